@@ -1,0 +1,1 @@
+"""What `make bench` measures, and the hand-written programs it measures against."""
