@@ -1,0 +1,51 @@
+# Two commands do everything on a machine with python3 (3.11 or newer) and make: make demo, make test.
+
+PYTHON ?= python3
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
+LOCK := pyproject.toml constraints.txt
+
+.PHONY: demo test bench lint clean
+
+demo: $(VENV)/installed
+	$(VENV)/bin/gantrytau demo
+
+test: lint
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest
+
+bench: $(VENV)/installed-bench
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
+
+lint: $(VENV)/installed-dev
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/basedpyright
+
+# A stamp is older than pyproject.toml or constraints.txt when the set-up has to be done again.
+$(VENV)/installed: $(LOCK) | $(VENV)/bin/pip
+	@echo "Installing gantrytau into $(VENV) ..."
+	$(PIP) install --quiet -e . -c constraints.txt
+	@touch $@
+
+$(VENV)/installed-dev: $(LOCK) | $(VENV)/bin/pip
+	@echo "Installing gantrytau and what its tests need into $(VENV) ..."
+	$(PIP) install --quiet -e '.[dev]' -c constraints.txt
+	@touch $(VENV)/installed $@
+
+$(VENV)/installed-bench: $(LOCK) | $(VENV)/bin/pip
+	@echo "Installing gantrytau and the peers it is measured against into $(VENV) ..."
+	$(PIP) install --quiet -e '.[bench]' -c constraints.txt
+	@touch $(VENV)/installed $@
+
+$(VENV)/bin/pip:
+	@command -v $(PYTHON) > /dev/null || { echo "$(PYTHON): not found; install Python 3.11 or newer" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "$$($(PYTHON) --version) found, 3.11 or newer expected; name another one: make PYTHON=python3.12 ..." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2> /dev/null || { \
+	  echo "$(PYTHON) cannot create environments; install its venv module (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# Keeps the environment, but has it checked by the next command.
+clean:
+	rm -rf build dist demo-output .pytest_cache .ruff_cache .hypothesis $(VENV)/installed*
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
