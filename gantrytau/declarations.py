@@ -1,0 +1,292 @@
+"""What stands in the body of a model class: quantities with unit and description, and arrays of components.
+
+A declaration is inert. When a model is instantiated each one is replaced, on the instance, by a CasADi
+symbol of the same shape; until then arithmetic on declarations is remembered as a formula, so that a
+parameter can be bound to others (`area = Parameter(width * height)`, `Cart(m=Base.m_total)`).
+"""
+
+import enum
+import operator
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from gantrytau.errors import ModelError
+
+Component = TypeVar("Component")
+
+
+class StateSelect(enum.IntEnum):
+    """How gladly a variable becomes a state (Modelica Language Specification 3.6, section 4.9.7.1)."""
+
+    NEVER = 0
+    AVOID = 1
+    DEFAULT = 2
+    PREFER = 3
+    ALWAYS = 4
+
+
+class Formula:
+    """An expression of declarations, evaluated when the model that contains it is instantiated."""
+
+    def __init__(self, function: Callable[..., Any], *arguments: Any):
+        self._function = function
+        self._arguments = arguments
+
+    def evaluate(self, scope: Any) -> Any:
+        """The value of the formula where `scope` is the instance whose class body holds it."""
+        return self._function(*(evaluate(argument, scope) for argument in self._arguments))
+
+    def __add__(self, other: Any) -> Any:
+        return Formula(operator.add, self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return Formula(operator.add, other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return Formula(operator.sub, self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return Formula(operator.sub, other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return Formula(operator.mul, self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return Formula(operator.mul, other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return Formula(operator.truediv, self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return Formula(operator.truediv, other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        return Formula(operator.pow, self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return Formula(operator.pow, other, self)
+
+    def __matmul__(self, other: Any) -> Any:
+        return Formula(operator.matmul, self, other)
+
+    def __rmatmul__(self, other: Any) -> Any:
+        return Formula(operator.matmul, other, self)
+
+    def __neg__(self) -> Any:
+        return Formula(operator.neg, self)
+
+    def __getitem__(self, index: Any) -> Any:
+        return Formula(operator.getitem, self, index)
+
+    def __iter__(self) -> Iterator[Any]:
+        raise ModelError(f"{type(self).__name__}: a declaration has elements only inside equations(self)")
+
+    def __getattr__(self, name: str) -> Any:
+        # only the symbol that stands here after instantiation has .T, .shape and the like
+        if name.startswith("__") or name not in {"T", "shape"}:
+            raise AttributeError(f"{type(self).__name__} has no attribute '{name}'")
+        return Formula(operator.attrgetter(name), self)
+
+    def __le__(self, other: Any) -> Any:
+        return _no_relation("<=")
+
+    def __ge__(self, other: Any) -> Any:
+        return _no_relation(">=")
+
+    def __lt__(self, other: Any) -> Any:
+        return _no_relation("<")
+
+    def __gt__(self, other: Any) -> Any:
+        return _no_relation(">")
+
+    def __eq__(self, other: Any) -> Any:
+        if self is other:
+            return True
+        return _no_relation("==")
+
+    __hash__ = object.__hash__
+
+
+def _no_relation(sign: str) -> Any:
+    raise ModelError(f"'{sign}' between declarations in a class body: equations stand in equations(self)")
+
+
+def evaluate(value: Any, scope: Any) -> Any:
+    """A formula evaluated in the instance `scope`; a function called with it; all else as it is."""
+    if isinstance(value, Formula):
+        return value.evaluate(scope)
+    if isinstance(value, (list, tuple)) and any(isinstance(item, Formula) for item in value):
+        return [evaluate(item, scope) for item in value]
+    if callable(value) and not isinstance(value, type):
+        return value(scope)
+    return value
+
+
+class Quantity(Formula):
+    """Base of Real, Parameter, Input, Output, Flow and Propagated."""
+
+    kind = "real"
+
+    def __init__(
+        self,
+        shape: Any = (),
+        *,
+        unit: str | None = None,
+        description: str = "",
+        start: Any = None,
+        fixed: bool = False,
+        min: Any = None,
+        max: Any = None,
+        nominal: Any = None,
+        prefer: StateSelect = StateSelect.DEFAULT,
+    ):
+        self.declared_shape = shape
+        self.unit = unit
+        self.description = description
+        self.start = start
+        self.fixed = fixed
+        self.min = min
+        self.max = max
+        self.nominal = nominal
+        self.prefer = prefer
+        self.name = ""
+        self.owner = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name, self.owner = name, owner.__name__
+
+    def evaluate(self, scope: Any) -> Any:
+        try:
+            found = getattr(scope, self.name)
+        except AttributeError:
+            found = self
+        if found is self or isinstance(found, Quantity):
+            raise ModelError(
+                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which is not a "
+                f"member of {type(scope).__name__}; refer to a parameter of the class that holds the expression"
+            )
+        return found
+
+    def words(self) -> str:
+        """Description and unit, for messages."""
+        return ", ".join(part for part in (self.description, self.unit or "") if part)
+
+
+class Real(Quantity):
+    """A real variable: `Real(unit="m")`, `Real(3, unit="m/s")`, `Real((3, 3))`.
+
+    shape: (), an int or a tuple; a function of the instance where it depends on its settings.
+    start: guess of the initial value (None: no opinion); fixed: the start is an initial condition.
+    min, max: limits used by optimisation; nominal: typical magnitude; prefer: see StateSelect.
+    """
+
+
+class Input(Quantity):
+    """A variable that is known from outside; the optimiser chooses it, `simulate` is given it."""
+
+    kind = "input"
+
+
+class Output(Quantity):
+    """A variable that the model offers to the outside."""
+
+    kind = "output"
+
+
+class Flow(Quantity):
+    """A connector variable whose sum over a connection is zero: force, torque, current."""
+
+    kind = "flow"
+
+
+class Propagated(Quantity):
+    """A connector quantity that is not a variable: it is passed on along a spanning tree of the frames.
+
+    Orientation is one: R of a frame is an expression of the joint angles between it and the root.
+    """
+
+    kind = "propagated"
+
+
+class Parameter(Quantity):
+    """A constant of one simulation: a number or array, or an expression of other parameters.
+
+    value: number, array, formula of declarations (`2 * m`), or function of the instance
+    (`lambda self: self.L / 2`). Its shape is that of the value, unless `shape` says otherwise.
+    evaluate: the value shapes the equations (a joint axis): it is folded in when the model is
+    translated, as Modelica's annotation Evaluate=true.
+    """
+
+    kind = "parameter"
+
+    def __init__(
+        self,
+        value: Any = None,
+        *,
+        unit: str | None = None,
+        description: str = "",
+        min: Any = None,
+        max: Any = None,
+        nominal: Any = None,
+        shape: Any = None,
+        evaluate: bool = False,
+    ):
+        if shape is None:
+            shape = () if value is None or callable(value) or isinstance(value, Formula) else np.shape(value)
+        super().__init__(shape, unit=unit, description=description, min=min, max=max, nominal=nominal)
+        self.value = value
+        self.fold = evaluate
+
+
+class Array(Generic[Component]):
+    """Several components of one class: `Array(Cart, 3, m=2.0)` or `Array(Cart, [dict(m=1.0), dict(m=2.0)])`."""
+
+    def __init__(self, component: Callable[..., Component], count: int | list[Any], **modifications: Any):
+        if isinstance(count, int):
+            count = [{} for _ in range(count)]
+        self.component = component
+        self.elements = [
+            component(**{**modifications, **one}) if isinstance(one, dict) else one for one in count
+        ]
+
+    def __getitem__(self, index: int) -> Component:
+        return self.elements[index]
+
+    def __iter__(self) -> Iterator[Component]:
+        return iter(self.elements)
+
+    def __len__(self) -> int:
+        return len(self.elements)
+
+
+class Start:
+    """Modification: the guess of an initial value, `x=Start(0.5)`."""
+
+    fixed = False
+
+    def __init__(self, value: Any):
+        self.value = value
+
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the variable that this modification sets."""
+        return dict(start=self.value, fixed=self.fixed)
+
+
+class Fixed(Start):
+    """Modification: an initial condition, `x=Fixed(0.5)`."""
+
+    fixed = True
+
+
+class Bounds:
+    """Modification: the limits of a variable, `x=Bounds(-1, 1)`."""
+
+    def __init__(self, min: Any = None, max: Any = None):
+        self.min = min
+        self.max = max
+
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the variable that this modification sets."""
+        return dict(min=self.min, max=self.max)

@@ -1,0 +1,70 @@
+"""The record of a flattened model: what crosses from the language to the compiler."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau.declarations import StateSelect
+from gantrytau.statements import Equation
+
+
+@dataclass(frozen=True, eq=False)
+class FlatVariable:
+    """A declared quantity, vectors whole.
+
+    name: dotted path; shape: (), (n,) or (n, m); elements: names of its scalars, column after column;
+    symbol: its SX; start, min, max: SX expressions of parameters per scalar, or None (no opinion);
+    model: class that declares it; owner: path of the component or connector that holds it.
+    """
+
+    name: str
+    kind: str
+    shape: tuple[int, ...]
+    elements: tuple[str, ...]
+    symbol: ca.SX
+    unit: str | None
+    description: str
+    start: tuple[ca.SX, ...] | None = None
+    fixed: bool = False
+    min: tuple[ca.SX, ...] | None = None
+    max: tuple[ca.SX, ...] | None = None
+    nominal: tuple[ca.SX, ...] | None = None
+    prefer: StateSelect = StateSelect.DEFAULT
+    owner: str = ""
+    free: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FlatParameter(FlatVariable):
+    """A parameter: `value` holds one SX per scalar, a number or an expression of other parameters.
+
+    fold: its value shapes the equations and is folded in at translation.
+    """
+
+    value: tuple[ca.SX, ...] = ()
+    fold: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FlatModel:
+    """A model written out: variables, parameters and scalar equations between their symbols.
+
+    derivatives: symbols of derivatives by name, `der(x)`; definitions: propagated quantities (such as
+    orientations) as expressions of variables; inputs: names of the scalars known from outside.
+    """
+
+    name: str
+    time: ca.SX
+    variables: tuple[FlatVariable, ...]
+    parameters: tuple[FlatParameter, ...]
+    equations: tuple[Equation, ...]
+    initial_equations: tuple[Equation, ...]
+    derivatives: Mapping[str, ca.SX]
+    definitions: Mapping[str, ca.SX]
+    inputs: tuple[str, ...]
+    hints: Mapping[str, str]
+
+    def find(self, name: str) -> FlatVariable | None:
+        """The variable or parameter of that name."""
+        return next((v for v in (*self.variables, *self.parameters) if v.name == name), None)

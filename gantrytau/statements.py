@@ -1,0 +1,140 @@
+"""What `equations(self)` yields: equations, connections, and the branches of orientation trees."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau.functions import Between
+from gantrytau.model import Connector
+from gantrytau.symbols import scalars
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """A scalar equation `left == right` and where it stands."""
+
+    left: ca.SX
+    right: ca.SX
+    path: str
+    model: str
+    number: int
+    element: int | None = None
+
+    @property
+    def residual(self) -> ca.SX:
+        """left - right."""
+        return self.left - self.right
+
+    @property
+    def name(self) -> str:
+        """Where the equation stands: 'carts[0] (Cart), equation 2, row 1'."""
+        row = "" if self.element is None else f", row {self.element}"
+        return f"{self.path or 'the model'} ({self.model}), equation {self.number}{row}"
+
+    @property
+    def text(self) -> str:
+        """The equation as written."""
+        return f"{self.left} == {self.right}"
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """`connect(a, b)`."""
+
+    a: Any
+    b: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A rigid or jointed way along which propagated quantities go from connector a to b and back."""
+
+    a: Any
+    b: Any
+    forward: dict[str, Any]
+    backward: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Root:
+    """A connector whose propagated quantities are given."""
+
+    connector: Any
+    values: dict[str, Any]
+
+
+def connect(a: Any, b: Any) -> Connection:
+    """Join two connectors: equal potentials, flows that sum to zero. Or two signals: equality.
+
+    Raises ModelError if the two are not of the same kind.
+    """
+    if isinstance(a, Connector) != isinstance(b, Connector):
+        raise ModelError(
+            f"connect({_kind(a)}, {_kind(b)}): found a connector and something else, expected two connectors"
+        )
+    return Connection(a, b)
+
+
+def branch(a: Connector, b: Connector, *, forward: dict[str, Any], backward: dict[str, Any]) -> Branch:
+    """State how propagated quantities of `b` follow from those of `a` (forward) and the reverse (backward)."""
+    return Branch(a, b, forward, backward)
+
+
+def root(connector: Connector, **values: Any) -> Root:
+    """State the propagated quantities of a connector outright, as the world frame does."""
+    return Root(connector, values)
+
+
+def _kind(value: Any) -> str:
+    return type(value).__name__
+
+
+def equality(statement: Any, path: str, model: str, number: int) -> list[Equation]:
+    """The scalar equations of one yielded `a == b`; ModelError if it is no equation or the shapes differ."""
+    place = f"{path or 'the model'} ({model}), equation {number}"
+    if isinstance(statement, (bool, np.bool_)):
+        raise ModelError(
+            f"{place}: found {statement!r}, expected an equation `a == b` of symbols; Python compared the "
+            "two sides itself. Join symbols with casadi.vertcat(...) instead of a list"
+        )
+    if isinstance(statement, Between) or not isinstance(statement, (ca.SX, ca.DM)):
+        raise ModelError(
+            f"{place}: found {_kind(statement)}, expected an equation `a == b` or connect(a, b)"
+        )
+    found: list[Equation] = []
+    elements = scalars(statement)
+    for row, element in enumerate(elements):
+        if element.is_constant():
+            if float(element) == 0.0:
+                raise ModelError(f"{place}: both sides are constants that differ, so it can never hold")
+            continue
+        if not element.is_op(ca.OP_EQ):
+            found_text = str(element)
+            raise ModelError(
+                f"{place}: found '{found_text[:80]}', expected an equation; write `a == b`"
+            )
+        found.append(
+            Equation(
+                element.dep(0), element.dep(1), path, model, number, row if len(elements) > 1 else None
+            )
+        )
+    if not found:
+        raise ModelError(f"{place}: both sides are the same, so it says nothing; remove it or correct it")
+    _check_shapes(found, place)
+    return found
+
+
+def _check_shapes(rows: list[Equation], place: str) -> None:
+    # CasADi repeats a scalar to fit a vector; a number may stand for a vector of numbers, a symbol may not
+    if len(rows) < 2:
+        return
+    for side in ("left", "right"):
+        nodes = [getattr(row, side) for row in rows]
+        if not nodes[0].is_constant() and len({node.element_hash() for node in nodes}) == 1:
+            raise ModelError(
+                f"{place}: found shapes ({len(rows)},) and () in '{rows[0].text}' and the rows below, expected "
+                "the same shape on both sides; index the vector, or repeat the scalar in separate equations"
+            )

@@ -1,0 +1,117 @@
+"""The symbols of one instantiated model and their time derivatives."""
+
+from collections.abc import Iterable
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from gantrytau.errors import ModelError
+
+time = ca.SX.sym("time")  # the independent variable of every model, in s
+
+
+@dataclass(frozen=True, eq=False)
+class Symbol:
+    """A scalar symbol: a variable, a parameter, or the `order`-th derivative of variable `base`."""
+
+    name: str
+    sx: ca.SX
+    kind: str  # real, input, output, flow, parameter, propagated
+    base: str
+    order: int
+
+
+class Symbols:
+    """All scalar symbols of one model, found by name or by the CasADi node that stands for them."""
+
+    def __init__(self) -> None:
+        self.by_name: dict[str, Symbol] = {}
+        self._by_node: dict[int, Symbol] = {}
+
+    def add(self, name: str, kind: str, base: str | None = None, order: int = 0) -> Symbol:
+        """A new symbol of that name."""
+        symbol = Symbol(name, ca.SX.sym(name), kind, base or name, order)
+        self.by_name[name] = symbol
+        self._by_node[symbol.sx.element_hash()] = symbol
+        return symbol
+
+    def find(self, node: ca.SX) -> Symbol | None:
+        """The symbol that the scalar expression `node` is, or None."""
+        return self._by_node.get(node.element_hash())
+
+    def derivative(self, symbol: Symbol) -> Symbol:
+        """The time derivative of a variable, made when it is first asked for."""
+        name = derivative_name(symbol.base, symbol.order + 1)
+        return self.by_name.get(name) or self.add(name, symbol.kind, symbol.base, symbol.order + 1)
+
+    def total_derivative(self, expression: ca.SX) -> ca.SX:
+        """d/dt of a scalar expression by the chain rule; parameters are constant."""
+        found = self.find(expression)
+        if found is not None:
+            return ca.SX(0) if found.kind == "parameter" else self.derivative(found).sx
+        inside, rates = [time], [ca.SX(1)]
+        for leaf in ca.symvar(expression):
+            symbol = self.find(leaf)
+            if symbol is not None and symbol.kind != "parameter":
+                inside.append(leaf)
+                rates.append(self.derivative(symbol).sx)
+        return ca.jtimes(expression, ca.vertcat(*inside), ca.vertcat(*rates))
+
+
+def derivative_name(base: str, order: int) -> str:
+    """`der(der(x))` for ("x", 2)."""
+    return "der(" * order + base + ")" * order
+
+
+def split_derivative(name: str) -> tuple[str, int]:
+    """("x", 2) for `der(der(x))`."""
+    order = 0
+    while name.startswith("der(") and name.endswith(")"):
+        name, order = name[4:-1], order + 1
+    return name, order
+
+
+def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
+    """Names of the elements of a quantity, column after column as CasADi orders them."""
+    if shape == ():
+        return [name]
+    if len(shape) == 1:
+        return [f"{name}[{i}]" for i in range(shape[0])]
+    return [f"{name}[{i},{j}]" for j in range(shape[1]) for i in range(shape[0])]
+
+
+_current: ContextVar[Symbols | None] = ContextVar("symbols of the model being written out", default=None)
+
+
+@contextmanager
+def writing(symbols: Symbols):
+    """While it lasts, `der` refers to these symbols."""
+    token = _current.set(symbols)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def der(expression: Any) -> ca.SX:
+    """Time derivative of a variable or expression, of the same shape; for use in equations(self).
+
+    Raises ModelError outside of the equations of a model.
+    """
+    symbols = _current.get()
+    if symbols is None:
+        raise ModelError(
+            "der() was called outside of equations(self), where there are no symbols yet; "
+            "a result is asked for a derivative by name: result['der(x)']"
+        )
+    expression = ca.densify(ca.SX(expression))
+    elements = [symbols.total_derivative(element) for element in expression.elements()]
+    return ca.reshape(ca.vertcat(*elements), *expression.shape)
+
+
+def scalars(expression: Iterable[Any] | Any) -> list[ca.SX]:
+    """The elements of an SX (or of numbers), column after column."""
+    return ca.densify(ca.SX(expression)).elements()

@@ -1,0 +1,89 @@
+"""Units as Modelica writes them ("kg.m2", "m/s2", "N.m.s/rad"), reduced to SI dimensions.
+
+Modelica Language Specification 3.6, chapter 19. The radian is of dimension one, as in the SI. Only
+coherent units are known: a millimetre inside a model would be a factor of a thousand nobody applies.
+"""
+
+import re
+from fractions import Fraction
+from functools import lru_cache
+
+from gantrytau.errors import ModelError
+
+BASE = ("m", "kg", "s", "A", "K", "mol", "cd")
+ONE = (Fraction(0),) * len(BASE)
+
+Dimension = tuple[Fraction, ...]
+
+
+def _dimension(**powers: int) -> Dimension:
+    return tuple(Fraction(powers.get(base, 0)) for base in BASE)
+
+
+SYMBOLS: dict[str, Dimension] = {
+    "1": ONE,
+    "rad": ONE,
+    "sr": ONE,
+    "m": _dimension(m=1),
+    "kg": _dimension(kg=1),
+    "s": _dimension(s=1),
+    "A": _dimension(A=1),
+    "K": _dimension(K=1),
+    "mol": _dimension(mol=1),
+    "cd": _dimension(cd=1),
+    "Hz": _dimension(s=-1),
+    "N": _dimension(m=1, kg=1, s=-2),
+    "Pa": _dimension(m=-1, kg=1, s=-2),
+    "J": _dimension(m=2, kg=1, s=-2),
+    "W": _dimension(m=2, kg=1, s=-3),
+    "C": _dimension(A=1, s=1),
+    "V": _dimension(m=2, kg=1, s=-3, A=-1),
+    "Ohm": _dimension(m=2, kg=1, s=-3, A=-2),
+    "F": _dimension(m=-2, kg=-1, s=4, A=2),
+    "H": _dimension(m=2, kg=1, s=-2, A=-2),
+    "Wb": _dimension(m=2, kg=1, s=-2, A=-1),
+    "T": _dimension(kg=1, s=-2, A=-1),
+    "S": _dimension(m=-2, kg=-1, s=3, A=2),
+}
+FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1)(?P<power>[+-]?\d+)?$")
+
+
+@lru_cache(maxsize=None)
+def dimension(unit: str) -> Dimension:
+    """SI exponents (m, kg, s, A, K, mol, cd) of a unit; ModelError for a text that is none."""
+    numerator, *denominators = unit.replace(" ", "").split("/")
+    if len(denominators) > 1:
+        raise ModelError(f"unit '{unit}' has {len(denominators)} '/'; write one, as in 'N.m/(rad.s)'")
+    total = list(ONE)
+    for text, sign in ((numerator, 1), *((part, -1) for part in denominators)):
+        for factor in text.strip("()").split("."):
+            for place, power in enumerate(_factor(factor, unit)):
+                total[place] += sign * power
+    return tuple(total)
+
+
+def _factor(text: str, unit: str) -> Dimension:
+    match = FACTOR.match(text)
+    if match is None:
+        raise ModelError(f"unit '{unit}': cannot read '{text}'; write units as in 'kg.m2/s2'")
+    symbol, power = match["symbol"], int(match["power"] or 1)
+    if symbol not in SYMBOLS:
+        raise ModelError(
+            f"unit '{unit}': '{symbol}' is not a coherent SI unit; quantities are in SI inside a model "
+            "(m, kg, s, rad, N, N.m, ...), convert where the number enters"
+        )
+    return tuple(power * exponent for exponent in SYMBOLS[symbol])
+
+
+def unit_text(dimension: Dimension) -> str:
+    """A dimension written out in base units, for messages: 'kg.m/s2'."""
+
+    def product(items):
+        return ".".join(f"{base}{'' if power == 1 else power}" for base, power in items)
+
+    above = [(base, power) for base, power in zip(BASE, dimension, strict=True) if power > 0]
+    below = [(base, -power) for base, power in zip(BASE, dimension, strict=True) if power < 0]
+    text = product(above) or "1"
+    if below:
+        text += "/" + (product(below) if len(below) == 1 else f"({product(below)})")
+    return text
