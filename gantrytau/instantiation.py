@@ -24,7 +24,7 @@ class Leaf:
 
 
 @dataclass(eq=False)
-class Declared_:
+class Placed:
     """A quantity of the instantiated model while its attributes are still formulas."""
 
     path: str
@@ -42,7 +42,7 @@ class Instance:
 
     root: Any
     symbols: Symbols
-    quantities: list[Declared_]
+    quantities: list[Placed]
     components: list[tuple[str, Any]]
     connectors: list[tuple[str, Any, str]]  # path, connector, path of the component it belongs to
     paths: dict[int, str]  # id of a component or connector -> its path
@@ -69,7 +69,7 @@ def instantiate(model: Model) -> Instance:
 class _Builder:
     def __init__(self) -> None:
         self.symbols = Symbols()
-        self.quantities: list[Declared_] = []
+        self.quantities: list[Placed] = []
         self.components: list[tuple[str, Any]] = []
         self.connectors: list[tuple[str, Any, str]] = []
         self.paths: dict[int, str] = {}
@@ -161,7 +161,7 @@ class _Builder:
         vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
         symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
         instance.__dict__[name] = symbol
-        self.quantities.append(Declared_(path, full, declaration, shape, symbol, attributes, names))
+        self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names))
 
     def resolve_outers(self) -> None:
         for instance, name, wanted, around in self.outers:

@@ -10,7 +10,24 @@ from gantrytau.declarations import Array, Quantity
 from gantrytau.errors import ModelError, did_you_mean
 
 
-class Declared:
+class _Part:
+    """What a class body may hold besides quantities and arrays."""
+
+
+_PARTS = (Quantity, _Part)
+
+
+def refuse_container(path: str, value: Any) -> None:
+    """ModelError for a list, tuple or dict of components, which would be lost silently."""
+    items = value.values() if isinstance(value, Mapping) else value
+    if isinstance(value, (list, tuple, Mapping)) and any(isinstance(x, _PARTS) for x in items):
+        raise ModelError(
+            f"{path} is a {type(value).__name__} of declarations, which would not become part of the model; "
+            "declare several components with Array(Component, count) and several numbers with Real(count)"
+        )
+
+
+class Declared(_Part):
     """Base of Model and Connector: declarations in the class body, modifications as keywords."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
@@ -131,13 +148,3 @@ def check_member(cls: type[Any], name: str, path: str) -> None:
 def is_setting(value: Any, name: str) -> bool:
     """Whether a class attribute is a plain constant that shapes the model, such as `order = 2`."""
     return not name.startswith("_") and isinstance(value, (bool, int, float, str))
-
-
-def refuse_container(path: str, value: Any) -> None:
-    """ModelError for a list, tuple or dict of components, which would be lost silently."""
-    items = value.values() if isinstance(value, Mapping) else value
-    if isinstance(value, (list, tuple, Mapping)) and any(isinstance(x, (Declared, Quantity)) for x in items):
-        raise ModelError(
-            f"{path} is a {type(value).__name__} of declarations, which would not become part of the model; "
-            "declare several components with Array(Component, count) and several numbers with Real(count)"
-        )

@@ -1,0 +1,48 @@
+"""gantrytau: acausal modelling on CasADi, for robots with closed kinematic loops and everything else."""
+
+from gantrytau.dae import Dae
+from gantrytau.declarations import (
+    Array,
+    Bounds,
+    Fixed,
+    Flow,
+    Input,
+    Output,
+    Parameter,
+    Propagated,
+    Real,
+    Start,
+    StateSelect,
+)
+from gantrytau.errors import (
+    GantryTauError,
+    InitializationError,
+    ModelError,
+    SolveError,
+    StructureError,
+)
+from gantrytau.flat_model import FlatModel
+from gantrytau.flattening import flatten
+from gantrytau.functions import (
+    acos,
+    asin,
+    atan,
+    atan2,
+    between,
+    cos,
+    cross,
+    dot,
+    exp,
+    fabs,
+    if_else,
+    log,
+    norm_2,
+    sin,
+    sqrt,
+    tan,
+    tanh,
+)
+from gantrytau.model import Connector, Model, outer
+from gantrytau.statements import branch, connect, root
+from gantrytau.symbols import der, time
+from gantrytau.translation import translate

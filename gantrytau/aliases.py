@@ -1,0 +1,223 @@
+"""Alias elimination: variables that are equal to another one, up to sign, factor, constant or derivative.
+
+`v == der(s)` makes v the first derivative of s, so that mechanics stays of second order.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau.flat_model import FlatModel
+from gantrytau.parameters import ParameterTable
+from gantrytau.statements import Equation
+from gantrytau.symbols import derivative_name, split_derivative
+
+LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
+
+
+@dataclass(frozen=True, eq=False)
+class Alias:
+    """variable = factor * (order-th derivative of root) + offset; root None: a constant."""
+
+    root: str | None
+    order: int
+    factor: float
+    offset: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Equations that are left, and for every variable what it is an alias of.
+
+    residuals: one scalar SX per remaining equation, in symbols of `chains`; equations: where they come from.
+    """
+
+    residuals: tuple[ca.SX, ...]
+    equations: tuple[Equation, ...]
+    aliases: Mapping[str, Alias]
+    unknowns: tuple[str, ...]
+    known: frozenset[str]
+    chains: "Chains"
+
+
+class Chains:
+    """Symbols of variables and their derivatives, the missing ones made when asked for."""
+
+    def __init__(self, flat: FlatModel):
+        self._sx: dict[str, ca.SX] = dict(flat.derivatives)
+        for variable in flat.variables:
+            self._sx.update(zip(variable.elements, variable.symbol.elements(), strict=True))
+
+    def sx(self, root: str, order: int = 0) -> ca.SX:
+        """The symbol of the order-th derivative of a variable."""
+        name = derivative_name(root, order)
+        if name not in self._sx:
+            self._sx[name] = ca.SX.sym(name)
+        return self._sx[name]
+
+    def named(self, name: str) -> ca.SX:
+        """The symbol of that name, `x` or `der(x)`."""
+        return self.sx(*split_derivative(name))
+
+
+class _Terms:
+    """A sum of factors times symbols plus an offset of parameters."""
+
+    def __init__(self) -> None:
+        self.factors: dict[str, float] = {}
+        self.offset = ca.SX(0)
+
+
+def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Reduced:
+    """Remove all aliases. `known`: scalars that are given as functions of time."""
+    return _Elimination(flat, table, known).run()
+
+
+class _Elimination:
+    def __init__(self, flat: FlatModel, table: ParameterTable, known: frozenset[str]):
+        self.flat, self.known = flat, known
+        self.chains = Chains(flat)
+        self.parents: dict[str, Alias] = {}
+        self.parameters = set(table.independent)
+        self.rank: dict[str, tuple[int, ...]] = {}
+        for place, variable in enumerate(flat.variables):
+            for name in variable.elements:
+                self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
+        sides = table.reduce(ca.vertcat(*(e.residual for e in flat.equations)))
+        self.residuals = ca.SX(sides).elements() if flat.equations else []
+
+    def run(self) -> Reduced:
+        remaining = list(range(len(self.residuals)))
+        while True:
+            sums = {i: terms for i in remaining if (terms := self._sum(self.residuals[i])) is not None}
+            changed = False
+            while True:
+                used = [i for i, terms in sums.items() if self._use(terms)]
+                if not used:
+                    break
+                changed = True
+                for i in used:
+                    del sums[i]
+                    remaining.remove(i)
+            if not changed:
+                break
+            for i, new in zip(remaining, self._substitute([self.residuals[i] for i in remaining]), strict=True):
+                self.residuals[i] = new
+        names = [n for v in self.flat.variables for n in v.elements]
+        aliases = {n: self.resolve(n, 0) for n in names}
+        used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
+        unknowns = tuple(n for n in names if n in used_names and n not in self.known)
+        return Reduced(
+            tuple(self.residuals[i] for i in remaining),
+            tuple(self.flat.equations[i] for i in remaining),
+            aliases,
+            unknowns,
+            self.known,
+            self.chains,
+        )
+
+    def resolve(self, name: str, order: int) -> Alias:
+        """What the order-th derivative of a variable is."""
+        factor, offset = 1.0, ca.SX(0)
+        while (alias := self.parents.get(name)) is not None:
+            if order == 0:
+                offset = offset + factor * alias.offset
+            if alias.root is None:
+                return Alias(None, 0, 0.0, offset)
+            factor *= alias.factor
+            name, order = alias.root, order + alias.order
+        return Alias(name, order, factor, offset)
+
+    def _sum(self, expression: ca.SX) -> _Terms | None:
+        """The expression as a sum of symbols times numbers, or None if it is none."""
+        terms = _Terms()
+        stack = [(expression, 1.0)]
+        for _ in range(3 * LONGEST_SUM):
+            if not stack:
+                return terms
+            node, factor = stack.pop()
+            if node.is_symbolic():
+                name = node.name()
+                if name in self.parameters:
+                    terms.offset = terms.offset + factor * node
+                elif name == self.flat.time.name():
+                    return None
+                else:
+                    terms.factors[name] = terms.factors.get(name, 0.0) + factor
+            elif node.is_constant():
+                terms.offset = terms.offset + factor * float(node)
+            elif node.is_op(ca.OP_ADD):
+                stack += [(node.dep(0), factor), (node.dep(1), factor)]
+            elif node.is_op(ca.OP_SUB):
+                stack += [(node.dep(0), factor), (node.dep(1), -factor)]
+            elif node.is_op(ca.OP_NEG):
+                stack.append((node.dep(0), -factor))
+            elif node.is_op(ca.OP_TWICE):
+                stack.append((node.dep(0), 2 * factor))
+            elif node.is_op(ca.OP_MUL) and node.dep(0).is_constant():
+                stack.append((node.dep(1), factor * float(node.dep(0))))
+            elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
+                stack.append((node.dep(0), factor * float(node.dep(1))))
+            elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
+                terms.offset = terms.offset + factor * node
+            else:
+                return None
+        return None
+
+    def _use(self, terms: _Terms) -> bool:
+        """Turn the sum into an alias if at most two symbols are left in it."""
+        factors: dict[tuple[str, int], float] = {}
+        offset = terms.offset
+        for name, factor in terms.factors.items():
+            alias = self.resolve(*split_derivative(name))
+            offset = offset + factor * alias.offset
+            if alias.root is not None:
+                key = (alias.root, alias.order)
+                factors[key] = factors.get(key, 0.0) + factor * alias.factor
+        left = [(key, factor) for key, factor in factors.items() if abs(factor) > 1e-12]
+        if not left or len(left) > 2:
+            return False
+        if len(left) == 1:
+            ((name, order), factor) = left[0]
+            if order > 0 or name in self.known:
+                return False
+            self.parents[name] = Alias(None, 0, 0.0, -offset / factor)
+            return True
+        (a, factor_a), (b, factor_b) = left
+        if a[1] == b[1] == 0:
+            if self.rank[a[0]] < self.rank[b[0]]:
+                a, b, factor_a, factor_b = b, a, factor_b, factor_a
+        elif a[1] > 0 and b[1] == 0:
+            a, b, factor_a, factor_b = b, a, factor_b, factor_a
+        constant = offset.is_constant() and float(offset) == 0.0
+        if a[1] > 0 or a[0] in self.known or a[0] == b[0] or (b[1] > 0 and not constant):
+            return False
+        self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, -offset / factor_a)
+        return True
+
+    def _substitute(self, residuals: list[ca.SX]) -> list[ca.SX]:
+        if not residuals:
+            return []
+        vector = ca.vertcat(*residuals)
+        old, new = [], []
+        for leaf in ca.symvar(vector):
+            name, order = split_derivative(leaf.name())
+            if name in self.parents:
+                alias = self.resolve(name, order)
+                old.append(leaf)
+                new.append(self.expression(alias))
+        return ca.substitute(vector, ca.vertcat(*old), ca.vertcat(*new)).elements() if old else residuals
+
+    def expression(self, alias: Alias) -> ca.SX:
+        return alias_expression(alias, self.chains)
+
+
+def alias_expression(alias: Alias, chains: Chains) -> ca.SX:
+    """The alias written out."""
+    if alias.root is None:
+        return alias.offset
+    symbol = chains.sx(alias.root, alias.order)
+    scaled = symbol if alias.factor == 1.0 else (-symbol if alias.factor == -1.0 else alias.factor * symbol)
+    zero = alias.offset.is_constant() and float(alias.offset) == 0.0
+    return scaled if zero else scaled + alias.offset

@@ -1,0 +1,177 @@
+"""Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.blocks import block_pattern
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.solution import Block, solve_block
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.translation import all_symbols, translate_flat
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+
+def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Function:
+    """See Dae.function."""
+    dae = _with_parameters(dae, given)
+    columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
+    known = _known(dae, given, columns)
+    targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
+    blocks = _blocks(dae, known, targets, find)
+    if blocks is None:
+        dae = _flipped(dae, given, find)
+        known = _known(dae, given, columns)
+        targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
+        blocks = _blocks(dae, known, targets, find)
+        if blocks is None:
+            raise StructureError(_undetermined(dae, known, targets, given, find))
+    return _compose(dae, blocks, known, targets, given, find, columns)
+
+
+def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":
+    """Parameters that are given stay symbols, even those that shape the equations."""
+    scalars = [n for name in given for n in dae.expand(name)]
+    symbols = [n for n in scalars if n in dae.table.symbols and n not in dae.table.independent]
+    if not symbols:
+        return dae
+    parameters = [n for n in scalars if n in dae.table.symbols]
+    chosen = {k: dae.settings[k] for k in ("find", "states")}
+    return translate_flat(dae.flat, given=(*dae.known, *parameters), **chosen)
+
+
+def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
+    """Expression of each known symbol in the arguments of the function."""
+    known: dict[str, ca.SX] = {}
+    for name, symbols in zip(given, columns, strict=True):
+        for scalar, argument in zip(dae.expand(name), symbols, strict=True):
+            base, order = split_derivative(scalar)
+            if base in dae.table.symbols or base == dae.flat.time.name():
+                symbol, value = base, argument
+            elif base in dae.flat.definitions:
+                raise ModelError(f"{scalar} follows from other variables and cannot be given; name those")
+            else:
+                alias = dae.reduced.aliases[base]
+                if alias.root is None:
+                    raise ModelError(f"{scalar} is constant in {dae.name} and cannot be given")
+                symbol = derivative_name(alias.root, alias.order + order)
+                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+                value = (argument - offset) / alias.factor
+            if symbol in known:
+                raise StructureError(f"{scalar} is given twice under two names; leave one of them out")
+            known[symbol] = value
+    return known
+
+
+def _blocks(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]) -> list[Block] | None:
+    """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
+    wanted = [n for n in wanted if n not in dae.table.symbols and n != dae.flat.time.name()]
+    missing = [n for n in wanted if n not in set(unknowns)]
+    pattern = block_pattern(dae.indexed.residuals, unknowns, wanted)
+    if pattern.surplus:
+        names = "; ".join(dae.equation_name(k) for k in pattern.surplus[:3])
+        raise StructureError(
+            f"{dae.name}: the given names determine more than there is to choose; contradicted: {names}. "
+            "Leave out one of the given names"
+        )
+    if missing or pattern.undetermined:
+        return None
+    symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
+    return [solve_block(e, u, dae.indexed.residuals, symbols, dae.start) for e, u in pattern.blocks]
+
+
+def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
+    """The model translated anew with the given variables as known functions of time."""
+    scalars = [n for name in given for n in dae.expand(name) if not n.startswith("der(") and n != "time"]
+    variables = [n for n in scalars if n not in dae.table.symbols]
+    parameters = [n for n in scalars if n in dae.table.symbols]
+    roots: dict[str, str] = {}
+    for name in variables:
+        alias = dae.reduced.aliases[name]
+        if alias.root is not None and alias.order == 0:
+            roots.setdefault(alias.root, name)
+    return translate_flat(dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start)
+
+
+def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], given, find) -> str:
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    missing = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
+    text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."
+    if missing:
+        return f"{text} Give also {', '.join(missing[:6])}."
+    return f"{text} Give more names: states, inputs, or derivatives such as der({given[0] if given else 'x'})."
+
+
+def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> ca.Function:
+    numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
+    definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
+    definitions += [
+        (dae.table.symbols[n] if n in dae.table.symbols else dae.flat.time if n == "time" else dae.reduced.chains.named(n), e)
+        for n, e in known.items()
+    ]
+    implicit: list[Block] = []
+    for block in blocks:
+        if block.solution is None:
+            implicit.append(block)
+        else:
+            definitions += zip(block.tears, block.solution, strict=True)
+        definitions += block.inner
+    expressions = [*(r for b in implicit for r in b.residuals), *targets]
+    symbols, values = [v for v, _ in definitions], [e for _, e in definitions]
+    _, expressions = ca.substitute_inplace(symbols, values, expressions, False)
+    arguments = [ca.vertcat(*column) for column in columns]
+    names_in, names_out = _legal(given, "i"), _legal(find, "o")
+    _refuse_time(expressions, dae)
+    if not implicit:
+        return ca.Function("f", arguments, expressions, names_in, names_out, {"cse": True})
+    return _with_iteration(dae, implicit, expressions, arguments, names_in, names_out)
+
+
+def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in, names_out) -> ca.Function:
+    """Blocks without closed form are solved by Newton's method, one after another."""
+    q = ca.vertcat(*arguments)
+    x = [ca.MX.sym(name, a.shape[0]) for name, a in zip(names_in, arguments, strict=True)]
+    qx = ca.vertcat(*x)
+    before, solved = ca.SX(0, 1), ca.MX(0, 1)
+    place = 0
+    for number, block in enumerate(implicit):
+        y = ca.vertcat(*block.tears)
+        f = ca.vertcat(*expressions[place : place + len(block.tears)])
+        place += len(block.tears)
+        residual = ca.Function("residual", [y, ca.vertcat(q, before)], [f], {"cse": True})
+        options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
+        newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
+        guess = ca.DM([dae.start[s.name()] for s in block.tears])
+        solved = ca.vertcat(solved, newton(guess, ca.vertcat(qx, solved)))
+        before = ca.vertcat(before, y)
+    outside = ca.Function("rest", [q, before], list(expressions[place:]), {"cse": True})
+    found = outside(qx, solved)
+    found = list(found) if isinstance(found, (tuple, list)) else [found]
+    return ca.Function("f", x, found, names_in, names_out)
+
+
+def _refuse_time(expressions, dae) -> None:
+    if any(leaf.name() == dae.flat.time.name() for leaf in ca.symvar(ca.vertcat(*expressions)) if not leaf.is_constant()):
+        time_is_argument = any(leaf is dae.flat.time for leaf in ca.symvar(ca.vertcat(*expressions)))
+        if time_is_argument:
+            raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")
+
+
+def _legal(names: Sequence[str], prefix: str) -> list[str]:
+    """Names as CasADi accepts them: letters, digits and single underscores, all different."""
+    found: list[str] = []
+    for name in names:
+        text = "".join(c if c.isalnum() else "_" for c in name).strip("_")
+        while "__" in text:
+            text = text.replace("__", "_")
+        if not text or not text[0].isalpha():
+            text = f"{prefix}_{text}".rstrip("_")
+        while text in found:
+            text += "x"
+        found.append(text)
+    return found

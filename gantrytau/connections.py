@@ -1,0 +1,93 @@
+"""Connections become equations: potentials are equal, flows sum to zero (Modelica specification 3.6, 9.2)."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import casadi as ca
+
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.instantiation import Instance
+from gantrytau.model import Connector
+from gantrytau.statements import Connection, Equation, equality
+from gantrytau.symbols import scalars
+
+# a connector seen from outside its component has sign +1, from inside -1: what flows in there leaves here
+Face = tuple[str, int]
+
+
+def connection_equations(
+    instance: Instance, connections: Iterable[tuple[str, Connection]]
+) -> list[Equation]:
+    """Equations of all connections, and zero flow for the connectors that stay unconnected.
+
+    connections: pairs of the path of the component that states it, and the statement.
+    """
+    members = {path: connector for path, connector, _ in instance.connectors}
+    owners = {path: owner for path, _, owner in instance.connectors}
+    parent: dict[Face, Face] = {(path, 1): (path, 1) for path in members}
+    equations: list[Equation] = []
+
+    def find(face: Face) -> Face:
+        parent.setdefault(face, face)
+        while parent[face] != face:
+            parent[face] = parent[parent[face]]
+            face = parent[face]
+        return face
+
+    for number, (where, connection) in enumerate(connections, start=1):
+        if not isinstance(connection.a, Connector):
+            equations += equality(connection.a == connection.b, where, "connection", number)
+            continue
+        faces: list[Face] = []
+        for end in (connection.a, connection.b):
+            path = _path(instance, end, where)
+            faces.append((path, -1 if owners[path] == where else 1))
+        _check_same(connection, faces, where)
+        parent[find(faces[0])] = find(faces[1])
+    sets: dict[Face, list[Face]] = {}
+    for face in parent:
+        sets.setdefault(find(face), []).append(face)
+    for faces in sets.values():
+        equations += _set_equations([(members[path], path, sign) for path, sign in faces])
+    return equations
+
+
+def _path(instance: Instance, end: Any, where: str) -> str:
+    try:
+        return instance.path(end)
+    except KeyError:
+        raise ModelError(
+            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of this model, "
+            "expected a connector reached through self"
+        ) from None
+
+
+def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
+    a, b = (set(type(end).members()) for end in (connection.a, connection.b))
+    if a != b:
+        kinds = [f"{path} ({type(end).__name__})" for (path, _), end in zip(faces, (connection.a, connection.b), strict=True)]
+        missing = sorted(a ^ b)[0]
+        raise ModelError(
+            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: '{missing}' is in "
+            f"one of them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
+        )
+
+
+def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
+    first, first_path, _ = members[0]
+    where = " - ".join(path for _, path, _ in members)
+    equations: list[Equation] = []
+    for number, (name, declaration) in enumerate(type(first).members().items(), start=1):
+        columns = [scalars(getattr(connector, name)) for connector, _, _ in members]
+        signs = [sign for _, _, sign in members]
+        for row in range(len(columns[0])):
+            element = row if len(columns[0]) > 1 else None
+            if declaration.kind == "flow":
+                total = sum((sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0))
+                equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
+            elif declaration.kind != "propagated":
+                equations += [
+                    Equation(columns[0][row], column[row], where, "connection", number, element)
+                    for column in columns[1:]
+                ]
+    return equations

@@ -1,0 +1,232 @@
+"""The translated model: a frozen record that simulation, optimisation and export consume."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.aliases import Reduced, alias_expression
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.flat_model import FlatModel, FlatVariable
+from gantrytau.index_reduction import Indexed, Key
+from gantrytau.parameters import ParameterTable
+from gantrytau.solution import Block
+from gantrytau.states import StateChoice
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.system import System, assemble
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What translation found out: sizes, states and their conditioning, blocks. Prints itself."""
+
+    model: str
+    unknowns: int
+    equations: int
+    aliases: int
+    differentiated: int
+    mobility: int
+    redundant: tuple[str, ...]
+    states: tuple[str, ...]
+    condition: float
+    blocks: tuple[tuple[str, int, int], ...]  # kind, unknowns, torn unknowns
+
+    def __str__(self) -> str:
+        several = [f"{kind} {size}" + (f" -> {torn}" if torn < size else "") for kind, size, torn in self.blocks if size > 1]
+        return "\n".join(
+            [
+                f"{self.model}: {self.equations} equations, {self.unknowns} unknowns",
+                f"  {self.aliases} aliases removed, {self.differentiated} equations differentiated",
+                f"  mobility {self.mobility}, redundant constraints: {', '.join(self.redundant) or 'none'}",
+                f"  states (condition {self.condition:.3g}): {', '.join(self.states) or 'none'}",
+                f"  {len(self.blocks)} blocks, of them with several unknowns: {', '.join(several) or 'none'}",
+            ]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Dae:
+    """A differential-algebraic system of index one, sorted into blocks that are solved one after another.
+
+    Made by `translate`. Names are those of the model; a vector's name stands for its elements.
+    """
+
+    flat: FlatModel
+    table: ParameterTable
+    reduced: Reduced
+    indexed: Indexed
+    choice: StateChoice
+    blocks: tuple[Block, ...]
+    known: tuple[str, ...]
+    start: Mapping[str, float]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Class of the model."""
+        return self.flat.name
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states (scalars), as the model calls them: a speed by its own name, not `der(...)`."""
+        return tuple(self._spoken(name) for name in self.choice.states)
+
+    @property
+    def algebraics(self) -> tuple[str, ...]:
+        """Unknowns that have to be found by iteration, because their block has no closed form."""
+        return tuple(y.name() for block in self.blocks if block.solution is None for y in block.tears)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what is known from outside, scalars."""
+        return self.known
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the declared outputs, scalars."""
+        return tuple(n for v in self.flat.variables if v.kind == "output" for n in v.elements)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of all parameters, scalars."""
+        return tuple(n for p in self.flat.parameters for n in p.elements)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of all variables, scalars, aliases and propagated quantities included."""
+        return (*(n for v in self.flat.variables for n in v.elements), *self.flat.definitions)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis:
+        """Sizes, mobility, states and blocks; prints itself."""
+        positions = sum(1 for n in self.choice.states if not n.startswith("der("))
+        return Diagnosis(
+            model=self.name,
+            unknowns=sum(len(v.elements) for v in self.flat.variables) - len(self.known),
+            equations=len(self.flat.equations),
+            aliases=len(self.flat.equations) - len(self.reduced.residuals),
+            differentiated=sum(1 for c in self.indexed.counts if c),
+            mobility=positions,
+            redundant=(),
+            states=self.states,
+            condition=self.choice.condition,
+            blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in self.blocks),
+        )
+
+    @cached_property
+    def vectors(self) -> Mapping[str, FlatVariable]:
+        """Declared quantities by their whole names."""
+        return {v.name: v for v in (*self.flat.variables, *self.flat.parameters)}
+
+    def expand(self, name: str) -> tuple[str, ...]:
+        """The scalar names of `name` (a scalar, a vector, or a derivative of one); ModelError if unknown."""
+        base, order = split_derivative(name)
+        if base in self.vectors:
+            return tuple(derivative_name(n, order) for n in self.vectors[base].elements)
+        if base in self._scalars:
+            return (name,)
+        if base in self._definition_vectors:
+            return self._definition_vectors[base]
+        known = [*self._scalars, *self.vectors]
+        raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
+
+    @cached_property
+    def _definition_vectors(self) -> dict[str, tuple[str, ...]]:
+        found: dict[str, list[str]] = {}
+        for name in self.flat.definitions:
+            found.setdefault(name.partition("[")[0], []).append(name)
+        return {name: tuple(elements) for name, elements in found.items()}
+
+    @cached_property
+    def _scalars(self) -> frozenset[str]:
+        return frozenset((*self.variables, *self.parameters, self.flat.time.name()))
+
+    @cached_property
+    def _spoken_names(self) -> dict[str, str]:
+        """Names of variables that are exactly a derivative of another one."""
+        found: dict[str, str] = {}
+        for name, alias in self.reduced.aliases.items():
+            plain = alias.factor == 1.0 and alias.offset.is_constant() and float(alias.offset) == 0.0
+            if alias.root is not None and alias.order > 0 and plain:
+                key = derivative_name(alias.root, alias.order)
+                if key not in found or name.count(".") < found[key].count("."):
+                    found[key] = name
+        return found
+
+    def _spoken(self, name: str) -> str:
+        return self._spoken_names.get(name, name)
+
+    def expression(self, name: str) -> ca.SX:
+        """A scalar variable, derivative or parameter in the symbols of the reduced equations."""
+        base, order = split_derivative(name)
+        if base == self.flat.time.name():
+            return self.flat.time
+        if base in self.table.symbols:
+            return self.table.expressions.get(base, self.table.symbols[base])
+        if base in self.flat.definitions:
+            return self.reduce(self.flat.definitions[base])
+        alias = self.reduced.aliases[base]
+        if alias.root is not None:
+            shifted = type(alias)(alias.root, alias.order + order, alias.factor, alias.offset if order == 0 else ca.SX(0))
+            return self.table.reduce(alias_expression(shifted, self.reduced.chains))
+        return self.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+
+    def reduce(self, expression: ca.SX) -> ca.SX:
+        """An expression of the flat model's symbols in the symbols of the reduced equations."""
+        leaves = ca.symvar(expression)
+        new = [self.expression(leaf.name()) for leaf in leaves]
+        return ca.substitute(expression, ca.vertcat(*leaves), ca.vertcat(*new)) if leaves else expression
+
+    def system(self, form: Literal["explicit", "lifted"] = "explicit", also: Sequence[ca.SX] = ()) -> System:
+        """The equations as x' = ode(t, x, z, u, p), 0 = residuals(t, x, z, u, p).
+
+        explicit: everything that has a closed form is inserted, z is what has none. lifted: square roots
+        and torn unknowns stay in z with equations of their own, which optimisers prefer. `also`: expressions
+        of the model that must be available (their derivatives beyond the states are checked).
+        """
+        return assemble(self, form)
+
+    def equations(self, format: Literal["text"] = "text") -> str:
+        """Every block on its line, with the component equation each comes from."""
+        from gantrytau.equation_text import block_text
+
+        if format != "text":
+            raise ModelError(f"equations(format={format!r}): expected 'text'")
+        return block_text(self)
+
+    def function(self, given: Sequence[str], find: Sequence[str]) -> ca.Function:
+        """A CasADi function from `given` to `find`, by name; the causality follows from the names.
+
+        One argument and one result per name, vectors (k,). Derivatives are `der(x)`, `der(der(x))`.
+        Parameters that are not given have their values. Raises StructureError if `given` does not determine
+        `find` or contradicts itself, ModelError for unknown names.
+        """
+        from gantrytau.causality import function
+
+        return function(self, list(given), list(find))
+
+    def evaluate(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """All variables and derivatives at a consistent point that holds `values` exactly.
+
+        The rest is completed from the start values. Keys: scalars as float, vectors as arrays, derivatives
+        as `der(x)`; parameters may be given too. Raises InitializationError if there is no such point.
+        """
+        from gantrytau.initialization import evaluate
+
+        return evaluate(self, dict(values or {}))
+
+    def numbers(self, names: Iterable[str], values: Mapping[str, float]) -> np.ndarray:
+        """Values of scalars, from numbers of all symbols of the reduced equations."""
+        expressions = ca.vertcat(*(self.expression(n) for n in names))
+        leaves = ca.symvar(expressions)
+        function = ca.Function("numbers", [ca.vertcat(*leaves)], [ca.densify(expressions)])
+        return np.array(function(ca.DM([values[leaf.name()] for leaf in leaves]))).ravel()
+
+    def equation_name(self, key: Key) -> str:
+        """Where an equation of a block comes from."""
+        index, times = key
+        name = self.reduced.equations[index].name
+        return name if times == 0 else f"{name}, differentiated {'once' if times == 1 else f'{times} times'}"

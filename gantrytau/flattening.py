@@ -1,0 +1,206 @@
+"""Writes an instantiated model out as one flat list of variables, parameters and scalar equations."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import casadi as ca
+
+from gantrytau.connections import connection_equations
+from gantrytau.declarations import Parameter, evaluate
+from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.flat_model import FlatModel, FlatParameter, FlatVariable
+from gantrytau.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
+from gantrytau.model import Model
+from gantrytau.propagation import propagate
+from gantrytau.statements import Branch, Connection, Equation, Root, equality
+from gantrytau.symbols import scalars, time, writing
+
+HINTS = {
+    "truth value": "Python's if, and, or, max and chained comparisons cannot work on symbols; "
+    "use if_else, between, casadi.fmax",
+    "Dimension mismatch": "the two operands have different shapes",
+}
+
+
+def flatten(model: Model) -> FlatModel:
+    """The model written out as variables, parameters and equations; raises ModelError with the path of a fault."""
+    return write_out(instantiate(model))
+
+
+def write_out(instance: Instance) -> FlatModel:
+    """The flat record of an instantiated model."""
+    equations: list[Equation] = []
+    initial: list[Equation] = []
+    connections: list[tuple[str, Connection]] = []
+    branches: list[Branch] = []
+    roots: list[Root] = []
+    with writing(instance.symbols):
+        for path, component in instance.components:
+            name = type(component).__name__
+            for number, statement in _statements(component.equations, path, name):
+                if isinstance(statement, Connection):
+                    connections.append((path, statement))
+                elif isinstance(statement, Branch):
+                    branches.append(statement)
+                elif isinstance(statement, Root):
+                    roots.append(statement)
+                else:
+                    equations += equality(statement, path, name, number)
+            for number, statement in _statements(component.initial_equations, path, name):
+                initial += equality(statement, path, name, number)
+        equations += _bindings(instance)
+        equations += connection_equations(instance, connections)
+        definitions = propagate(instance, connections, branches, roots)
+        flat_variables = tuple(_variable(placed) for placed in instance.quantities if not _is_parameter(placed))
+        parameters = tuple(_parameter(placed) for placed in instance.quantities if _is_parameter(placed))
+    propagated = {n for placed in instance.quantities if placed.declaration.kind == "propagated" for n in placed.elements}
+    return FlatModel(
+        name=type(instance.root).__name__,
+        time=time,
+        variables=tuple(v for v in flat_variables if v.kind != "propagated"),
+        parameters=parameters,
+        equations=substituted(equations, definitions, instance),
+        initial_equations=substituted(initial, definitions, instance),
+        derivatives={n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0 and s.base not in propagated},
+        definitions=definitions,
+        inputs=_free_inputs(instance, equations),
+        hints=_hints(instance),
+    )
+
+
+def _is_parameter(placed: Placed) -> bool:
+    return isinstance(placed.declaration, Parameter)
+
+
+def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
+    """Numbered statements of a component; an error on the way is told with the place where it happened."""
+    number = 0
+    try:
+        for number, statement in enumerate(generate(), start=1):
+            yield number, statement
+    except GantryTauError as error:
+        if str(error).startswith(path or "the model"):
+            raise
+        raise type(error)(f"{path or 'the model'} ({model}), after equation {number}: {error}") from error
+    except (RuntimeError, TypeError, AttributeError, NotImplementedError, ValueError, IndexError, KeyError) as error:
+        lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
+        words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
+        hint = next((f"; {text}" for key, text in HINTS.items() if key in str(error)), "")
+        raise ModelError(f"{path or 'the model'} ({model}), equation {number + 1}: {words}{hint}") from error
+
+
+def _bindings(instance: Instance) -> list[Equation]:
+    """`phi=0.5` as a modification of a variable is the equation phi == 0.5."""
+    found: list[Equation] = []
+    for placed in instance.quantities:
+        if "value" in placed.attributes and not _is_parameter(placed):
+            value = expression(placed, "value")
+            for row, (left, right) in enumerate(zip(scalars(placed.symbol), value, strict=True)):
+                found.append(Equation(left, right, placed.name, "binding", 1, row if len(value) > 1 else None))
+    return found
+
+
+def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str, ...]:
+    """Inputs that stay known from outside: not bound, not connected, not set by an enclosing component."""
+    owners = {n: p.path for p in instance.quantities if p.declaration.kind == "input" for n in p.elements}
+    for equation in equations:
+        for side in (equation.left, equation.right):
+            symbol = instance.symbols.find(side)
+            if symbol is not None and symbol.name in owners and equation.path != owners[symbol.name]:
+                inside = owners[symbol.name].startswith(equation.path) or equation.model in ("binding", "connection")
+                if inside:
+                    del owners[symbol.name]
+    return tuple(owners)
+
+
+def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
+    """An attribute of a quantity as one SX per scalar; a scalar stands for all elements of a start or limit."""
+    leaf: Leaf = placed.attributes[attribute]
+    value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
+    try:
+        value = evaluate(value, leaf.scope)
+        found = ca.densify(ca.SX(ca.vertcat(*value) if isinstance(value, list) else value))
+    except (RuntimeError, TypeError, NotImplementedError, AttributeError) as error:
+        raise ModelError(
+            f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
+            f"parameters ({error.__class__.__name__}: {str(error).splitlines()[0]})"
+        ) from error
+    size = len(placed.elements)
+    if found.numel() == 1 and (size == 1 or attribute != "value"):
+        elements = found.elements() * size
+    elif found.numel() == size and (len(placed.shape) < 2 or found.shape == placed.shape):
+        elements = found.elements()
+    else:
+        shape = found.shape if found.shape[1] != 1 else (found.shape[0],)
+        raise ModelError(f"{placed.name}: {attribute} has shape {shape}, expected {placed.shape}")
+    bad = [e for e in elements if e.is_constant() and not _allowed(float(e), attribute)]
+    if bad:
+        raise ModelError(f"{placed.name}: {attribute} is {bad[0]}, expected a finite number")
+    return tuple(elements)
+
+
+def _allowed(value: float, attribute: str) -> bool:
+    infinite = value in (float("inf"), float("-inf"))
+    return value == value and (attribute in ("min", "max") or not infinite)
+
+
+def _variable(placed: Placed) -> FlatVariable:
+    return FlatVariable(**_common(placed), prefer=prefer_of(placed.attributes))
+
+
+def _common(placed: Placed) -> dict[str, Any]:
+    attributes = placed.attributes
+    limits = {key: expression(placed, key) for key in ("min", "max", "nominal") if key in attributes}
+    return dict(
+        name=placed.name,
+        kind=placed.declaration.kind,
+        shape=placed.shape,
+        elements=tuple(placed.elements),
+        symbol=placed.symbol,
+        unit=attributes["unit"].value if "unit" in attributes else None,
+        description=attributes["description"].value if "description" in attributes else "",
+        start=expression(placed, "start") if "start" in attributes else None,
+        fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
+        owner=placed.path,
+        free=getattr(placed.declaration, "free", False),
+        **limits,
+    )
+
+
+def _parameter(placed: Placed) -> FlatParameter:
+    if "value" not in placed.attributes:
+        raise ModelError(
+            f"{placed.name} ({placed.declaration.words()}) has no value, expected one; "
+            f"give it where the component is declared, `{placed.name.split('.')[-1]}=...`"
+        )
+    declaration = placed.declaration
+    assert isinstance(declaration, Parameter)
+    return FlatParameter(**_common(placed), value=expression(placed, "value"), fold=declaration.fold)
+
+
+def substituted(
+    equations: Iterable[Equation], definitions: Mapping[str, ca.SX], instance: Instance
+) -> tuple[Equation, ...]:
+    """The equations with propagated quantities replaced by their expressions."""
+    equations = tuple(equations)
+    if not definitions or not equations:
+        return equations
+    symbols = ca.vertcat(*(instance.symbols.by_name[name].sx for name in definitions))
+    sides = ca.vertcat(*(side for e in equations for side in (e.left, e.right)))
+    new = ca.substitute(sides, symbols, ca.vertcat(*definitions.values())).elements()
+    return tuple(
+        Equation(new[2 * i], new[2 * i + 1], e.path, e.model, e.number, e.element)
+        for i, e in enumerate(equations)
+    )
+
+
+def _hints(instance: Instance) -> dict[str, str]:
+    hints: dict[str, str] = {}
+    by_path = dict(instance.components)
+    for placed in instance.quantities:
+        component = by_path.get(placed.path)
+        if component is not None and type(component).failure_hint is not Model.failure_hint:
+            words = component.failure_hint(placed.name.rsplit(".", 1)[-1])
+            if words:
+                hints.update(dict.fromkeys(placed.elements, words))
+    return hints

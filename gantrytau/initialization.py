@@ -1,0 +1,214 @@
+"""Start values of all symbols: what the model gives, made consistent level by level."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.aliases import Reduced
+from gantrytau.consistency import Level, solve_levels
+from gantrytau.dae import Dae
+from gantrytau.errors import InitializationError, ModelError
+from gantrytau.flat_model import FlatModel, FlatVariable
+from gantrytau.index_reduction import Indexed
+from gantrytau.parameters import ParameterTable, parameter_table, with_values
+from gantrytau.symbols import derivative_name, split_derivative
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold."""
+
+    values: Mapping[str, float]
+    started: frozenset[str]
+    fixed: frozenset[str]
+
+
+def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> Guess:
+    """Start attributes carried over to the symbols of the reduced equations."""
+    values: dict[str, float] = dict.fromkeys(symbols, 0.0)
+    owners: dict[str, tuple[bool, int]] = {}
+    fixed: dict[str, str] = {}
+    for variable in flat.variables:
+        if variable.start is None:
+            continue
+        numbers = table.number(ca.vertcat(*variable.start))
+        for name, number in zip(variable.elements, numbers, strict=True):
+            _place(variable, name, float(number), table, reduced, values, owners, fixed)
+    values.update(table.values)
+    values[flat.time.name()] = 0.0
+    return Guess(values, frozenset(owners), frozenset(fixed))
+
+
+def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:
+    alias = reduced.aliases[name]
+    if alias.root is None:
+        return
+    symbol = derivative_name(alias.root, alias.order)
+    value = (number - float(table.number(alias.offset)[0])) / alias.factor
+    if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
+        raise InitializationError(
+            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which it is an alias; "
+            "release one with Start(...) instead of Fixed(...)"
+        )
+    rank = (not variable.fixed, name.count("."))
+    if symbol not in owners or rank < owners[symbol]:
+        owners[symbol] = rank
+        values[symbol] = value
+    if variable.fixed:
+        fixed[symbol] = name
+
+
+def levels(indexed: Indexed, reduced: Reduced) -> list[Level]:
+    """Positions, velocities, accelerations and forces: the equations and unknowns of each level."""
+    found: list[Level] = []
+    for stage in range(-max(indexed.orders.values(), default=0), 1):
+        keys = [(i, stage + c) for i, c in enumerate(indexed.counts) if stage + c >= 0]
+        unknowns = [derivative_name(n, stage + top) for n, top in indexed.orders.items() if stage + top >= 0]
+        found.append(
+            Level(
+                tuple(indexed.residuals[k] for k in keys),
+                tuple(
+                    f"{reduced.equations[i].name} `{reduced.equations[i].text[:90]}`" + (f" (derivative {m})" if m else "")
+                    for i, m in keys
+                ),
+                tuple(unknowns),
+            )
+        )
+    return found
+
+
+def consistent_start(
+    flat: FlatModel,
+    table: ParameterTable,
+    reduced: Reduced,
+    indexed: Indexed,
+    guess: Guess,
+    held: frozenset[str] = frozenset(),
+    free: tuple[str, ...] = (),
+) -> dict[str, float]:
+    """Consistent numbers of all symbols; `held` must not move, `free` are inputs that may (last level)."""
+    stages = levels(indexed, reduced)
+    if free:
+        last = stages[-1]
+        stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
+    symbols = {n: reduced.chains.named(n) for level in stages for n in level.unknowns}
+    title, fixed = flat.name, guess.fixed | held
+    values = solve_levels(stages, symbols, guess.values, held=fixed, started=guess.started | held, title=title)
+    if flat.initial_equations and not held:
+        extra = _initial_level(flat, table, reduced, stages)
+        values = solve_levels([extra], symbols, values, held=fixed, started=guess.started, title=title)
+    return values
+
+
+def _initial_level(flat: FlatModel, table: ParameterTable, reduced: Reduced, stages: list[Level]) -> Level:
+    residual = table.reduce(ca.vertcat(*(e.residual for e in flat.initial_equations)))
+    leaves = [leaf for leaf in ca.symvar(residual) if split_derivative(leaf.name())[0] in reduced.aliases]
+    new = [_alias_of(leaf.name(), reduced) for leaf in leaves]
+    rows = ca.substitute(residual, ca.vertcat(*leaves), ca.vertcat(*new)).elements()
+    return Level(
+        tuple(r for s in stages for r in s.residuals) + tuple(rows),
+        tuple(n for s in stages for n in s.names) + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
+        tuple(n for s in stages for n in s.unknowns),
+    )
+
+
+def _alias_of(name: str, reduced: Reduced) -> ca.SX:
+    base, order = split_derivative(name)
+    alias = reduced.aliases[base]
+    if alias.root is None:
+        return alias.offset if order == 0 else ca.SX(0)
+    offset = alias.offset if order == 0 else ca.SX(0)
+    return alias.factor * reduced.chains.sx(alias.root, alias.order + order) + offset
+
+
+def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:
+    """See Dae.evaluate."""
+    scalars = given_scalars(dae, given)
+    parameters = {n: v for n, v in scalars.items() if n in dae.table.symbols}
+    if parameters:
+        from gantrytau.translation import retranslate
+
+        rest = {n: v for n, v in scalars.items() if n not in parameters}
+        return evaluate(retranslate(dae, with_values(dae.flat, parameters)), rest)
+    values = dict(dae.start)
+    held: set[str] = set()
+    for name, number in scalars.items():
+        base, order = split_derivative(name)
+        if name == dae.flat.time.name():
+            values[name] = number
+            continue
+        if base not in dae.reduced.aliases:
+            raise ModelError(f"{dae.name}: {name} is propagated, not a variable; give what it follows from")
+        alias = dae.reduced.aliases[base]
+        offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
+        if alias.root is None:
+            if abs(number - offset) > 1e-9 * max(1.0, abs(offset)):
+                raise InitializationError(f"{name}: found {number:g}, but it is constant and equal to {offset:g}")
+            continue
+        symbol = derivative_name(alias.root, alias.order + order)
+        value = (number - offset) / alias.factor
+        if symbol in held and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
+            raise InitializationError(f"{name}: found {number:g}, which contradicts another given value of the same quantity")
+        values[symbol] = value
+        held.add(symbol)
+    found = _complete(dae, values, frozenset(held))
+    return named_values(dae, found)
+
+
+def _complete(dae: Dae, values: dict[str, float], held: frozenset[str]) -> dict[str, float]:
+    guess = Guess(values, frozenset(dae.settings.get("started", ())), frozenset())
+    derivatives = [n for n in values if split_derivative(n)[0] in dae.known]
+    try:
+        return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, held | set(derivatives))
+    except InitializationError:
+        free = tuple(n for n in dae.known if n not in held)
+        if not free:
+            raise
+        still = held | (set(derivatives) - set(free))
+        return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free)
+
+
+def given_scalars(dae: Dae, given: Mapping[str, Any]) -> dict[str, float]:
+    """Values by scalar name; ModelError for unknown names, wrong lengths and numbers that are not finite."""
+    found: dict[str, float] = {}
+    for name, value in given.items():
+        elements = dae.expand(name)
+        numbers = np.asarray(value, dtype=float).ravel(order="F")
+        if numbers.size != len(elements):
+            raise ModelError(f"{name}: found {numbers.size} values, expected {len(elements)}")
+        if not np.all(np.isfinite(numbers)):
+            raise ModelError(f"{name}: found {numbers.tolist()}, expected finite numbers")
+        found.update(zip(elements, numbers.tolist(), strict=True))
+    return found
+
+
+def named_values(dae: Dae, values: Mapping[str, float]) -> dict[str, Any]:
+    """Every variable, parameter and derivative by name, scalars as float and vectors as arrays."""
+    chains = {n: top for n, top in dae.indexed.orders.items()}
+    names: list[str] = []
+    groups: list[tuple[str, tuple[int, ...], list[str]]] = []
+    for variable in dae.flat.variables:
+        for order in range(max(chains.values(), default=0) + 1):
+            elements = [derivative_name(n, order) for n in variable.elements]
+            if all(_available(dae, n, order, chains, values) for n in variable.elements):
+                groups.append((derivative_name(variable.name, order), variable.shape, elements))
+                names += elements
+    names += dae.flat.definitions
+    numbers = dict(zip(names, dae.numbers(names, values).tolist(), strict=True))
+    for name, shape, elements in groups:
+        if shape:
+            numbers[name] = np.array([numbers[n] for n in elements]).reshape(shape, order="F")
+    for parameter in dae.flat.parameters:
+        numbers.update((n, dae.table.values[n]) for n in parameter.elements)
+        if parameter.shape:
+            whole = np.array([dae.table.values[n] for n in parameter.elements])
+            numbers[parameter.name] = whole.reshape(parameter.shape, order="F")
+    return numbers
+
+
+def _available(dae: Dae, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]) -> bool:
+    alias = dae.reduced.aliases[name]
+    return alias.root is None or derivative_name(alias.root, alias.order + order) in values

@@ -1,0 +1,141 @@
+"""From a model to a Dae: the whole way, step by step."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from gantrytau.aliases import eliminate_aliases
+from gantrytau.blocks import block_pattern
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, StructureError, did_you_mean
+from gantrytau.flat_model import FlatModel, FlatVariable
+from gantrytau.flattening import flatten
+from gantrytau.index_reduction import Indexed, reduce_index
+from gantrytau.initialization import consistent_start, starting_guess
+from gantrytau.model import Model
+from gantrytau.parameters import parameter_table
+from gantrytau.solution import solve_block
+from gantrytau.states import choose_states
+from gantrytau.statements import Equation
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.unit_checking import check_units
+
+
+def translate(
+    model: Model,
+    *,
+    given: Sequence[str] = (),
+    find: Sequence[str] = (),
+    states: Sequence[str] | None = None,
+    units: bool = True,
+) -> Dae:
+    """Turn a model into a system of index one, sorted into blocks.
+
+    given: names that are known instead of the declared inputs, as functions of time (parameters named here
+    stay symbols); find: names and derivatives that must be available; states: names preferred as states;
+    units: check the dimensions of all equations. Raises ModelError for faults of writing, StructureError if
+    the equations cannot determine the unknowns, InitializationError if no consistent start is found.
+    """
+    flat = flatten(model)
+    if units:
+        check_units(flat)
+    return translate_flat(flat, given=given, find=find, states=states)
+
+
+def translate_flat(
+    flat: FlatModel,
+    *,
+    given: Sequence[str] = (),
+    find: Sequence[str] = (),
+    states: Sequence[str] | None = None,
+    start: Mapping[str, float] | None = None,
+) -> Dae:
+    """Like `translate`, from the flattened model; `start`: numbers of symbols that replace start values."""
+    given, find, states = tuple(given), tuple(find), tuple(states or ())
+    settings = dict(given=given, find=find, states=states)
+    flat = _with_wanted(flat, find)
+    scalars = [n for name in given for n in expand(flat, name)]
+    parameters = {n for p in flat.parameters for n in p.elements}
+    table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
+    known = tuple(n for n in scalars if n not in parameters) if given else flat.inputs
+    if given and not known:
+        known = flat.inputs
+    for name in known:
+        if name.startswith("der("):
+            raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
+    reduced = eliminate_aliases(flat, table, frozenset(known))
+    indexed = reduce_index(reduced, flat.hints, flat.name)
+    symbols = all_symbols(indexed, reduced.known)
+    guess = starting_guess(flat, table, reduced, symbols)
+    if start:
+        guess = replace(guess, values={**guess.values, **{n: v for n, v in start.items() if n in guess.values}})
+    sample = consistent_start(flat, table, reduced, indexed, guess)
+    preference = {n: int(v.prefer) for v in flat.variables for n in v.elements}
+    for name, alias in reduced.aliases.items():
+        if alias.root is not None and alias.root != name:
+            preference[alias.root] = max(preference[alias.root], preference[name])
+    wanted = [_state_name(reduced.aliases, n) for name in states for n in expand(flat, name)]
+    choice = choose_states(indexed, reduced.chains, sample, preference, wanted, flat.name)
+    unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
+    pattern = block_pattern(indexed.residuals, unknowns)
+    by_name = {n: reduced.chains.named(n) for n in unknowns}
+    blocks = tuple(solve_block(e, u, indexed.residuals, by_name, sample) for e, u in pattern.blocks)
+    settings["started"] = guess.started
+    return Dae(flat, table, reduced, indexed, choice, blocks, tuple(known), sample, settings)
+
+
+def retranslate(dae: Dae, flat: FlatModel) -> Dae:
+    """The same translation of a flat model with other parameter values."""
+    chosen = {k: dae.settings[k] for k in ("given", "find", "states")}
+    return translate_flat(flat, **chosen)
+
+
+def all_symbols(indexed: Indexed, known: frozenset[str]) -> list[str]:
+    """Unknowns with their derivatives, and the known variables with the derivatives that occur."""
+    names = dict.fromkeys(indexed.unknown_symbols())
+    names.update(dict.fromkeys(known))
+    for residual in indexed.residuals.values():
+        for leaf in ca.symvar(residual):
+            if split_derivative(leaf.name())[0] in known:
+                names[leaf.name()] = None
+    return list(names)
+
+
+def expand(flat: FlatModel, name: str) -> tuple[str, ...]:
+    """Scalar names of a variable, parameter or derivative of a flat model; ModelError if unknown."""
+    base, order = split_derivative(name)
+    found = flat.find(base)
+    if found is not None:
+        return tuple(derivative_name(n, order) for n in found.elements)
+    known = [n for v in (*flat.variables, *flat.parameters) for n in v.elements]
+    if base not in known:
+        raise ModelError(f"{flat.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
+    return (name,)
+
+
+def _state_name(aliases: Mapping[str, Any], name: str) -> str:
+    base, order = split_derivative(name)
+    alias = aliases[base]
+    if alias.root is None:
+        raise StructureError(f"{name} is constant and cannot be a state")
+    return derivative_name(alias.root, alias.order + order)
+
+
+def _with_wanted(flat: FlatModel, find: Sequence[str]) -> FlatModel:
+    """Derivatives that are asked for become outputs with an equation, so that they are known in time."""
+    wanted = [n for name in find for n in expand(flat, name) if n.startswith("der(")]
+    wanted = [n for n in wanted if n not in flat.derivatives]
+    if not wanted:
+        return flat
+    variables, equations, derivatives = list(flat.variables), list(flat.equations), dict(flat.derivatives)
+    for name in dict.fromkeys(wanted):
+        derivatives[name] = ca.SX.sym(name)
+        helper = f"wanted {name}"
+        symbol = ca.SX.sym(helper)
+        variables.append(FlatVariable(helper, "output", (), (helper,), symbol, None, ""))
+        equations.append(Equation(symbol, derivatives[name], "", "wanted", 1))
+    return replace(
+        flat, variables=tuple(variables), equations=tuple(equations), derivatives=derivatives
+    )
