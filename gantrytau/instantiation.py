@@ -79,14 +79,15 @@ class _Builder:
         cls = type(template)
         instance = cls.__new__(cls)
         for name, value in vars(template).items():
+            if name == "_modifications":
+                continue
             refuse_container(f"{path or cls.__name__}.{name}", value)
             if isinstance(value, (Declared, Quantity, Array)):
                 raise ModelError(
                     f"{path or cls.__name__}.{name} is assigned in __init__, where it would be lost; "
                     "declare it in the class body and modify it by keyword"
                 )
-            if name != "_modifications":
-                instance.__dict__[name] = value
+            instance.__dict__[name] = value
         self.paths[id(instance)] = path
         modifications = _merge(_wrap(template.modifications, scope), outer)
         for name in modifications:

@@ -1,0 +1,1 @@
+"""Standard mechanics: translational, rotational, multibody."""

@@ -1,0 +1,134 @@
+"""Motion along one axis: flanges, masses, springs, dampers, friction, sources.
+
+Position s of a flange is absolute, its force f is positive into the component.
+"""
+
+from gantrytau import Connector, Flow, Input, Model, Parameter, Real, between, der, if_else, tanh
+
+
+class Flange(Connector):
+    """One point on an axis."""
+
+    s = Real(unit="m", description="position along the axis")
+    f = Flow(unit="N", description="cut force along the axis, positive into the component")
+
+
+class Fixed(Model):
+    """A point that does not move."""
+
+    s = Parameter(0.0, unit="m", description="position along the axis")
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.s == self.s
+
+
+class Mass(Model):
+    """A sliding point mass."""
+
+    m = Parameter(1.0, unit="kg", description="mass")
+    s = Real(unit="m", description="position along the axis")
+    v = Real(unit="m/s", description="speed")
+    flange = Flange()
+
+    def equations(self):
+        yield self.s == self.flange.s
+        yield self.v == der(self.s)
+        yield self.m * der(self.v) == self.flange.f
+
+
+class Compliant(Model):
+    """Base of components between two flanges that carry one force f, positive in tension."""
+
+    s_rel = Real(unit="m", description="distance from flange_a to flange_b")
+    f = Real(unit="N", description="force, positive in tension")
+    flange_a = Flange()
+    flange_b = Flange()
+
+    def equations(self):
+        yield self.s_rel == self.flange_b.s - self.flange_a.s
+        yield self.flange_b.f == self.f
+        yield self.flange_a.f == -self.f
+
+
+class Spring(Compliant):
+    """A linear spring."""
+
+    c = Parameter(1.0, unit="N/m", description="stiffness")
+    s_rel0 = Parameter(0.0, unit="m", description="length without force")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.f == self.c * (self.s_rel - self.s_rel0)
+
+
+class Damper(Compliant):
+    """A linear damper."""
+
+    d = Parameter(1.0, unit="N.s/m", description="damping")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.f == self.d * der(self.s_rel)
+
+
+class Friction(Model):
+    """Base of friction against the ground; replace it to choose another law, or `Frictionless` to leave it out."""
+
+    v = Real(unit="m/s", description="speed against the ground")
+    f = Real(unit="N", description="friction force on the flange, positive against positive speed")
+    flange = Flange()
+
+    def equations(self):
+        yield self.v == der(self.flange.s)
+        yield self.flange.f == self.f
+
+
+class Frictionless(Friction):
+    """No friction."""
+
+    def equations(self):
+        yield from super().equations()
+        yield self.f == 0
+
+
+class TanhFriction(Friction):
+    """Coulomb and viscous friction, the sign smoothed by tanh: f = f_c tanh(v / v_s) + f_v v."""
+
+    f_c = Parameter(0.0, unit="N", description="Coulomb friction")
+    f_v = Parameter(0.0, unit="kg/s", description="viscous friction")
+    v_s = Parameter(0.05, unit="m/s", description="smoothing speed")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.f == self.f_c * tanh(self.v / self.v_s) + self.f_v * self.v
+
+
+class LinearFriction(TanhFriction):
+    """Coulomb and viscous friction, the sign smoothed piecewise linearly (Dressler 2012, Figure 3.6)."""
+
+    def equations(self):
+        yield from Friction.equations(self)
+        slope = self.v / self.v_s
+        sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
+        yield self.f == self.f_c * sign + self.f_v * self.v
+
+
+class Force(Model):
+    """A given force that pushes the flange against the ground."""
+
+    f = Input(unit="N", description="force on the flange, positive along the axis", start=0.0)
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.f == -self.f
+
+
+class Position(Model):
+    """Moves the flange as a given function of time, whatever force that takes."""
+
+    s = Input(unit="m", description="position along the axis", start=0.0)
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.s == self.s
