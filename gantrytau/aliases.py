@@ -102,7 +102,9 @@ class _Elimination:
                     remaining.remove(i)
             if not changed:
                 break
-            for i, new in zip(remaining, self._substitute([self.residuals[i] for i in remaining]), strict=True):
+            for i, new in zip(
+                remaining, self._substitute([self.residuals[i] for i in remaining]), strict=True
+            ):
                 self.residuals[i] = new
         names = [n for v in self.flat.variables for n in v.elements]
         aliases = {n: self.resolve(n, 0) for n in names}

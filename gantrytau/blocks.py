@@ -39,20 +39,21 @@ def block_pattern(
     determined = [i for i, j in enumerate(of_row) if j >= 0 and j not in free]
     index = {i: k for k, i in enumerate(determined)}
     successors = [
-        [index[of_column[j]] for j in rows[i] if of_column.get(j) in index and of_column[j] != i] for i in determined
+        [index[of_column[j]] for j in rows[i] if of_column.get(j) in index and of_column[j] != i]
+        for i in determined
     ]
     components = strong_components(successors)
     targets = names if wanted is None else [n for n in wanted if n in place]
     undetermined = tuple(n for n in targets if place[n] in free or place[n] not in of_column)
-    needed = _needed(components, successors, [index[of_column[place[n]]] for n in targets if n not in undetermined])
+    needed = _needed(
+        components, successors, [index[of_column[place[n]]] for n in targets if n not in undetermined]
+    )
     blocks = []
     for component in components:
         if component[0] in needed:
             equations = [determined[k] for k in component]
             equations.sort()
-            blocks.append(
-                (tuple(keys[i] for i in equations), tuple(names[of_row[i]] for i in equations))
-            )
+            blocks.append((tuple(keys[i] for i in equations), tuple(names[of_row[i]] for i in equations)))
     surplus = tuple(keys[i] for i, j in enumerate(of_row) if j < 0)
     return Pattern(tuple(blocks), undetermined, surplus)
 

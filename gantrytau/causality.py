@@ -66,7 +66,9 @@ def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict
     return known
 
 
-def _blocks(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]) -> list[Block] | None:
+def _blocks(
+    dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
+) -> list[Block] | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
     unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
@@ -104,14 +106,23 @@ def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], giv
     text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."
     if missing:
         return f"{text} Give also {', '.join(missing[:6])}."
-    return f"{text} Give more names: states, inputs, or derivatives such as der({given[0] if given else 'x'})."
+    return (
+        f"{text} Give more names: states, inputs, or derivatives such as der({given[0] if given else 'x'})."
+    )
 
 
 def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> ca.Function:
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
     definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
     definitions += [
-        (dae.table.symbols[n] if n in dae.table.symbols else dae.flat.time if n == "time" else dae.reduced.chains.named(n), e)
+        (
+            dae.table.symbols[n]
+            if n in dae.table.symbols
+            else dae.flat.time
+            if n == "time"
+            else dae.reduced.chains.named(n),
+            e,
+        )
         for n, e in known.items()
     ]
     implicit: list[Block] = []
@@ -156,7 +167,11 @@ def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in
 
 
 def _refuse_time(expressions, dae) -> None:
-    if any(leaf.name() == dae.flat.time.name() for leaf in ca.symvar(ca.vertcat(*expressions)) if not leaf.is_constant()):
+    if any(
+        leaf.name() == dae.flat.time.name()
+        for leaf in ca.symvar(ca.vertcat(*expressions))
+        if not leaf.is_constant()
+    ):
         time_is_argument = any(leaf is dae.flat.time for leaf in ca.symvar(ca.vertcat(*expressions)))
         if time_is_argument:
             raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")

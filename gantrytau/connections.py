@@ -15,9 +15,7 @@ from gantrytau.symbols import scalars
 Face = tuple[str, int]
 
 
-def connection_equations(
-    instance: Instance, connections: Iterable[tuple[str, Connection]]
-) -> list[Equation]:
+def connection_equations(instance: Instance, connections: Iterable[tuple[str, Connection]]) -> list[Equation]:
     """Equations of all connections, and zero flow for the connectors that stay unconnected.
 
     connections: pairs of the path of the component that states it, and the statement.
@@ -65,7 +63,10 @@ def _path(instance: Instance, end: Any, where: str) -> str:
 def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
     a, b = (set(type(end).members()) for end in (connection.a, connection.b))
     if a != b:
-        kinds = [f"{path} ({type(end).__name__})" for (path, _), end in zip(faces, (connection.a, connection.b), strict=True)]
+        kinds = [
+            f"{path} ({type(end).__name__})"
+            for (path, _), end in zip(faces, (connection.a, connection.b), strict=True)
+        ]
         missing = sorted(a ^ b)[0]
         raise ModelError(
             f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: '{missing}' is in "
@@ -83,7 +84,9 @@ def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
         for row in range(len(columns[0])):
             element = row if len(columns[0]) > 1 else None
             if declaration.kind == "flow":
-                total = sum((sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0))
+                total = sum(
+                    (sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0)
+                )
                 equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
             elif declaration.kind != "propagated":
                 equations += [

@@ -13,7 +13,9 @@ import numpy as np
 from gantrytau.errors import InitializationError
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
-TOLERANCE = 1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
+TOLERANCE = (
+    1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
+)
 ITERATIONS = 60
 
 

@@ -35,7 +35,11 @@ class Diagnosis:
     blocks: tuple[tuple[str, int, int], ...]  # kind, unknowns, torn unknowns
 
     def __str__(self) -> str:
-        several = [f"{kind} {size}" + (f" -> {torn}" if torn < size else "") for kind, size, torn in self.blocks if size > 1]
+        several = [
+            f"{kind} {size}" + (f" -> {torn}" if torn < size else "")
+            for kind, size, torn in self.blocks
+            if size > 1
+        ]
         return "\n".join(
             [
                 f"{self.model}: {self.equations} equations, {self.unknowns} unknowns",
@@ -170,7 +174,9 @@ class Dae:
             return self.reduce(self.flat.definitions[base])
         alias = self.reduced.aliases[base]
         if alias.root is not None:
-            shifted = type(alias)(alias.root, alias.order + order, alias.factor, alias.offset if order == 0 else ca.SX(0))
+            shifted = type(alias)(
+                alias.root, alias.order + order, alias.factor, alias.offset if order == 0 else ca.SX(0)
+            )
             return self.table.reduce(alias_expression(shifted, self.reduced.chains))
         return self.table.reduce(alias.offset) if order == 0 else ca.SX(0)
 

@@ -24,7 +24,10 @@ def block_text(dae: "Dae") -> str:
         lines.append(
             f"[{number}] {block.kind} block of {len(block.unknowns)} unknowns, torn to {len(block.tears)}    # from {origin}"
         )
-        lines += [f"      0 = {_text(r)}    # determines {y}" for y, r in zip(block.tears, block.residuals, strict=True)]
+        lines += [
+            f"      0 = {_text(r)}    # determines {y}"
+            for y, r in zip(block.tears, block.residuals, strict=True)
+        ]
         lines += [f"      {symbol} = {_text(value)}" for symbol, value in block.inner]
     return "\n".join(lines) + "\n"
 

@@ -51,9 +51,16 @@ def write_out(instance: Instance) -> FlatModel:
         equations += _bindings(instance)
         equations += connection_equations(instance, connections)
         definitions = propagate(instance, connections, branches, roots)
-        flat_variables = tuple(_variable(placed) for placed in instance.quantities if not _is_parameter(placed))
+        flat_variables = tuple(
+            _variable(placed) for placed in instance.quantities if not _is_parameter(placed)
+        )
         parameters = tuple(_parameter(placed) for placed in instance.quantities if _is_parameter(placed))
-    propagated = {n for placed in instance.quantities if placed.declaration.kind == "propagated" for n in placed.elements}
+    propagated = {
+        n
+        for placed in instance.quantities
+        if placed.declaration.kind == "propagated"
+        for n in placed.elements
+    }
     return FlatModel(
         name=type(instance.root).__name__,
         time=time,
@@ -61,7 +68,9 @@ def write_out(instance: Instance) -> FlatModel:
         parameters=parameters,
         equations=substituted(equations, definitions, instance),
         initial_equations=substituted(initial, definitions, instance),
-        derivatives={n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0 and s.base not in propagated},
+        derivatives={
+            n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0 and s.base not in propagated
+        },
         definitions=definitions,
         inputs=_free_inputs(instance, equations),
         hints=_hints(instance),
@@ -82,7 +91,15 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
         if str(error).startswith(path or "the model"):
             raise
         raise type(error)(f"{path or 'the model'} ({model}), after equation {number}: {error}") from error
-    except (RuntimeError, TypeError, AttributeError, NotImplementedError, ValueError, IndexError, KeyError) as error:
+    except (
+        RuntimeError,
+        TypeError,
+        AttributeError,
+        NotImplementedError,
+        ValueError,
+        IndexError,
+        KeyError,
+    ) as error:
         lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
         words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
         hint = next((f"; {text}" for key, text in HINTS.items() if key in str(error)), "")
@@ -96,7 +113,9 @@ def _bindings(instance: Instance) -> list[Equation]:
         if "value" in placed.attributes and not _is_parameter(placed):
             value = expression(placed, "value")
             for row, (left, right) in enumerate(zip(scalars(placed.symbol), value, strict=True)):
-                found.append(Equation(left, right, placed.name, "binding", 1, row if len(value) > 1 else None))
+                found.append(
+                    Equation(left, right, placed.name, "binding", 1, row if len(value) > 1 else None)
+                )
     return found
 
 
@@ -107,7 +126,10 @@ def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str
         for side in (equation.left, equation.right):
             symbol = instance.symbols.find(side)
             if symbol is not None and symbol.name in owners and equation.path != owners[symbol.name]:
-                inside = owners[symbol.name].startswith(equation.path) or equation.model in ("binding", "connection")
+                inside = owners[symbol.name].startswith(equation.path) or equation.model in (
+                    "binding",
+                    "connection",
+                )
                 if inside:
                     del owners[symbol.name]
     return tuple(owners)

@@ -126,7 +126,9 @@ def unbalanced(
     extra = [i for i in range(m) if of_row[i] < 0]
     if extra:
         reached = _reach_rows(extra, signature, of_row)
-        where = "; ".join(f"{reduced.equations[i].name}: {reduced.equations[i].text[:100]}" for i in sorted(reached)[:4])
+        where = "; ".join(
+            f"{reduced.equations[i].name}: {reduced.equations[i].text[:100]}" for i in sorted(reached)[:4]
+        )
         text += (
             f" Overdetermined by {len(extra)}: these equations contradict or repeat each other: {where}. "
             "Remove one of them, or name one more unknown."
@@ -134,7 +136,9 @@ def unbalanced(
     return text
 
 
-def _reach_columns(start: list[int], signature: list[dict[int, int]], of_column: Mapping[int, int]) -> set[int]:
+def _reach_columns(
+    start: list[int], signature: list[dict[int, int]], of_column: Mapping[int, int]
+) -> set[int]:
     row_of = {i: j for j, i in of_column.items()}
     reached, queue = set(start), list(start)
     for j in queue:

@@ -13,7 +13,7 @@ from gantrytau.dae import Dae
 from gantrytau.errors import InitializationError, ModelError
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.index_reduction import Indexed
-from gantrytau.parameters import ParameterTable, parameter_table, with_values
+from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
 
 
@@ -71,7 +71,8 @@ def levels(indexed: Indexed, reduced: Reduced) -> list[Level]:
             Level(
                 tuple(indexed.residuals[k] for k in keys),
                 tuple(
-                    f"{reduced.equations[i].name} `{reduced.equations[i].text[:90]}`" + (f" (derivative {m})" if m else "")
+                    f"{reduced.equations[i].name} `{reduced.equations[i].text[:90]}`"
+                    + (f" (derivative {m})" if m else "")
                     for i, m in keys
                 ),
                 tuple(unknowns),
@@ -96,7 +97,9 @@ def consistent_start(
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
     symbols = {n: reduced.chains.named(n) for level in stages for n in level.unknowns}
     title, fixed = flat.name, guess.fixed | held
-    values = solve_levels(stages, symbols, guess.values, held=fixed, started=guess.started | held, title=title)
+    values = solve_levels(
+        stages, symbols, guess.values, held=fixed, started=guess.started | held, title=title
+    )
     if flat.initial_equations and not held:
         extra = _initial_level(flat, table, reduced, stages)
         values = solve_levels([extra], symbols, values, held=fixed, started=guess.started, title=title)
@@ -110,7 +113,8 @@ def _initial_level(flat: FlatModel, table: ParameterTable, reduced: Reduced, sta
     rows = ca.substitute(residual, ca.vertcat(*leaves), ca.vertcat(*new)).elements()
     return Level(
         tuple(r for s in stages for r in s.residuals) + tuple(rows),
-        tuple(n for s in stages for n in s.names) + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
+        tuple(n for s in stages for n in s.names)
+        + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
         tuple(n for s in stages for n in s.unknowns),
     )
 
@@ -146,12 +150,16 @@ def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:
         offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
         if alias.root is None:
             if abs(number - offset) > 1e-9 * max(1.0, abs(offset)):
-                raise InitializationError(f"{name}: found {number:g}, but it is constant and equal to {offset:g}")
+                raise InitializationError(
+                    f"{name}: found {number:g}, but it is constant and equal to {offset:g}"
+                )
             continue
         symbol = derivative_name(alias.root, alias.order + order)
         value = (number - offset) / alias.factor
         if symbol in held and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
-            raise InitializationError(f"{name}: found {number:g}, which contradicts another given value of the same quantity")
+            raise InitializationError(
+                f"{name}: found {number:g}, which contradicts another given value of the same quantity"
+            )
         values[symbol] = value
         held.add(symbol)
     found = _complete(dae, values, frozenset(held))
@@ -209,6 +217,8 @@ def named_values(dae: Dae, values: Mapping[str, float]) -> dict[str, Any]:
     return numbers
 
 
-def _available(dae: Dae, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]) -> bool:
+def _available(
+    dae: Dae, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]
+) -> bool:
     alias = dae.reduced.aliases[name]
     return alias.root is None or derivative_name(alias.root, alias.order + order) in values

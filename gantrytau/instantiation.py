@@ -107,12 +107,16 @@ class _Builder:
                 self._component(instance, path, name, member, modifications.get(name, {}), around)
         return instance
 
-    def _component(self, instance: Any, path: str, name: str, member: Any, modification: Any, around: list[Any]):
+    def _component(
+        self, instance: Any, path: str, name: str, member: Any, modification: Any, around: list[Any]
+    ):
         place = f"{path}.{name}" if path else name
         scope = instance
         if isinstance(modification, Leaf):  # redeclaration
             wanted, scope = modification.value, modification.scope
-            if not isinstance(wanted, (Declared, Array)) or isinstance(wanted, Array) != isinstance(member, Array):
+            if not isinstance(wanted, (Declared, Array)) or isinstance(wanted, Array) != isinstance(
+                member, Array
+            ):
                 raise ModelError(
                     f"{place}: found {wanted!r} as modification, expected a component that replaces "
                     f"{type(member).__name__}, or dict(...) to modify it"
@@ -124,7 +128,9 @@ class _Builder:
             common = {key: value for key, value in modification.items() if isinstance(key, str)}
             count = 1 + max((key for key in modification if isinstance(key, int)), default=-1)
             if count not in (0, len(member)):
-                raise ModelError(f"{place}: found {count} modifications, expected one for each of {len(member)}")
+                raise ModelError(
+                    f"{place}: found {count} modifications, expected one for each of {len(member)}"
+                )
             built = []
             for index, element in enumerate(member):
                 one = modification.get(index, {})
@@ -145,7 +151,11 @@ class _Builder:
             for key in ATTRIBUTES
             if getattr(declaration, key, None) is not None
         }
-        if isinstance(modification, Leaf) and isinstance(modification.value, Quantity) and not modification.value.name:
+        if (
+            isinstance(modification, Leaf)
+            and isinstance(modification.value, Quantity)
+            and not modification.value.name
+        ):
             # an unnamed declaration replaces this one: mass=Free(9.0)
             new = modification.value
             attributes |= {
@@ -190,7 +200,12 @@ def _shape(
     declaration: Quantity, attributes: Mapping[str, Leaf], instance: Any, path: str
 ) -> tuple[int, ...]:
     shape = evaluate(declaration.declared_shape, instance)
-    if isinstance(declaration, Parameter) and shape == () and declaration.value is None and "value" in attributes:
+    if (
+        isinstance(declaration, Parameter)
+        and shape == ()
+        and declaration.value is None
+        and "value" in attributes
+    ):
         value = attributes["value"].value
         if isinstance(value, (int, float, list, tuple, np.ndarray)):
             shape = np.shape(value)

@@ -102,7 +102,9 @@ class Outer:
         self.component = component
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"Outer({self.component.__name__}) has no attribute '{name}' before instantiation")
+        raise AttributeError(
+            f"Outer({self.component.__name__}) has no attribute '{name}' before instantiation"
+        )
 
 
 def outer(component: type[Any]) -> Any:

@@ -90,7 +90,9 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
         binding = bindings[name]
         if needs[name]:
             inside = ca.vertcat(*(symbols[n] for n in needs[name]))
-            values[name] = float(ca.evalf(ca.substitute(binding, inside, ca.DM([values[n] for n in needs[name]]))))
+            values[name] = float(
+                ca.evalf(ca.substitute(binding, inside, ca.DM([values[n] for n in needs[name]])))
+            )
         else:
             values[name] = float(binding)
         if not np.isfinite(values[name]):
@@ -101,7 +103,9 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
             inner = [n for n in needs[name] if n in expressions]
             expressions[name] = (
                 ca.substitute(
-                    binding, ca.vertcat(*(symbols[n] for n in inner)), ca.vertcat(*(expressions[n] for n in inner))
+                    binding,
+                    ca.vertcat(*(symbols[n] for n in inner)),
+                    ca.vertcat(*(expressions[n] for n in inner)),
                 )
                 if inner
                 else binding
@@ -109,9 +113,7 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
         else:
             independent.append(name)
     declared = [n for p in flat.parameters for n in p.elements]
-    return ParameterTable(
-        tuple(n for n in declared if n in set(independent)), values, expressions, symbols
-    )
+    return ParameterTable(tuple(n for n in declared if n in set(independent)), values, expressions, symbols)
 
 
 def _sorted(needs: Mapping[str, list[str]]) -> list[str]:
@@ -129,7 +131,9 @@ def _sorted(needs: Mapping[str, list[str]]) -> list[str]:
                 order[name] = None
                 stack.pop()
             elif name in path:
-                raise ModelError(f"parameters {', '.join(dict.fromkeys(path))} are defined by each other in a circle")
+                raise ModelError(
+                    f"parameters {', '.join(dict.fromkeys(path))} are defined by each other in a circle"
+                )
             else:
                 path.append(name)
                 stack += missing

@@ -75,7 +75,9 @@ def _propagated(connector: Connector) -> dict[str, Any]:
     return {n: m for n, m in type(connector).members().items() if getattr(m, "kind", "") == "propagated"}
 
 
-def _spanning_tree(nodes: Iterable[str], edges: list[_Edge], roots: list[str]) -> tuple[list[_Edge], list[_Edge]]:
+def _spanning_tree(
+    nodes: Iterable[str], edges: list[_Edge], roots: list[str]
+) -> tuple[list[_Edge], list[_Edge]]:
     group = {path: path for path in nodes}
 
     def find(path: str) -> str:
@@ -114,7 +116,9 @@ def _from_the_roots(nodes: Iterable[str], tree: list[_Edge], roots: Mapping[str,
                     queue.append((other, way))
 
 
-def _check_closes(instance: Instance, nodes: Mapping[str, Any], edge: _Edge, values: Mapping[str, ca.SX]) -> None:
+def _check_closes(
+    instance: Instance, nodes: Mapping[str, Any], edge: _Edge, values: Mapping[str, ca.SX]
+) -> None:
     for name in _propagated(nodes[edge.a]):
         pairs = zip(scalars(getattr(nodes[edge.a], name)), scalars(getattr(nodes[edge.b], name)), strict=True)
         for a, b in pairs:

@@ -123,7 +123,9 @@ def eliminate(matrix: ca.SX, right: ca.SX, sample: Mapping[str, float]) -> list[
     columns = list(range(n))
     for _ in range(n):
         scaled = {
-            (i, j): abs(numbers[i, j]) / max(np.abs(numbers[i, columns]).max(), 1e-300) for i in rows for j in columns
+            (i, j): abs(numbers[i, j]) / max(np.abs(numbers[i, columns]).max(), 1e-300)
+            for i in rows
+            for j in columns
         }
         # the sparsest of the rows and columns with a good pivot keeps the formulas short
         p, q = min(

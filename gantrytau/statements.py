@@ -25,7 +25,7 @@ class Equation:
 
     @property
     def residual(self) -> ca.SX:
-        """left - right."""
+        """Left - right."""
         return self.left - self.right
 
     @property
@@ -101,9 +101,7 @@ def equality(statement: Any, path: str, model: str, number: int) -> list[Equatio
             "two sides itself. Join symbols with casadi.vertcat(...) instead of a list"
         )
     if isinstance(statement, Between) or not isinstance(statement, (ca.SX, ca.DM)):
-        raise ModelError(
-            f"{place}: found {_kind(statement)}, expected an equation `a == b` or connect(a, b)"
-        )
+        raise ModelError(f"{place}: found {_kind(statement)}, expected an equation `a == b` or connect(a, b)")
     found: list[Equation] = []
     elements = scalars(statement)
     for row, element in enumerate(elements):
@@ -113,13 +111,9 @@ def equality(statement: Any, path: str, model: str, number: int) -> list[Equatio
             continue
         if not element.is_op(ca.OP_EQ):
             found_text = str(element)
-            raise ModelError(
-                f"{place}: found '{found_text[:80]}', expected an equation; write `a == b`"
-            )
+            raise ModelError(f"{place}: found '{found_text[:80]}', expected an equation; write `a == b`")
         found.append(
-            Equation(
-                element.dep(0), element.dep(1), path, model, number, row if len(elements) > 1 else None
-            )
+            Equation(element.dep(0), element.dep(1), path, model, number, row if len(elements) > 1 else None)
         )
     if not found:
         raise ModelError(f"{place}: both sides are the same, so it says nothing; remove it or correct it")

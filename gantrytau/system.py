@@ -62,7 +62,9 @@ class System:
     def _inserted(self, expressions: Sequence[ca.SX]):
         symbols = [v for v, _ in self.definitions]
         values = [e for _, e in self.definitions]
-        return ca.substitute_inplace(symbols, values, list(expressions), False) if symbols else ((), expressions)
+        return (
+            ca.substitute_inplace(symbols, values, list(expressions), False) if symbols else ((), expressions)
+        )
 
     @cached_property
     def closed_algebraics(self) -> ca.SX | None:
@@ -128,7 +130,9 @@ def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
         inputs=dae.known,
         u=ca.vertcat(*(chains.sx(n) for n in dae.known)) if dae.known else ca.SX(0, 1),
         parameters=dae.table.independent,
-        p=ca.vertcat(*(dae.table.symbols[n] for n in dae.table.independent)) if dae.table.independent else ca.SX(0, 1),
+        p=ca.vertcat(*(dae.table.symbols[n] for n in dae.table.independent))
+        if dae.table.independent
+        else ca.SX(0, 1),
         definitions=tuple(definitions),
         ode=ode,
         residuals=residuals,
@@ -140,5 +144,11 @@ def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
         Algebraic(a.name, a.symbol, residuals[i], None if a.closed is None else next(given), a.min)
         for i, a in enumerate(algebraics)
     )
-    return System(**{**{k: getattr(draft, k) for k in draft.__dataclass_fields__}, "ode": ode, "residuals": residuals, "algebraics": resolved})
-
+    return System(
+        **{
+            **{k: getattr(draft, k) for k in draft.__dataclass_fields__},
+            "ode": ode,
+            "residuals": residuals,
+            "algebraics": resolved,
+        }
+    )

@@ -17,8 +17,8 @@ from gantrytau.initialization import consistent_start, starting_guess
 from gantrytau.model import Model
 from gantrytau.parameters import parameter_table
 from gantrytau.solution import solve_block
-from gantrytau.states import choose_states
 from gantrytau.statements import Equation
+from gantrytau.states import choose_states
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.unit_checking import check_units
 
@@ -70,7 +70,9 @@ def translate_flat(
     symbols = all_symbols(indexed, reduced.known)
     guess = starting_guess(flat, table, reduced, symbols)
     if start:
-        guess = replace(guess, values={**guess.values, **{n: v for n, v in start.items() if n in guess.values}})
+        guess = replace(
+            guess, values={**guess.values, **{n: v for n, v in start.items() if n in guess.values}}
+        )
     sample = consistent_start(flat, table, reduced, indexed, guess)
     preference = {n: int(v.prefer) for v in flat.variables for n in v.elements}
     for name, alias in reduced.aliases.items():
@@ -136,6 +138,4 @@ def _with_wanted(flat: FlatModel, find: Sequence[str]) -> FlatModel:
         symbol = ca.SX.sym(helper)
         variables.append(FlatVariable(helper, "output", (), (helper,), symbol, None, ""))
         equations.append(Equation(symbol, derivatives[name], "", "wanted", 1))
-    return replace(
-        flat, variables=tuple(variables), equations=tuple(equations), derivatives=derivatives
-    )
+    return replace(flat, variables=tuple(variables), equations=tuple(equations), derivatives=derivatives)

@@ -18,12 +18,21 @@ NUMBER = "number"
 ANY = "any"
 Unit = Dimension | str
 
-SAME = {ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_HYPOT, ca.OP_FMOD, ca.OP_REMAINDER, ca.OP_COPYSIGN}
+SAME = {
+    ca.OP_ADD,
+    ca.OP_SUB,
+    ca.OP_FMIN,
+    ca.OP_FMAX,
+    ca.OP_HYPOT,
+    ca.OP_FMOD,
+    ca.OP_REMAINDER,
+    ca.OP_COPYSIGN,
+}
 RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
 ANGLES = {
     getattr(ca, f"OP_{name}"): name.lower()
-    for name in "SIN COS TAN ASIN ACOS ATAN SINH COSH TANH ASINH ACOSH ATANH EXP LOG LOG1P EXPM1 ERF".split()
+    for name in ["SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SINH", "COSH", "TANH", "ASINH", "ACOSH", "ATANH", "EXP", "LOG", "LOG1P", "EXPM1", "ERF"]
 }
 POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
 
@@ -31,7 +40,10 @@ POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction
 def check_units(flat: FlatModel) -> None:
     """ModelError naming equation, the two terms and their units, for the first that disagree."""
     units = symbol_units(flat)
-    symbols = [flat.time, *(s for v in (*flat.variables, *flat.parameters) for s in v.symbol.elements() if s.is_symbolic())]
+    symbols = [
+        flat.time,
+        *(s for v in (*flat.variables, *flat.parameters) for s in v.symbol.elements() if s.is_symbolic()),
+    ]
     symbols += list(flat.derivatives.values())
     given = [units[s.name()] for s in symbols]
     for equations in (flat.equations, flat.initial_equations):
@@ -104,7 +116,9 @@ def _infer(symbols, given, expressions, place_name) -> list[Unit]:
     return found
 
 
-def _unit(operation: int, units: list[Unit], words: list[str], power: Fraction | None) -> tuple[Unit, str | None]:
+def _unit(
+    operation: int, units: list[Unit], words: list[str], power: Fraction | None
+) -> tuple[Unit, str | None]:
     """Unit of one operation, and a message if its operands do not fit."""
     first, second = units[0], units[-1]
     if operation in SAME or operation in RELATIONS:

@@ -6,7 +6,7 @@ coherent units are known: a millimetre inside a model would be a factor of a tho
 
 import re
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache
 
 from gantrytau.errors import ModelError
 
@@ -48,7 +48,7 @@ SYMBOLS: dict[str, Dimension] = {
 FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1)(?P<power>[+-]?\d+)?$")
 
 
-@lru_cache(maxsize=None)
+@cache
 def dimension(unit: str) -> Dimension:
     """SI exponents (m, kg, s, A, K, mol, cd) of a unit; ModelError for a text that is none."""
     numerator, *denominators = unit.replace(" ", "").split("/")

@@ -19,18 +19,25 @@ from gantrytau.mechanics.multibody import (
 from gantrytau.mechanics.translational import Flange, Force, Friction, Frictionless, TanhFriction
 from gantrytau_models.prototypes import Prototype
 
+
 class Arm(Model):
     """Guideway and link of one arm: frame_a at the base, frame_cart on the guideway, frame_b at the tool."""
 
     length = Parameter(unit="m", description="length of the link")
-    offset = Parameter(shape=3, unit="m", description="cart at s = 0, less the place of the joint on the plate (4.7)")
-    direction = Parameter(shape=3, unit="1", description="axis of the guideway; its length is the transmission factor")
+    offset = Parameter(
+        shape=3, unit="m", description="cart at s = 0, less the place of the joint on the plate (4.7)"
+    )
+    direction = Parameter(
+        shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
+    )
     link_mass = Parameter(0.0, unit="kg", description="mass of the link")
     frame_a = Frame()
     frame_cart = Frame()
     frame_b = Frame()
     base = FixedTranslation(r=offset)
-    rail = Prismatic(n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT))
+    rail = Prismatic(
+        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
+    )
     link = SphericalSpherical(L=length, m=link_mass)
     axis = Flange()
 
@@ -105,13 +112,19 @@ class GantryTau(Model):
     carts = Array(Cart, 3)
     tool = Tool(m=plate_mass)
 
-    def __init__(self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications):
+    def __init__(
+        self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
+    ):
         if not isinstance(prototype, Prototype):
-            raise TypeError(f"GantryTau: found {prototype!r}, expected a prototype record such as prototypes.L1")
+            raise TypeError(
+                f"GantryTau: found {prototype!r}, expected a prototype record such as prototypes.L1"
+            )
         defaults = dict(
             plate_mass=prototype.plate_mass,
             arms=[
-                dict(length=arm.length, offset=list(arm.offset), direction=list(arm.direction), link_mass=mass)
+                dict(
+                    length=arm.length, offset=list(arm.offset), direction=list(arm.direction), link_mass=mass
+                )
                 for arm, mass in zip(prototype.arms, prototype.link_masses, strict=True)
             ],
             carts=[
