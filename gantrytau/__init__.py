@@ -43,6 +43,8 @@ from gantrytau.functions import (
     tanh,
 )
 from gantrytau.model import Connector, Model, outer
+from gantrytau.result import Result
+from gantrytau.simulation import simulate
 from gantrytau.statements import branch, connect, root
 from gantrytau.symbols import der, time
 from gantrytau.translation import translate

@@ -84,7 +84,7 @@ def translate_flat(
     pattern = block_pattern(indexed.residuals, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
     blocks = tuple(solve_block(e, u, indexed.residuals, by_name, sample) for e, u in pattern.blocks)
-    settings["started"] = guess.started
+    settings |= dict(started=guess.started, fixed=guess.fixed)
     return Dae(flat, table, reduced, indexed, choice, blocks, tuple(known), sample, settings)
 
 

@@ -1,0 +1,240 @@
+"""The model with all its coordinates as states, for the integrator, and the constraints they must keep."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.blocks import block_pattern
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, SolveError
+from gantrytau.initialization import Guess, consistent_start
+from gantrytau.signals import Samples, Signal
+from gantrytau.solution import solve_block
+from gantrytau.symbols import derivative_name, split_derivative, time
+
+LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
+STEPS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """x' = ode(t, x, z, w), 0 = algebraic; invariants(t, x, w) are levels that must stay zero.
+
+    states: names of x, every derivative below the highest; known: expression of each known symbol in
+    time and the sampled inputs w (values, then slopes); symbols: all symbols in terms of (t, x, z, w).
+    """
+
+    dae: Dae
+    states: tuple[str, ...]
+    algebraics: tuple[str, ...]
+    sampled: tuple[str, ...]
+    x: ca.SX
+    z: ca.SX
+    w: ca.SX
+    t0: ca.SX
+    ode: ca.SX
+    algebraic: ca.SX
+    invariants: tuple[ca.SX, ...]
+    known: Mapping[str, ca.SX]
+    definitions: tuple[tuple[ca.SX, ca.SX], ...]
+    pivots: ca.SX
+
+    @property
+    def constrained(self) -> bool:
+        """Whether there are constraints to hold."""
+        return bool(self.invariants)
+
+    def integrator(self, count: int, tolerance: float) -> ca.Function:
+        """An integrator over `count` intervals in the scaled time 0..count.
+
+        p = (start, interval) in s without samples; with samples, per interval u = (start, length, number,
+        values, slopes): the intervals may differ then.
+        """
+        tau = ca.SX.sym("tau")
+        if self.sampled:
+            u = ca.SX.sym("u", 3 + self.w.numel())
+            t, h, w, p = u[0] + u[1] * (tau - u[2]), u[1], u[3:], ca.SX(0, 1)
+            begin = u[0]
+        else:
+            p, u, w = ca.SX.sym("p", 2), ca.SX(0, 1), ca.SX(0, 1)
+            t, h, begin = p[0] + p[1] * tau, p[1], p[0]
+        old = ca.vertcat(time, self.t0, self.w)
+        new = ca.vertcat(t, begin, w)
+        ode, algebraic = ca.substitute([h * self.ode, self.algebraic], [old], [new])
+        problem = {"t": tau, "x": self.x, "p": p, "u": u, "ode": ode}
+        options = {
+            "abstol": tolerance,
+            "reltol": tolerance,
+            "max_num_steps": 100_000,
+            "disable_internal_warnings": True,
+            "show_eval_warnings": False,
+        }
+        if self.algebraics:
+            problem |= {"z": self.z, "alg": algebraic}
+            return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
+        return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
+
+    def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent states and algebraics at the start, with the inputs as they are then."""
+        dae = self.dae
+        at = ca.Function("known", [time, self.t0, self.w], [ca.vertcat(*self.known.values())])
+        values = {**dae.start, time.name(): t}
+        if self.known:
+            values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
+        started = frozenset(dae.settings["started"])
+        fixed = frozenset(dae.settings["fixed"])
+        guess = Guess(values, started | frozenset(self.known), fixed)
+        found = consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess)
+        x = np.array([found[n] for n in self.states])
+        return x, np.array([found[n] for n in self.algebraics])
+
+    @cached_property
+    def _levels(self) -> list[ca.Function]:
+        """Each level as a function to its residual, Jacobian and the size of its terms."""
+        found = []
+        positions = {n: k for k, n in enumerate(self.states)}
+        for residual in self.invariants:
+            own = [n for n in (leaf.name() for leaf in ca.symvar(residual)) if n in positions]
+            top = _level_columns(own)
+            columns = [positions[n] for n in top]
+            x = self.x[columns]
+            jacobian = ca.densify(ca.jacobian(residual, x))
+            found.append(
+                (columns, ca.Function("level", [self.x, time, self.t0, self.w], [residual, jacobian]))
+            )
+        return found
+
+    def project(self, x: np.ndarray, t: float, w: np.ndarray) -> np.ndarray:
+        """The nearest point that satisfies all constraints; SolveError if there is none near."""
+        x = x.copy()
+        for columns, level in self._levels:
+            for _ in range(STEPS):
+                residual, jacobian = (np.array(m) for m in level(x, t, t, w))
+                scale = np.maximum(np.abs(jacobian) @ np.abs(x[columns]), 1e-3)
+                worst = np.max(np.abs(residual.ravel()) / scale)
+                if not worst > LARGEST_DRIFT:
+                    break
+                x[columns] -= np.linalg.lstsq(jacobian, residual.ravel(), rcond=1e-12)[0]
+            if not worst <= 1e-8:
+                raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {t:.6g} s", time=t)
+        return x
+
+    def weakest(self, x: np.ndarray, z: np.ndarray, t: float, w: np.ndarray) -> list[str]:
+        """Names of the equations that come nearest to depending on each other at a point."""
+        if self.pivots.numel() == 0:
+            return []
+        function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
+        matrix = np.array(function(x, z, t, t, w))
+        if not np.all(np.isfinite(matrix)):
+            return []
+        matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
+        left, values, _ = np.linalg.svd(matrix)
+        if values[-1] > 1e-3 * values[0]:
+            return []
+        strongest = np.argsort(-np.abs(left[:, -1]))[:4]
+        equations = self.dae.reduced.equations
+        return [equations[i].name for i in strongest if abs(left[i, -1]) > 0.1]
+
+
+def _level_columns(names: Sequence[str]) -> list[str]:
+    """Of the names in a level, those of the order that it determines: speeds once speeds occur."""
+    orders = {n: split_derivative(n)[1] for n in names}
+    highest = max(orders.values(), default=0)
+    return [n for n in names if orders[n] == highest] if highest else list(names)
+
+
+def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
+    """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
+    without value, or a sampled one that has to be differentiated."""
+    sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
+    w, t0 = ca.SX.sym("w", 2 * len(sampled)), ca.SX.sym("t0")
+    indexed, chains = dae.indexed, dae.reduced.chains
+    states = tuple(
+        derivative_name(n, k)
+        for k in range(max(indexed.orders.values(), default=0))
+        for n, top in indexed.orders.items()
+        if k < top
+    )
+    highest = {derivative_name(n, top): chains.sx(n, top) for n, top in indexed.orders.items()}
+    last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
+    blocks = [solve_block(e, u, last, highest, dae.start) for e, u in block_pattern(last, highest).blocks]
+    known = _known_symbols(dae, signals, sampled, w, t0)
+    numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
+    definitions = [*numbers, *((chains.named(n), e) for n, e in known.items())]
+    implicit = [b for b in blocks if b.solution is None]
+    for block in blocks:
+        if block.solution is not None:
+            definitions += zip(block.tears, block.solution, strict=True)
+        definitions += block.inner
+    ode = (
+        ca.vertcat(*(chains.sx(base, k + 1) for base, k in map(split_derivative, states)))
+        if states
+        else ca.SX(0, 1)
+    )
+    algebraic = ca.vertcat(*(r for b in implicit for r in b.residuals)) if implicit else ca.SX(0, 1)
+    invariants = _invariants(dae)
+    tops = ca.vertcat(*highest.values()) if highest else ca.SX(0, 1)
+    pivots = ca.jacobian(ca.vertcat(*last.values()), tops) if last else ca.SX(0, 0)
+    v, e = [s for s, _ in definitions], [d for _, d in definitions]
+    _, found = ca.substitute_inplace(v, e, [ode, algebraic, ca.densify(pivots), *invariants], False)
+    tears = [y for b in implicit for y in b.tears]
+    return Coordinates(
+        dae=dae,
+        states=states,
+        algebraics=tuple(y.name() for y in tears),
+        sampled=sampled,
+        x=ca.vertcat(*(chains.named(n) for n in states)) if states else ca.SX(0, 1),
+        z=ca.vertcat(*tears) if tears else ca.SX(0, 1),
+        w=w,
+        t0=t0,
+        ode=found[0],
+        algebraic=found[1],
+        invariants=tuple(found[3:]),
+        known=known,
+        definitions=tuple(definitions),
+        pivots=found[2],
+    )
+
+
+def _invariants(dae: Dae) -> list[ca.SX]:
+    """Residuals of the levels below the last: positions, then velocities."""
+    counts = dae.indexed.counts
+    found = []
+    for stage in range(-max(counts, default=0), 0):
+        rows = [dae.indexed.residuals[i, stage + c] for i, c in enumerate(counts) if stage + c >= 0]
+        found.append(ca.vertcat(*rows))
+    return found
+
+
+def _known_symbols(
+    dae: Dae, signals: Mapping[str, Signal], sampled: Sequence[str], w: ca.SX, t0: ca.SX
+) -> dict[str, ca.SX]:
+    """Inputs and those of their derivatives that occur, as expressions of time and samples."""
+    occurring = {leaf.name() for r in dae.indexed.residuals.values() for leaf in ca.symvar(r)}
+    starts = {n for v in dae.flat.variables if v.start is not None for n in v.elements}
+    known: dict[str, ca.SX] = {}
+    for name in dae.known:
+        signal = signals.get(name)
+        top = max((k for b, k in map(split_derivative, occurring) if b == name), default=0)
+        if isinstance(signal, Samples):
+            if top > 0:
+                raise ModelError(
+                    f"input {name} is differentiated {top} times by the model, which samples do not allow; give a "
+                    "function of time that accepts symbols, or pass the samples through a filter component"
+                )
+            k = sampled.index(name)
+            known[name] = w[k] + w[len(sampled) + k] * (time - t0)
+            continue
+        if signal is None:
+            if name not in starts:
+                raise ModelError(
+                    f"input {name} has no value; give inputs={{'{name}': ...}}, or a start value"
+                )
+            signal = ca.SX(dae.start[name])
+        for order in range(top + 1):
+            known[derivative_name(name, order)] = signal
+            signal = ca.jacobian(signal, time)
+    return known

@@ -1,0 +1,209 @@
+"""Simulation: CVODES or IDAS from CasADi on all coordinates of the model, held to its constraints.
+
+The integrator sees every coordinate, not a choice of independent ones, so it cannot meet a singularity
+that only the choice makes. Constraints and their derivatives are kept by projecting onto them.
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.coordinates import Coordinates, all_coordinates
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, SolveError
+from gantrytau.model import Model
+from gantrytau.parameters import with_values
+from gantrytau.result import Result
+from gantrytau.signals import Samples, Signal, read_signals
+from gantrytau.trajectories import result_of
+from gantrytau.translation import retranslate, translate
+
+CHUNK = 10  # output intervals between two projections onto the constraints
+LONG = 2.0  # s of waiting after which progress is shown
+
+
+def simulate(
+    model: Model | Dae,
+    *,
+    stop: float,
+    start: float = 0.0,
+    inputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    outputs: Sequence[str] | None = None,
+    tolerance: float = 1e-8,
+    points: int = 501,
+) -> Result:
+    """Simulate a model from its start values and return all its variables over time.
+
+    start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,) or (n, k)),
+    joined by straight lines; an input that is not named keeps its start value. parameters: name -> value;
+    outputs: names to keep (all); tolerance: relative and absolute, of the integrator; points: of the result.
+    Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
+    when there is no consistent start, ModelError for wrong names and values.
+    """
+    _check(start, stop, tolerance, points)
+    dae = model if isinstance(model, Dae) else translate(model)
+    if parameters:
+        dae = retranslate(dae, with_values(dae.flat, parameters))
+    for name in outputs or ():
+        dae.expand(name)
+    signals = read_signals(inputs or {}, dae.expand)
+    _check_inputs(dae, signals, start, stop)
+    coordinates = all_coordinates(dae, signals)
+    grid = np.linspace(start, stop, points)
+    run = _Run(coordinates, signals, grid, tolerance)
+    try:
+        run.go()
+    except SolveError as error:
+        error.result = result_of(coordinates, signals, *run.so_far(), outputs)
+        raise
+    except KeyboardInterrupt:
+        times, x, z = run.so_far()
+        raise SolveError(
+            f"{dae.name}: simulation interrupted at t = {times[-1]:.4g} s; .result holds what was computed",
+            time=float(times[-1]),
+            result=result_of(coordinates, signals, times, x, z, outputs),
+        ) from None
+    return result_of(coordinates, signals, *run.so_far(), outputs)
+
+
+def _check(start: float, stop: float, tolerance: float, points: int) -> None:
+    if not (np.isfinite(start) and np.isfinite(stop) and stop > start):
+        raise ModelError(f"simulate: found start={start} and stop={stop}, expected start < stop, both finite")
+    if not 0 < tolerance < 1:
+        raise ModelError(f"simulate: found tolerance={tolerance}, expected a number between 0 and 1, as 1e-8")
+    if points < 2:
+        raise ModelError(f"simulate: found points={points}, expected at least 2")
+
+
+def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:
+    for name, signal in signals.items():
+        if name not in dae.known:
+            raise ModelError(
+                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.known) or 'none'}); "
+                "to impose it, translate with given=..., to change a parameter use parameters="
+            )
+        if isinstance(signal, Samples) and (signal.times[0] > start or signal.times[-1] < stop):
+            raise ModelError(
+                f"input {name}: samples cover {signal.times[0]:g} to {signal.times[-1]:g} s, expected "
+                f"{start:g} to {stop:g} s; add samples or simulate a shorter time"
+            )
+
+
+class _Run:
+    """One integration over a grid, in chunks."""
+
+    def __init__(
+        self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, tolerance: float
+    ):
+        self.coordinates, self.tolerance = coordinates, tolerance
+        samples = {n: s for n, s in signals.items() if isinstance(s, Samples)}
+        self.samples = [samples[n] for n in coordinates.sampled]
+        knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
+        knots = knots[(knots > grid[0]) & (knots < grid[-1])]
+        self.mesh = np.unique(np.concatenate([grid, knots]))
+        self.kept = np.searchsorted(self.mesh, grid)
+        self.x = np.full((self.mesh.size, len(coordinates.states)), np.nan)
+        self.z = np.full((self.mesh.size, len(coordinates.algebraics)), np.nan)
+        self.done = 0
+        self.integrators: dict[int, ca.Function] = {}
+
+    def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times, states and algebraics at the output points that were reached."""
+        kept = self.kept[self.kept <= self.done]
+        return self.mesh[kept], self.x[kept], self.z[kept]
+
+    def go(self) -> None:
+        self.x[0], self.z[0] = self.coordinates.start(self.mesh[0], self._inputs(0))
+        last = self.mesh.size - 1
+        with _Progress(self.mesh[0], self.mesh[-1]) as progress:
+            size = CHUNK if self.coordinates.constrained or self.samples else last
+            size = min(size, max(CHUNK, last // 50))
+            while self.done < last:
+                count = min(size, last - self.done)
+                try:
+                    self._advance(count)
+                except RuntimeError as error:
+                    if count == 1 or isinstance(error, SolveError):
+                        raise self._stopped(error) from error
+                    size = 1
+                    continue
+                progress.at(self.mesh[self.done])
+
+    def _inputs(self, k: int) -> np.ndarray:
+        """Values and slopes of the sampled inputs on the k-th interval of the mesh."""
+        t = self.mesh[k]
+        h = self.mesh[min(k + 1, self.mesh.size - 1)] - t
+        values = np.array([np.interp(t, s.times, s.values) for s in self.samples])
+        after = np.array([np.interp(t + h, s.times, s.values) for s in self.samples])
+        slopes = (after - values) / h if h > 0 else 0.0 * values
+        return np.concatenate([values, slopes])
+
+    def _advance(self, count: int) -> None:
+        here = self.done
+        h = np.diff(self.mesh[here : here + count + 1])
+        if count not in self.integrators:
+            self.integrators[count] = self.coordinates.integrator(count, self.tolerance)
+        uniform = not self.samples
+        rows = [self.mesh[here : here + count], h, np.arange(count)]
+        if self.samples:
+            rows += list(np.array([self._inputs(here + k) for k in range(count)]).T)
+        found = self.integrators[count](
+            x0=self.x[here],
+            z0=self.z[here],
+            p=[self.mesh[here], h[0]] if uniform else [],
+            u=[] if uniform else np.vstack(rows),
+        )
+        x, z = np.array(found["xf"]).T, np.array(found["zf"]).T.reshape(count, -1)
+        if not np.all(np.isfinite(x)):
+            raise RuntimeError("the solution is not finite")
+        for k in range(count):
+            place = here + k + 1
+            self.x[place] = self.coordinates.project(x[k], self.mesh[place], self._inputs(place))
+            self.z[place] = z[k]
+        self.done = here + count
+
+    def _stopped(self, error: Exception) -> SolveError:
+        t = float(self.mesh[self.done])
+        dae = self.coordinates.dae
+        names = self.coordinates.weakest(self.x[self.done], self.z[self.done], t, self._inputs(self.done))
+        reason = "; ".join(line for line in str(error).splitlines() if "CV_" in line or "IDA_" in line)[:200]
+        where = f" The equations that degenerate there: {'; '.join(names)}." if names else ""
+        return SolveError(
+            f"{dae.name}: the integration stopped at t = {t:.6g} s ({reason or str(error).splitlines()[-1]}).{where} "
+            "The model may run into a singular position there; .result holds what was computed",
+            time=t,
+            equations=names,
+        )
+
+
+class _Progress:
+    """A bar on the screen for runs that take long, nothing otherwise."""
+
+    def __init__(self, start: float, stop: float):
+        self.start, self.stop, self.bar, self.task = start, stop, None, None
+
+    def __enter__(self) -> "_Progress":
+        from time import monotonic
+
+        self.clock = monotonic
+        self.since = monotonic()
+        return self
+
+    def at(self, t: float) -> None:
+        if self.bar is None and self.clock() - self.since > LONG and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self.bar = Progress(console=Console(stderr=True), transient=True)
+            self.task = self.bar.add_task("simulating", total=self.stop - self.start)
+            self.bar.start()
+        if self.bar is not None and self.task is not None:
+            self.bar.update(self.task, completed=t - self.start)
+
+    def __exit__(self, *exception: Any) -> None:
+        if self.bar is not None:
+            self.bar.stop()
