@@ -181,8 +181,8 @@ class Dae:
         return self.table.reduce(alias.offset) if order == 0 else ca.SX(0)
 
     def reduce(self, expression: ca.SX) -> ca.SX:
-        """An expression of the flat model's symbols in the symbols of the reduced equations."""
-        leaves = ca.symvar(expression)
+        """An expression of the flat model's symbols in the symbols of the reduced equations; others stay."""
+        leaves = [leaf for leaf in ca.symvar(expression) if split_derivative(leaf.name())[0] in self._scalars]
         new = [self.expression(leaf.name()) for leaf in leaves]
         return ca.substitute(expression, ca.vertcat(*leaves), ca.vertcat(*new)) if leaves else expression
 

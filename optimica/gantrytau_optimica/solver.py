@@ -1,0 +1,144 @@
+"""Ipopt on a transcribed problem: progress, interruption, and statuses in words."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau_optimica.transcription import Program
+
+WORDS = {
+    "Solve_Succeeded": "solved",
+    "Solved_To_Acceptable_Level": "solved to a lower accuracy than asked for",
+    "Infeasible_Problem_Detected": "no solution: the limits contradict each other",
+    "Search_Direction_Becomes_Too_Small": "stuck: steps became too small",
+    "Diverging_Iterates": "diverging: the problem may be unbounded",
+    "User_Requested_Stop": "interrupted",
+    "Maximum_Iterations_Exceeded": "iteration limit reached",
+    "Maximum_CpuTime_Exceeded": "time limit reached",
+    "Maximum_WallTime_Exceeded": "time limit reached",
+    "Restoration_Failed": "stuck: no way back to the limits was found",
+    "Error_In_Step_Computation": "stuck: no search direction was found",
+    "Invalid_Number_Detected": "stuck: an expression is not finite",
+    "Not_Enough_Degrees_Of_Freedom": "more conditions than unknowns",
+}
+
+Progress = Callable[[int, float, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Unknowns w and multipliers as Ipopt left them; status in words; times in s."""
+
+    w: np.ndarray
+    multipliers: np.ndarray
+    bound_multipliers: np.ndarray
+    constraints: np.ndarray
+    objective: float
+    success: bool
+    status: str
+    iterations: int
+    solve_time: float
+
+
+class Solver:
+    """Ipopt with exact derivatives for one program; may be called again with other bounds and guesses."""
+
+    def __init__(
+        self, program: Program, *, tolerance: float, max_iterations: int, max_time: float, progress: Progress | None
+    ):
+        self.program = program
+        self.watch = _Watch(program.w.numel(), program.g.numel(), progress)
+        options = {
+            "iteration_callback": self.watch,
+            "print_time": False,
+            "calc_lam_p": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "mu_strategy": "adaptive",
+                "linear_solver": "mumps",
+                "tol": tolerance,
+                "max_iter": max_iterations,
+                "max_wall_time": max_time,
+            },
+        }
+        nlp = {"x": program.w, "f": program.f, "g": program.g}
+        self.nlpsol = ca.nlpsol("optimum", "ipopt", nlp, options)
+
+    def solve(self, guess: np.ndarray) -> Solution:
+        """Solve from unknowns `guess` (unscaled)."""
+        program = self.program
+        begin = time.perf_counter()
+        with self.watch.interruptible():
+            found = self.nlpsol(
+                x0=guess / program.scale, lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg
+            )
+        stats: dict[str, Any] = self.nlpsol.stats()
+        word = str(stats["return_status"])
+        return Solution(
+            w=np.array(found["x"]).ravel() * program.scale,
+            multipliers=np.array(found["lam_g"]).ravel(),
+            bound_multipliers=np.array(found["lam_x"]).ravel() / program.scale,
+            constraints=np.array(found["g"]).ravel(),
+            objective=float(found["f"]),
+            success=bool(stats["success"]),
+            status=WORDS.get(word, word.replace("_", " ").lower()),
+            iterations=int(stats["iter_count"]),
+            solve_time=time.perf_counter() - begin,
+        )
+
+
+class _Watch(ca.Callback):
+    """Called by Ipopt after every iteration: reports progress, and stops when Ctrl-C was pressed."""
+
+    def __init__(self, unknowns: int, constraints: int, progress: Progress | None):
+        ca.Callback.__init__(self)
+        self.sizes = {"x": unknowns, "f": 1, "g": constraints, "lam_x": unknowns, "lam_g": constraints, "lam_p": 0}
+        self.progress = progress
+        self.stop = False
+        self.iteration = 0
+        self.construct("watch", {})
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        size = self.sizes.get(ca.nlpsol_out(i), 0)
+        return ca.Sparsity.dense(size, 1) if size else ca.Sparsity(0, 1 if i else 0)
+
+    def eval(self, arg: Any) -> list[int]:
+        self.iteration += 1
+        if self.progress is not None:
+            self.progress(self.iteration, float(arg[1]), 0.0)
+        return [1 if self.stop else 0]
+
+    def interruptible(self):
+        """While it lasts, Ctrl-C lets Ipopt finish its iteration and keep what it has."""
+        return _Interruptible(self)
+
+
+class _Interruptible:
+    def __init__(self, watch: _Watch):
+        self.watch = watch
+
+    def __enter__(self) -> None:
+        self.watch.stop, self.watch.iteration = False, 0
+        self.main = threading.current_thread() is threading.main_thread()
+        if self.main:
+            self.before = signal.signal(signal.SIGINT, self._pressed)
+
+    def _pressed(self, number: int, frame: Any) -> None:
+        self.watch.stop = True
+
+    def __exit__(self, *exception: Any) -> None:
+        if self.main:
+            signal.signal(signal.SIGINT, self.before)
