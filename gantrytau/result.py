@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -125,6 +125,16 @@ class Result:
         """The last value: a float, or an array for a vector or matrix."""
         last = self[name][-1]
         return last if last.ndim else float(last)
+
+    def select(self, names: Sequence[str]) -> "Result":
+        """Only the named variables, vectors with all their elements; ModelError for an unknown name."""
+        values: dict[str, Values] = {}
+        for name in names:
+            elements = self._arrays[name].flat if name in self._arrays else [name]
+            values.update((str(element), self[str(element)]) for element in elements)  # an unknown name raises
+        units = {name: self.unit(name) for name in values}
+        words = {name: self.description(name) for name in values}
+        return Result(self._time, values, units=units, descriptions=words, title=self._title)
 
     def plot(self, *names: str, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Draw variables over time, one axis for each unit, and return the figure.

@@ -51,9 +51,7 @@ def build(read: ReadProblem, guess: Mapping[str, Any]) -> Built:
     values = [next(found) for _ in points]
     times = [p.time if isinstance(p.time, str) else ca.SX(p.time) for p in points]
     times = [next(found) if isinstance(p.time, ca.SX) else t for p, t in zip(points, times, strict=True)]
-    rows = [
-        Limit(next(found), *_bounds(c, dae, read.name), name=c.name) for c in (*constraints, *limits)
-    ]
+    rows = [Limit(next(found), *_bounds(c, dae, read.name), name=c.name) for c in (*constraints, *limits)]
     ode, residuals = _numbered([system.ode, system.residuals], dae, numbers)
     chosen = tuple(
         FreeNumber(n, dae.table.symbols[n], *_range(p, k, dae), guess=_free_guess(n, guess, dae))
@@ -89,7 +87,8 @@ def build(read: ReadProblem, guess: Mapping[str, Any]) -> Built:
 
 def _signals(names: tuple[str, ...], symbols: list[ca.SX]) -> tuple[Signal, ...]:
     return tuple(
-        Signal(name, symbol, -np.inf, np.inf, 1.0, np.zeros_like) for name, symbol in zip(names, symbols, strict=True)
+        Signal(name, symbol, -np.inf, np.inf, 1.0, np.zeros_like)
+        for name, symbol in zip(names, symbols, strict=True)
     )
 
 
@@ -115,7 +114,9 @@ def _start_constraints(dae: Dae, points: tuple[Point, ...]) -> list[Constraint]:
     found = []
     for name, point in zip(sorted(dae.settings["fixed"]), points, strict=True):
         value = ca.SX(dae.start[name])
-        found.append(Constraint(point.symbol, value, value, f"initial({name}) == {dae.start[name]:g} (fixed start)"))
+        found.append(
+            Constraint(point.symbol, value, value, f"initial({name}) == {dae.start[name]:g} (fixed start)")
+        )
     return found
 
 
@@ -143,7 +144,9 @@ def _bounds(constraint: Constraint, dae: Dae, name: str) -> tuple[float, float]:
             )
         ends.append(float(dae.table.number(bound)[0]))
     if not ends[0] <= ends[1] or any(np.isnan(ends)):
-        raise ModelError(f"{name}: `{constraint.name}` has limits {ends[0]:g} and {ends[1]:g}; make the lower the smaller")
+        raise ModelError(
+            f"{name}: `{constraint.name}` has limits {ends[0]:g} and {ends[1]:g}; make the lower the smaller"
+        )
     return ends[0], ends[1]
 
 
@@ -160,7 +163,9 @@ def _free_guess(name: str, guess: Mapping[str, Any], dae: Dae) -> float:
     return float(value) if isinstance(value, (int, float)) else dae.table.values[name]
 
 
-def _sorted_limits(draft: ControlProblem, rows: list[Limit], name: str) -> tuple[tuple[Limit, ...], tuple[Limit, ...]]:
+def _sorted_limits(
+    draft: ControlProblem, rows: list[Limit], name: str
+) -> tuple[tuple[Limit, ...], tuple[Limit, ...]]:
     """Limits on paths and conditions on points, told apart by the symbols in them."""
     signals = {s.symbol.element_hash() for s in draft.signals} | {draft.time.element_hash()}
     points = {e.element_hash() for p in draft.points for e in p.symbol.elements()}
@@ -178,8 +183,48 @@ def _sorted_limits(draft: ControlProblem, rows: list[Limit], name: str) -> tuple
             boundary.append(row)
         elif not row.lower - 1e-9 <= float(row.expression) <= row.upper + 1e-9:
             value = float(row.expression)
-            raise ModelError(f"{name}: `{row.name}` can never hold, its value is always {value:g}; remove or correct it")
-    return tuple(path), tuple(boundary)
+            raise ModelError(
+                f"{name}: `{row.name}` can never hold, its value is always {value:g}; remove or correct it"
+            )
+    return tuple(path), _independent(draft, boundary, name)
+
+
+def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tuple[Limit, ...]:
+    """Conditions without those that follow from states which others fix at the same time.
+
+    On a path the whole position may be given where one coordinate decides it; such repetitions would
+    make the derivatives of the conditions depend on each other.
+    """
+    states = {s.symbol.element_hash() for s in draft.states}
+    meaning = {
+        s.element_hash(): (p.time, e)
+        for p in draft.points
+        if isinstance(p.time, str)
+        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
+    }
+    fixed: dict[str, dict[int, tuple[ca.SX, float]]] = {"initial": {}, "final": {}}
+    kept: list[Limit] = []
+    for row in boundary:
+        when, value = meaning.get(row.expression.element_hash(), ("", row.expression))
+        if row.lower != row.upper or when not in fixed:
+            kept.append(row)
+            continue
+        known = fixed[when]
+        leaves = ca.symvar(value)
+        if all(leaf.element_hash() in known for leaf in leaves):
+            pairs = [known[leaf.element_hash()] for leaf in leaves]
+            inside, numbers = ca.vertcat(*(p[0] for p in pairs)), ca.DM([p[1] for p in pairs])
+            found = float(ca.evalf(ca.substitute(value, inside, numbers))) if leaves else float(value)
+            if abs(found - row.lower) > 1e-7 * max(1.0, abs(row.lower)):
+                raise ModelError(
+                    f"{name}: `{row.name}` contradicts other conditions at the same time, from which it follows that "
+                    f"the value is {found:.8g}; correct one of them"
+                )
+            continue
+        if value.is_symbolic() and value.element_hash() in states:
+            known[value.element_hash()] = (value, row.lower)
+        kept.append(row)
+    return tuple(kept)
 
 
 def _check_symbols(draft: ControlProblem, name: str) -> None:
@@ -211,10 +256,13 @@ def _with_guesses(draft: ControlProblem, guesses: Mapping[str, Any]) -> ControlP
 
     def done(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
         return tuple(
-            replace(s, guess=guesses[s.name], nominal=typical_size(guesses[s.name], bounds[s.name])) for s in signals
+            replace(s, guess=guesses[s.name], nominal=typical_size(guesses[s.name], bounds[s.name]))
+            for s in signals
         )
 
-    return replace(draft, states=done(draft.states), algebraics=done(draft.algebraics), inputs=done(draft.inputs))
+    return replace(
+        draft, states=done(draft.states), algebraics=done(draft.algebraics), inputs=done(draft.inputs)
+    )
 
 
 def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:

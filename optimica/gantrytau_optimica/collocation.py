@@ -1,64 +1,79 @@
-"""Collocation on one element: points, differentiation, interpolation and quadrature on [0, 1]."""
+"""Radau and Gauss collocation on the unit interval: points and weights from their definitions."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
 
-import casadi as ca
 import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
-from gantrytau import ModelError
-
-SCHEMES = {"radau": "radau", "gauss": "legendre"}
-MOST_POINTS = 9
+Array = NDArray[np.float64]
+SchemeName = Literal["radau", "gauss"]
 
 
 @dataclass(frozen=True, eq=False)
-class Collocation:
-    """A collocation scheme.
+class Scheme:
+    """One element of collocation with k points; its polynomials of degree k run through 0 and the points."""
 
-    points: (k,) in (0, 1]; nodes: (k + 1,) with 0 before them; differentiation: (k + 1, k), derivative at
-    point j of the polynomial through values v at the nodes is v @ differentiation[:, j]; end: (k + 1,) its
-    value at 1; weights: (k,) of the quadrature over the points.
-    """
+    name: SchemeName
+    points: Array  # (k,) in (0, 1]
+    differentiation: Array  # (k, k + 1): derivative at the points from the values at (0, points)
+    end: Array  # (k + 1,): value at 1 from the values at (0, points)
+    quadrature: Array  # (k,): integral over [0, 1] from the values at the points
 
-    scheme: str
-    points: np.ndarray
-    nodes: np.ndarray
-    differentiation: np.ndarray
-    end: np.ndarray
-    weights: np.ndarray
+    @property
+    def nodes(self) -> Array:
+        """0 and the points, (k + 1,)."""
+        return np.concatenate([[0.0], self.points])
 
 
-def collocation(scheme: str, count: int) -> Collocation:
-    """The scheme "radau" or "gauss" with `count` points per element. Raises ModelError for others."""
-    if scheme not in SCHEMES:
-        raise ModelError(f"scheme={scheme!r}: expected one of {', '.join(SCHEMES)}")
-    if not isinstance(count, int) or not 1 <= count <= MOST_POINTS:
-        raise ModelError(f"points={count!r}: expected a whole number from 1 to {MOST_POINTS}")
-    points = np.array(ca.collocation_points(count, SCHEMES[scheme]))
-    nodes = np.concatenate([[0.0], points])
-    powers = np.arange(count + 1)
-    # columns of `coefficients`: the polynomials that are one at one node and zero at the others
-    coefficients = np.linalg.inv(nodes[:, None] ** powers)
-    slopes = powers[1:] * points[:, None] ** powers[:-1]
-    weights = np.linalg.solve((points[:, None] ** powers[:-1]).T, 1.0 / powers[1:])
-    return Collocation(
-        scheme,
-        points,
-        nodes,
-        (slopes @ coefficients[1:]).T,
-        coefficients.sum(axis=0),
-        weights,
+@cache
+def scheme(name: SchemeName, points: int) -> Scheme:
+    """The Radau scheme (last point at 1, order 2k - 1) or the Gauss scheme (order 2k) of k points."""
+    if name not in ("radau", "gauss"):
+        raise ValueError(f"scheme: found '{name}', expected 'radau' or 'gauss'")
+    if not 1 <= points <= 9:
+        raise ValueError(f"points per element: found {points}, expected 1 to 9")
+    # roots of P_k (Gauss), or of P_k - P_(k-1) (Radau, right end included)
+    series = np.zeros(points + 1)
+    series[points] = 1.0
+    if name == "radau":
+        series[points - 1] -= 1.0
+    tau = np.sort((1 + np.real(legendre.legroots(series))) / 2)
+    if name == "radau":
+        tau[-1] = 1.0
+    nodes = np.concatenate([[0.0], tau])
+    powers = np.vander(tau, points, increasing=True)
+    moments = 1 / np.arange(1, points + 1)
+    return Scheme(
+        name=name,
+        points=tau,
+        differentiation=_derivatives(nodes)[1:],
+        end=np.array(lagrange(nodes, 1.0)),
+        quadrature=np.linalg.solve(powers.T, moments),
     )
 
 
-def interpolation(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Weights (len(at), n): value at each `at` of the polynomial through values at the n nodes."""
-    at = np.atleast_1d(at)
-    difference = nodes[:, None] - nodes[None, :]
-    np.fill_diagonal(difference, 1.0)
-    found = np.ones((at.size, nodes.size))
-    for j in range(nodes.size):
-        for m in range(nodes.size):
-            if m != j:
-                found[:, j] *= (at - nodes[m]) / difference[j, m]
-    return found
+def lagrange(nodes: Any, s: Any) -> list[Any]:
+    """The Lagrange polynomials of the nodes at s; entries of nodes and s may be numbers, arrays or symbols."""
+    basis = []
+    for k in range(len(nodes)):
+        value = 1.0 + 0 * s
+        for m in range(len(nodes)):
+            if m != k:
+                value = value * ((s - nodes[m]) / (nodes[k] - nodes[m]))
+        basis.append(value)
+    return basis
+
+
+def _derivatives(nodes: Array) -> Array:
+    """Differentiation matrix of the nodes by the barycentric formula; the rows sum to zero by construction."""
+    distance = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
+    weights = 1 / distance.prod(axis=1)
+    matrix = weights[None, :] / weights[:, None] / distance
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return matrix

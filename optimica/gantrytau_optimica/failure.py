@@ -71,7 +71,9 @@ def _binding(program: Program, solution: Solution, horizon: tuple[float, float])
             for word, bound in (("lower", lower[places]), ("upper", upper[places])):
                 reached = _reached(value, bound)
                 if np.any(reached):
-                    found.append(f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, times)}")
+                    found.append(
+                        f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, times)}"
+                    )
     rows: dict[str, list[int]] = {}
     for k, row in enumerate(program.rows):
         if row.kind == "path":

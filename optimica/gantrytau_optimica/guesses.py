@@ -51,7 +51,9 @@ def _horizon(draft: ControlProblem) -> tuple[float, float]:
     evaluate = ca.Function("horizon", [numbers], [draft.start_time, draft.final_time])
     start, stop = (float(x) for x in evaluate(ca.DM([n.guess for n in draft.free])))
     if not start < stop:
-        raise ModelError(f"start_time {start:g} s and final_time {stop:g} s, expected the first to be the smaller")
+        raise ModelError(
+            f"start_time {start:g} s and final_time {stop:g} s, expected the first to be the smaller"
+        )
     return start, stop
 
 
@@ -109,7 +111,9 @@ def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Callable[[float]
     return {name: signal(name) for name in names}
 
 
-def _ends(dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint]) -> dict[str, dict[str, float]]:
+def _ends(
+    dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint]
+) -> dict[str, dict[str, float]]:
     """Values given at the start and at the end, by symbol."""
     from gantrytau_optimica.building import derivative_symbol
 
@@ -125,7 +129,11 @@ def _ends(dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint]) 
         if not constraint.expression.is_symbolic() or not constraint.lower.is_constant():
             continue
         known = meaning.get(constraint.expression.element_hash())
-        if known is None or not constraint.upper.is_constant() or float(constraint.lower) != float(constraint.upper):
+        if (
+            known is None
+            or not constraint.upper.is_constant()
+            or float(constraint.lower) != float(constraint.upper)
+        ):
             continue
         which, leaf = known
         target = derivative_symbol(dae, leaf.name())
@@ -159,7 +167,9 @@ def trapezoid(fraction: Any) -> tuple[np.ndarray, np.ndarray]:
     return np.where(f < 0.5, half, 1 - half), top * np.minimum(left / RAMP, 1.0)
 
 
-def _algebraics(draft, system: System, numbers, symbols: Mapping[str, Guess], own, horizon) -> dict[str, Guess]:
+def _algebraics(
+    draft, system: System, numbers, symbols: Mapping[str, Guess], own, horizon
+) -> dict[str, Guess]:
     """Algebraics from their closed forms along the guess of the rest, where they have one."""
     found: dict[str, Guess] = {}
     if not system.algebraics:
@@ -186,12 +196,16 @@ class _Closed:
         expression = ca.substitute(expression, ca.vertcat(*known), ca.DM(values)) if known else expression
         self.signals = [symbols[s.name()] for s in (*system.x.elements(), *system.u.elements())]
         self.horizon = horizon
-        self.function = ca.Function("closed", [draft.time, ca.vertcat(system.x, system.u)], [ca.densify(expression)])
+        self.function = ca.Function(
+            "closed", [draft.time, ca.vertcat(system.x, system.u)], [ca.densify(expression)]
+        )
 
     def __call__(self, fraction: np.ndarray) -> np.ndarray:
         fraction = np.atleast_1d(fraction)
         start, stop = self.horizon
-        columns = np.array([signal(fraction) for signal in self.signals]).reshape(len(self.signals), fraction.size)
+        columns = np.array([signal(fraction) for signal in self.signals]).reshape(
+            len(self.signals), fraction.size
+        )
         found = np.array(self.function(start + (stop - start) * fraction[None, :], columns)).ravel()
         return np.where(np.isfinite(found), found, 1.0)
 

@@ -111,9 +111,13 @@ def at(time: Any, expression: Any) -> ca.SX:
 def _point(words: str, expression: Any, time: Any) -> ca.SX:
     points = _points.get()
     if points is None:
-        raise ModelError(f"{words} was used outside of an optimisation problem; use it in constraints() or objective()")
+        raise ModelError(
+            f"{words} was used outside of an optimisation problem; use it in constraints() or objective()"
+        )
     expression = ca.densify(ca.SX(expression))
-    names = [f"{words}({e})" if words in ("initial", "final") else f"{words} of {e}" for e in expression.elements()]
+    names = [
+        f"{words}({e})" if words in ("initial", "final") else f"{words} of {e}" for e in expression.elements()
+    ]
     symbol = ca.reshape(ca.vertcat(*(ca.SX.sym(name) for name in names)), *expression.shape)
     points.append(Point(ca.vec(symbol), ca.vec(expression), time))
     return symbol

@@ -34,7 +34,7 @@ def optimize(
     problem: a subclass of Optimization or an instance; elements, points: of the mesh, points per element (1 to 9);
     scheme: "radau" or "gauss"; guess: name -> number, array or function of time, or another solution; default: a
     straight line between given initial and final values, else start values. tolerance: of Ipopt; max_time: s;
-    progress: called with (iteration, objective, violation).
+    progress: called with (iteration, objective).
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
@@ -49,13 +49,16 @@ def optimize(
     built = build(read, dict(guess or {}))
     program = transcribe(built.problem, np.linspace(0.0, 1.0, elements + 1), collocation(scheme, points))
     _check_freedom(read.name, program)
-    solver = Solver(program, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time, progress=progress)
+    solver = Solver(
+        program, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time, progress=progress
+    )
     building = time.perf_counter() - begin
     solution = solver.solve(_first(program, built))
     optimum = Optimum(read.name, built, program, solution, building)
     if not solution.success:
         raise SolveError(
-            f"{optimum.report()}\nTry another guess= or more elements=, widen a limit, or look at .optimum.", optimum=optimum
+            f"{optimum.report()}\nTry another guess= or more elements=, widen a limit, or look at .optimum.",
+            optimum=optimum,
         )
     return optimum
 

@@ -103,7 +103,9 @@ class Optimum:
         names = list(self.dae.variables)
         rows = self._values(names, self.time)
         units, words = labels(self.dae)
-        return Result(self.time, dict(zip(names, rows, strict=True)), units=units, descriptions=words, title=self.name)
+        return Result(
+            self.time, dict(zip(names, rows, strict=True)), units=units, descriptions=words, title=self.name
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,6 +129,14 @@ class Optimum:
     def final(self, name: str) -> Any:
         """The value at the end of the horizon."""
         return self[name][-1]
+
+    def integral(self, name: str) -> float:
+        """The integral of a variable over the horizon, by the quadrature of the collocation."""
+        mesh, scheme = self.program.mesh, self.program.scheme
+        span = self.final_time - self.start_time
+        fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.points
+        values = self.signal(name)(self.start_time + span * fractions.ravel()).reshape(fractions.shape)
+        return float(span * np.sum(np.diff(mesh)[:, None] * scheme.weights * values))
 
     def signal(self, name: str):
         """A variable or derivative as a vectorised function of time: (n,) -> (n,) or (n, k), from the polynomials
@@ -176,12 +186,15 @@ class Optimum:
         span = self.final_time - self.start_time
         fraction = np.clip((times - self.start_time) / span, 0.0, 1.0)
         # a time on a border belongs to the element before it, where the limits hold at the last point
-        element = np.clip(np.searchsorted(program.mesh, fraction - 1e-13, side="right") - 1, 0, program.mesh.size - 2)
+        element = np.clip(
+            np.searchsorted(program.mesh, fraction - 1e-13, side="right") - 1, 0, program.mesh.size - 2
+        )
         local = (fraction - program.mesh[element]) / np.diff(program.mesh)[element]
         nodes = np.concatenate([program.starts[:-1, None, :], program.states], axis=1)
         x = np.einsum("tj,tjs->st", interpolation(program.scheme.nodes, local), w[nodes][element])
         weights = interpolation(program.scheme.points, local)
         others = [
-            np.einsum("tj,tjs->st", weights, w[table][element]) for table in (program.algebraics, program.inputs)
+            np.einsum("tj,tjs->st", weights, w[table][element])
+            for table in (program.algebraics, program.inputs)
         ]
         return np.vstack([x, *others])

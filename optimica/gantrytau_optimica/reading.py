@@ -45,7 +45,9 @@ def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
     if isinstance(problem, type) and issubclass(problem, Optimization):
         problem = problem()
     if not isinstance(problem, Optimization):
-        raise ModelError(f"optimize: found {problem!r}, expected a subclass of Optimization or an instance of it")
+        raise ModelError(
+            f"optimize: found {problem!r}, expected a subclass of Optimization or an instance of it"
+        )
     instance = instantiate(problem)
     root = instance.root
     name = type(root).__name__
@@ -68,7 +70,9 @@ def _scalar(place: str, evaluate: Callable[[], Any]) -> ca.SX:
     try:
         value = ca.densify(ca.SX(_told(place, evaluate)))
     except NotImplementedError:
-        raise ModelError(f"{place}: found no number or expression, expected one; return it from the method") from None
+        raise ModelError(
+            f"{place}: found no number or expression, expected one; return it from the method"
+        ) from None
     if value.numel() != 1:
         raise ModelError(f"{place}: found shape {value.shape}, expected one number; sum it up or weigh it")
     return value
@@ -81,7 +85,9 @@ def _told(place: str, evaluate: Callable[[], Any]) -> Any:
     except (RuntimeError, TypeError, AttributeError, ValueError, IndexError) as error:
         text = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
         if "truth value" in str(error):
-            text = "Python's chained comparison and `and` cannot work on symbols; write between(lower, x, upper)"
+            text = (
+                "Python's chained comparison and `and` cannot work on symbols; write between(lower, x, upper)"
+            )
         raise ModelError(f"{place}: {text.split(': ', 1)[-1] if '.cpp' in text else text}") from error
 
 
@@ -122,7 +128,9 @@ def _constraint(place: str, statement: Any) -> list[Constraint]:
         if element.is_constant() and float(element) != 0.0:
             continue
         if not (equal or element.is_op(ca.OP_LE) or element.is_op(ca.OP_LT)):
-            raise ModelError(f"{place}: found `{str(element)[:80]}`, expected `a == b`, `a <= b` or between(a, x, b)")
+            raise ModelError(
+                f"{place}: found `{str(element)[:80]}`, expected `a == b`, `a <= b` or between(a, x, b)"
+            )
         left, right = element.dep(0), element.dep(1)
         found.append(_relation(left, right, equal))
     return found
@@ -144,7 +152,9 @@ def _limit(place: str, bound: Any, expression: ca.SX) -> ca.SX:
     if bound.numel() == 1:
         return ca.repmat(bound, *expression.shape)
     if bound.shape != expression.shape:
-        raise ModelError(f"{place}: a limit has shape {bound.shape}, the expression {expression.shape}; make them equal")
+        raise ModelError(
+            f"{place}: a limit has shape {bound.shape}, the expression {expression.shape}; make them equal"
+        )
     return bound
 
 

@@ -28,7 +28,7 @@ WORDS = {
     "Not_Enough_Degrees_Of_Freedom": "more conditions than unknowns",
 }
 
-Progress = Callable[[int, float, float], None]
+Progress = Callable[[int, float], None]  # iteration, objective
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,13 @@ class Solver:
     """Ipopt with exact derivatives for one program; may be called again with other bounds and guesses."""
 
     def __init__(
-        self, program: Program, *, tolerance: float, max_iterations: int, max_time: float, progress: Progress | None
+        self,
+        program: Program,
+        *,
+        tolerance: float,
+        max_iterations: int,
+        max_time: float,
+        progress: Progress | None,
     ):
         self.program = program
         self.watch = _Watch(program.w.numel(), program.g.numel(), progress)
@@ -79,6 +85,8 @@ class Solver:
             found = self.nlpsol(
                 x0=guess / program.scale, lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg
             )
+        if self.watch.error is not None:
+            raise self.watch.error
         stats: dict[str, Any] = self.nlpsol.stats()
         word = str(stats["return_status"])
         return Solution(
@@ -99,9 +107,17 @@ class _Watch(ca.Callback):
 
     def __init__(self, unknowns: int, constraints: int, progress: Progress | None):
         ca.Callback.__init__(self)
-        self.sizes = {"x": unknowns, "f": 1, "g": constraints, "lam_x": unknowns, "lam_g": constraints, "lam_p": 0}
+        self.sizes = {
+            "x": unknowns,
+            "f": 1,
+            "g": constraints,
+            "lam_x": unknowns,
+            "lam_g": constraints,
+            "lam_p": 0,
+        }
         self.progress = progress
         self.stop = False
+        self.error: Exception | None = None
         self.iteration = 0
         self.construct("watch", {})
 
@@ -117,8 +133,11 @@ class _Watch(ca.Callback):
 
     def eval(self, arg: Any) -> list[int]:
         self.iteration += 1
-        if self.progress is not None:
-            self.progress(self.iteration, float(arg[1]), 0.0)
+        try:
+            if self.progress is not None:
+                self.progress(self.iteration, float(arg[1]))
+        except Exception as error:  # raised again once Ipopt has let go
+            self.stop, self.error = True, error
         return [1 if self.stop else 0]
 
     def interruptible(self):
@@ -131,7 +150,7 @@ class _Interruptible:
         self.watch = watch
 
     def __enter__(self) -> None:
-        self.watch.stop, self.watch.iteration = False, 0
+        self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
         self.main = threading.current_thread() is threading.main_thread()
         if self.main:
             self.before = signal.signal(signal.SIGINT, self._pressed)

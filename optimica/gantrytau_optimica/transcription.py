@@ -145,11 +145,23 @@ class _Writer:
                     slope = matrix @ scheme.differentiation[:, j]
                     add((slope - h * ode) / sizes, "dynamics", state_names, place)
                 add(residual, "algebraic", problem.residual_names, place)
-                add(limits, "path", [m.name for m in path], place, [m.lower for m in path], [m.upper for m in path])
+                add(
+                    limits,
+                    "path",
+                    [m.name for m in path],
+                    place,
+                    [m.lower for m in path],
+                    [m.upper for m in path],
+                )
                 f += h * scheme.weights[j] * integrand
             if not self.shared and state_names:
                 end = matrix @ scheme.end
-                add((end - self._at(self.starts[e + 1])) / sizes, "continuity", state_names, float(self.mesh[e + 1]))
+                add(
+                    (end - self._at(self.starts[e + 1])) / sizes,
+                    "continuity",
+                    state_names,
+                    float(self.mesh[e + 1]),
+                )
         boundary = problem.boundary
         expressions = [problem.objective, *(limit.expression for limit in boundary)]
         objective, *conditions = self._with_points(expressions, symbols, p, t0, tf)
@@ -204,7 +216,9 @@ class _Writer:
             lower[column], upper[column] = number.min, number.max
         return lower / self.scale, upper / self.scale
 
-    def _with_points(self, expressions: list[ca.SX], symbols: ca.SX, p: ca.SX, t0: ca.SX, tf: ca.SX) -> list[ca.SX]:
+    def _with_points(
+        self, expressions: list[ca.SX], symbols: ca.SX, p: ca.SX, t0: ca.SX, tf: ca.SX
+    ) -> list[ca.SX]:
         """Expressions of points and free numbers in the unknowns."""
         old, new = [symbols], [p]
         for point in self.problem.points:
@@ -243,7 +257,9 @@ class _Writer:
                 "start_time + fraction * (final_time - start_time)"
             )
         if not -1e-12 <= found <= 1 + 1e-12:
-            raise ModelError(f"at({point.time}, ...): lies outside of the horizon; choose a time inside of it")
+            raise ModelError(
+                f"at({point.time}, ...): lies outside of the horizon; choose a time inside of it"
+            )
         return min(max(found, 0.0), 1.0)
 
 

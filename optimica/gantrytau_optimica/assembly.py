@@ -1,0 +1,172 @@
+"""Many copies of a small function, summed into one nonlinear program with exact sparse derivatives.
+
+A block evaluates `values(local, parameters, constants)` for N columns of local variables. It is tied to the program by
+two constant sparse matrices:
+
+    local = gather w              w: variables of the program, (n,); local: (m N,)
+    g     = linear w + sum over the blocks of scatter values
+
+Hence the nonzeros of Jacobian and Hessian are linear in the nonzeros of the small functions' derivatives, and the
+matrices of these relations are computed once. Nothing is differentiated at the size of the program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """N copies of a small function, and where they stand in the program."""
+
+    local: ca.SX  # (m,)
+    parameters: ca.SX
+    constants: ca.SX  # (c,), differ from copy to copy
+    values: ca.SX  # (k,)
+    constant_values: Array  # (c, N)
+    gather: sparse.csr_matrix  # (m N, n)
+    scatter: sparse.csr_matrix  # (rows, k N)
+
+    @property
+    def copies(self) -> int:
+        """N."""
+        return self.constant_values.shape[1]
+
+    def call(self, name: str, result: ca.SX, w: ca.MX, p: ca.MX, weights: ca.SX | None = None,
+             weight_values: ca.MX | None = None) -> ca.MX:
+        """All copies of an expression of the local variables, stacked into one column."""
+        symbols = [self.local, self.parameters, self.constants]
+        local = ca.reshape(ca.mtimes(_dm(self.gather), w), self.local.numel(), self.copies)
+        arguments = [local, ca.repmat(p, 1, self.copies), ca.MX(ca.DM(self.constant_values))]
+        if weights is not None and weight_values is not None:
+            symbols.append(weights)
+            arguments.append(ca.reshape(weight_values, weights.numel(), self.copies))
+        function = ca.Function(name, symbols, [result])
+        return ca.vec(function.map(self.copies)(*arguments))
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A nonlinear program with its derivative functions, in the form that CasADi's nlpsol takes."""
+
+    nlp: ca.Function  # (x, p) -> (f, g)
+    grad_f: ca.Function  # (x, p) -> (f, gradient)
+    jac_g: ca.Function  # (x, p) -> (g, Jacobian)
+    hess_lag: ca.Function  # (x, p, lam_f, lam_g) -> upper triangle of the Hessian
+    variables: int
+    rows: int
+
+
+def assemble(
+    objective: Sequence[Block], constraints: Sequence[Block], linear: sparse.csr_matrix, parameters: int
+) -> Program:
+    """The program: minimise the objective blocks' sum; the rows are linear w + the constraint blocks' sum."""
+    rows, n = linear.shape
+    w, p = ca.MX.sym("x", n), ca.MX.sym("p", parameters)
+    f = sum((_values(block, w, p) for block in objective), ca.MX(0))
+    g = sum((_values(block, w, p) for block in constraints), ca.mtimes(_dm(linear), w))
+    gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
+    jacobian = _jacobian(constraints, linear, w, p)
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
+    hessian = _hessian([(block, lam_f) for block in objective] + [(block, lam_g) for block in constraints], w, p)
+    # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
+    return Program(
+        nlp=ca.Function("nlp", [w, p], [f, g], ["x", "p"], ["f", "g"]),
+        grad_f=ca.Function("nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)],
+                           ["x", "p"], ["f", "grad_f_x"]),
+        jac_g=ca.Function("nlp_jac_g", [w, p], [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
+        hess_lag=ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [hessian],
+                             ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]),
+        variables=n,
+        rows=rows,
+    )
+
+
+def _values(block: Block, w: ca.MX, p: ca.MX) -> ca.MX:
+    return ca.mtimes(_dm(block.scatter), block.call("values", block.values, w, p))
+
+
+def _jacobian(blocks: Sequence[Block], linear: sparse.csr_matrix, w: ca.MX, p: ca.MX) -> ca.MX:
+    """Jacobian of the rows: nonzeros of the small Jacobians times their scatter and gather factors."""
+    nonzeros, entries = [], []
+    for block in blocks:
+        small = ca.jacobian(block.values, block.local)
+        if small.nnz() == 0:
+            continue
+        nonzeros.append(block.call("jacobian", small.nz[:], w, p))
+        row, column = (np.array(part) for part in small.sparsity().get_triplet())
+        copy = np.arange(block.copies)[:, None]
+        source, rows, up = _expand(block.scatter.tocsc(), (copy * block.values.numel() + row).ravel())
+        inner, columns, down = _expand(block.gather, (copy * block.local.numel() + column).ravel()[source])
+        entries.append((rows[inner], columns, source[inner], up[inner] * down))
+    fixed = linear.tocoo()
+    return _sum_into(linear.shape, entries, nonzeros, (fixed.row, fixed.col, fixed.data))
+
+
+def _hessian(blocks: Sequence[tuple[Block, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
+    """Upper triangle of the Hessian of the sum of multiplier * row."""
+    nonzeros, entries = [], []
+    for block, multipliers in blocks:
+        weights = ca.SX.sym("weights", block.values.numel())
+        small = ca.triu(ca.hessian(ca.dot(weights, block.values), block.local)[0])
+        if small.nnz() == 0:
+            continue
+        values = ca.mtimes(_dm(block.scatter.T.tocsr()), multipliers)
+        nonzeros.append(block.call("hessian", small.nz[:], w, p, weights, values))
+        row, column = (np.array(part) for part in small.sparsity().get_triplet())
+        # the other triangle of a small Hessian may reach the upper one of the large
+        mirrored = np.flatnonzero(row != column)
+        number = np.concatenate([np.arange(len(row)), mirrored])
+        row, column = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
+        copy = np.arange(block.copies)[:, None]
+        source, rows, up = _expand(block.gather, (copy * block.local.numel() + row).ravel())
+        inner, columns, down = _expand(block.gather, (copy * block.local.numel() + column).ravel()[source])
+        rows, factor = rows[inner], up[inner] * down
+        place = (copy * small.nnz() + number).ravel()[source][inner]
+        keep = rows <= columns
+        entries.append((rows[keep], columns[keep], place[keep], factor[keep]))
+    return _sum_into((w.numel(), w.numel()), entries, nonzeros, None)
+
+
+def _expand(matrix: sparse.csr_matrix | sparse.csc_matrix, lines: Array) -> tuple[Array, Array, Array]:
+    """The nonzeros of the named lines (rows of a csr, columns of a csc): position in `lines`, index, value."""
+    first, count = matrix.indptr[lines], np.diff(matrix.indptr)[lines]
+    source = np.repeat(np.arange(len(lines)), count)
+    within = np.arange(len(source)) - np.repeat(np.cumsum(count) - count, count)
+    place = first[source] + within
+    return source, matrix.indices[place], matrix.data[place]
+
+
+def _sum_into(shape, entries, nonzeros: list[ca.MX], fixed) -> ca.MX:
+    """Sparse matrix of `shape` from entries (row, column, number of the nonzero in its block, factor)."""
+    offsets = np.cumsum([0] + [part.numel() for part in nonzeros])
+    parts = [(r, c, place + offset, factor) for (r, c, place, factor), offset in zip(entries, offsets)]  # noqa: B905
+    fixed_row, fixed_column, fixed_value = fixed if fixed is not None else (np.zeros(0),) * 3
+    row = np.concatenate([part[0] for part in parts] + [fixed_row]).astype(np.int64)
+    column = np.concatenate([part[1] for part in parts] + [fixed_column]).astype(np.int64)
+    keys, slot = np.unique(column * shape[0] + row, return_inverse=True)
+    pattern = ca.Sparsity.triplet(shape[0], shape[1], (keys % shape[0]).tolist(), (keys // shape[0]).tolist())
+    moving = len(row) - len(fixed_row)
+    values = ca.MX(ca.DM(np.bincount(slot[moving:], weights=fixed_value, minlength=len(keys))))
+    if nonzeros:
+        place, factor = (np.concatenate([part[i] for part in parts]) for i in (2, 3))
+        total = sparse.csr_matrix((factor, (slot[:moving], place)), shape=(len(keys), int(offsets[-1])))
+        values = values + ca.mtimes(_dm(total), ca.vertcat(*nonzeros))
+    return ca.MX(pattern, values)
+
+
+def _dm(matrix: sparse.csr_matrix) -> ca.DM:
+    """A constant sparse matrix for CasADi; zeros stay structural."""
+    columns = matrix.tocsc()
+    columns.sum_duplicates()
+    columns.sort_indices()
+    pattern = ca.Sparsity(matrix.shape[0], matrix.shape[1], columns.indptr.tolist(), columns.indices.tolist())
+    return ca.DM(pattern, columns.data)
