@@ -54,17 +54,17 @@ def table(summaries: list[dict[str, Any]]) -> "Table":
 
     found = Table(title="Minimum-time motion of the robot L1, beside Table 3.1 of the thesis", box=SIMPLE)
     found.add_column("motion", no_wrap=True)
-    for heading in ("T", "energy", "T (thesis)", "energy (thesis)", "iterations", "computed in"):
+    for heading in ("T [s]", "energy", "thesis T", "energy", "iterations", "took [s]"):
         found.add_column(heading, justify="right")
     for row in summaries:
         found.add_row(
             row["row"],
-            f"{row['time']:.5f} s",
+            f"{row['time']:.5f}",
             f"{row['energy']:.2f}",
-            f"{row['thesis_time']:.4f} s",
+            f"{row['thesis_time']:.4f}",
             f"{row['thesis_energy']:.2f}",
             str(row["iterations"]),
-            f"{row['seconds']:.1f} s",
+            f"{row['seconds']:.1f}",
         )
     return found
 

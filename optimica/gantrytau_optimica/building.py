@@ -11,7 +11,7 @@ from gantrytau import Dae, ModelError
 from gantrytau.flat_model import FlatVariable
 from gantrytau.symbols import derivative_name, split_derivative, time
 from gantrytau.system import System
-from gantrytau_optimica.control_problem import ControlProblem, FreeNumber, Limit, PointValue, Signal
+from gantrytau_optimica.records import ControlProblem, FreeNumber, Limit, PointValue, Signal
 from gantrytau_optimica.guesses import first_guesses, typical_size
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint, ReadProblem
@@ -247,7 +247,7 @@ def _check_symbols(draft: ControlProblem, name: str) -> None:
 
 def _with_guesses(draft: ControlProblem, guesses: Mapping[str, Any]) -> ControlProblem:
     bounds = {s.name: (s.min, s.max) for s in draft.signals}
-    from gantrytau_optimica.transcription import _bound
+    from gantrytau_optimica.program import _bound
 
     for limit in draft.path_limits:
         found = _bound(limit, draft)

@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau import Dae, ModelError, Result
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.system import System
-from gantrytau_optimica.control_problem import ControlProblem
+from gantrytau_optimica.records import ControlProblem
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint, ReadProblem
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
 from gantrytau_optimica.building import Built, build
-from gantrytau_optimica.collocation import collocation
+from gantrytau_optimica.scheme import collocation
 from gantrytau_optimica.guesses import guess_of
 from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.reading import ReadProblem, read_problem
-from gantrytau_optimica.solver import Progress, Solver
-from gantrytau_optimica.transcription import Program, transcribe
+from gantrytau_optimica.ipopt import Progress, Solver
+from gantrytau_optimica.program import Program, transcribe
 
 
 def optimize(

@@ -11,10 +11,10 @@ import numpy as np
 from gantrytau import Dae, Result
 from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
-from gantrytau_optimica.collocation import interpolation
-from gantrytau_optimica.failure import report
-from gantrytau_optimica.solver import Solution
-from gantrytau_optimica.transcription import Program
+from gantrytau_optimica.scheme import interpolation
+from gantrytau_optimica.reporting import report
+from gantrytau_optimica.ipopt import Solution
+from gantrytau_optimica.program import Program
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.collocation import Collocation, interpolation
-from gantrytau_optimica.control_problem import ControlProblem, PointValue
+from gantrytau_optimica.scheme import Collocation, interpolation
+from gantrytau_optimica.records import ControlProblem, PointValue
 
 
 @dataclass(frozen=True, eq=False)

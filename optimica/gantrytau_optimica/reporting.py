@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gantrytau_optimica.solver import Solution
-from gantrytau_optimica.transcription import Program
+from gantrytau_optimica.ipopt import Solution
+from gantrytau_optimica.program import Program
 
 MEANING = {
     "dynamics": "the motion of {}",

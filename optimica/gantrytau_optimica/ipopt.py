@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.transcription import Program
+from gantrytau_optimica.program import Program
 
 WORDS = {
     "Solve_Succeeded": "solved",
