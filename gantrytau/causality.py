@@ -7,7 +7,8 @@ import casadi as ca
 
 from gantrytau.blocks import block_pattern
 from gantrytau.errors import ModelError, StructureError
-from gantrytau.solution import Block, solve_block
+from gantrytau.guide import Guide
+from gantrytau.solution import Block, solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.translation import all_symbols, translate_flat
 
@@ -84,7 +85,8 @@ def _blocks(
     if missing or pattern.undetermined:
         return None
     symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
-    return [solve_block(e, u, dae.indexed.residuals, symbols, dae.start) for e, u in pattern.blocks]
+    guide = Guide(dae.start, dae.table.values, dae.choice.states)
+    return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)
 
 
 def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
@@ -129,14 +131,13 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
     for block in blocks:
         if block.solution is None:
             implicit.append(block)
-        else:
-            definitions += zip(block.tears, block.solution, strict=True)
-        definitions += block.inner
+        definitions += block.definitions
     expressions = [*(r for b in implicit for r in b.residuals), *targets]
     symbols, values = [v for v, _ in definitions], [e for _, e in definitions]
     _, expressions = ca.substitute_inplace(symbols, values, expressions, False)
     arguments = [ca.vertcat(*column) for column in columns]
-    names_in, names_out = _legal(given, "i"), _legal(find, "o")
+    names_in = _legal(given, "i")
+    names_out = _legal(find, "o", names_in)
     _refuse_time(expressions, dae)
     if not implicit:
         return ca.Function("f", arguments, expressions, names_in, names_out, {"cse": True})
@@ -167,17 +168,11 @@ def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in
 
 
 def _refuse_time(expressions, dae) -> None:
-    if any(
-        leaf.name() == dae.flat.time.name()
-        for leaf in ca.symvar(ca.vertcat(*expressions))
-        if not leaf.is_constant()
-    ):
-        time_is_argument = any(leaf is dae.flat.time for leaf in ca.symvar(ca.vertcat(*expressions)))
-        if time_is_argument:
-            raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")
+    if any(ca.is_equal(leaf, dae.flat.time) for leaf in ca.symvar(ca.vertcat(*expressions))):
+        raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")
 
 
-def _legal(names: Sequence[str], prefix: str) -> list[str]:
+def _legal(names: Sequence[str], prefix: str, taken: Sequence[str] = ()) -> list[str]:
     """Names as CasADi accepts them: letters, digits and single underscores, all different."""
     found: list[str] = []
     for name in names:
@@ -186,7 +181,7 @@ def _legal(names: Sequence[str], prefix: str) -> list[str]:
             text = text.replace("__", "_")
         if not text or not text[0].isalpha():
             text = f"{prefix}_{text}".rstrip("_")
-        while text in found:
+        while text in found or text in taken:
             text += "x"
         found.append(text)
     return found

@@ -56,7 +56,8 @@ def _solve(level: Level, moving: list[str], symbols, values: dict[str, float], s
     others = [leaf for leaf in ca.symvar(residual) if leaf.name() not in set(moving)]
     given = ca.DM([values[leaf.name()] for leaf in others])
     here = ca.substitute(residual, ca.vertcat(*others), given) if others else residual
-    evaluate = ca.Function("level", [x], [ca.densify(here), ca.densify(ca.jacobian(here, x))])
+    slopes = ca.jacobian(here, x)
+    evaluate = ca.Function("level", [x], [ca.densify(here), ca.densify(slopes)])
     weights = np.array([STIFFNESS if n in started else 1.0 for n in moving])
     point = np.array([values[n] for n in moving])
 
@@ -64,6 +65,7 @@ def _solve(level: Level, moving: list[str], symbols, values: dict[str, float], s
         f, jacobian = evaluate(point)
         return np.array(f).ravel(), np.array(jacobian).reshape(len(level.residuals), len(moving))
 
+    point = _propagated(at, point, slopes.sparsity(), {k for k, n in enumerate(moving) if n not in started})
     f, jacobian = at(point)
     for _ in range(ITERATIONS):
         if not np.all(np.isfinite(f)):
@@ -82,6 +84,30 @@ def _solve(level: Level, moving: list[str], symbols, values: dict[str, float], s
     if np.any(bad):
         raise InitializationError(_failure(level, f, bad, title))
     values.update(zip(moving, point.tolist(), strict=True))
+
+
+def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: set[int]) -> np.ndarray:
+    """Values without a start computed from those with one, as far as single equations give them outright."""
+    rows: dict[int, set[int]] = {}
+    for i, j in zip(*pattern.get_triplet(), strict=True):
+        if j in missing:
+            rows.setdefault(i, set()).add(j)
+    while True:
+        single = {next(iter(left)): i for i, left in rows.items() if len(left) == 1}
+        if not single:
+            return point
+        f, jacobian = at(point)
+        new = point.copy()
+        for j, i in single.items():
+            slope = jacobian[i, j]
+            if np.isfinite(f[i]) and abs(slope) > 1e-3 * np.abs(jacobian[i]).max() > 0:
+                new[j] -= f[i] / slope
+        after, _ = at(new)
+        for j, i in single.items():
+            if not abs(after[i]) <= 1e-9 * max(1.0, abs(f[i])):  # not linear in it
+                new[j] = point[j]
+        point = new
+        rows = {i: left - single.keys() for i, left in rows.items()}
 
 
 def _line_search(at, point, step, f, rows, jacobian):

@@ -10,9 +10,10 @@ import numpy as np
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
+from gantrytau.guide import Guide
 from gantrytau.initialization import Guess, consistent_start
 from gantrytau.signals import Samples, Signal
-from gantrytau.solution import solve_block
+from gantrytau.solution import solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative, time
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
@@ -148,7 +149,8 @@ def _level_columns(names: Sequence[str]) -> list[str]:
 
 def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
     """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
-    without value, or a sampled one that has to be differentiated."""
+    without value, or a sampled one that has to be differentiated.
+    """
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
     w, t0 = ca.SX.sym("w", 2 * len(sampled)), ca.SX.sym("t0")
     indexed, chains = dae.indexed, dae.reduced.chains
@@ -160,15 +162,16 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
     )
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in indexed.orders.items()}
     last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
-    blocks = [solve_block(e, u, last, highest, dae.start) for e, u in block_pattern(last, highest).blocks]
+    guide = Guide(dae.start, dae.table.values, dae.choice.states)
+    for block in dae.blocks:
+        block.enter(guide)
+    blocks = solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
     known = _known_symbols(dae, signals, sampled, w, t0)
     numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions = [*numbers, *((chains.named(n), e) for n, e in known.items())]
     implicit = [b for b in blocks if b.solution is None]
     for block in blocks:
-        if block.solution is not None:
-            definitions += zip(block.tears, block.solution, strict=True)
-        definitions += block.inner
+        definitions += block.definitions
     ode = (
         ca.vertcat(*(chains.sx(base, k + 1) for base, k in map(split_derivative, states)))
         if states

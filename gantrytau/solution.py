@@ -1,6 +1,6 @@
 """Solves one block of equations symbolically: in closed form where it has one, torn where it has not.
 
-Numbers guide the symbolic choices: pivots are accepted by their value at a sample point.
+Numbers guide the symbolic choices: pivots are accepted by their values at sample points.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.guide import Guide, reliable
 from gantrytau.index_reduction import Key
+from gantrytau.symbols import split_derivative
 from gantrytau.tearing import tear
 
 LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by unrolled elimination
@@ -41,6 +43,34 @@ class Block:
     inner: tuple[tuple[ca.SX, ca.SX], ...]
     solution: tuple[ca.SX, ...] | None
     root: Root | None = None
+    pairs: tuple[tuple[Key, str], ...] = ()  # equations solved for one unknown each
+
+    @property
+    def definitions(self) -> list[tuple[ca.SX, ca.SX]]:
+        """What is known of the unknowns in closed form, as (symbol, expression) in order of solution."""
+        tears = () if self.solution is None else zip(self.tears, self.solution, strict=True)
+        return [*tears, *self.inner]
+
+    def enter(self, guide: Guide) -> None:
+        """Let later blocks know this one."""
+        guide.define(self.definitions)
+        partners = {equation: split_derivative(name)[0] for (equation, _), name in self.pairs}
+        guide.partners.update({equation: partners.get(equation, "") for equation, _ in self.equations})
+
+
+def solve_blocks(
+    pattern: Sequence[tuple[tuple[Key, ...], tuple[str, ...]]],
+    residuals: Mapping[Key, ca.SX],
+    symbols: Mapping[str, ca.SX],
+    guide: Guide,
+) -> list[Block]:
+    """The solutions of blocks, given as (equations, unknowns) in the order of their solution."""
+    found: list[Block] = []
+    for equations, unknowns in pattern:
+        block = solve_block(equations, unknowns, residuals, symbols, guide)
+        block.enter(guide)
+        found.append(block)
+    return found
 
 
 def solve_block(
@@ -48,17 +78,21 @@ def solve_block(
     unknowns: tuple[str, ...],
     residuals: Mapping[Key, ca.SX],
     symbols: Mapping[str, ca.SX],
-    sample: Mapping[str, float],
+    guide: Guide,
 ) -> Block:
-    """The solution of one block; `sample` has a number for every symbol in it."""
+    """The solution of one block; `guide` have a number for every symbol in it."""
     x = ca.vertcat(*(symbols[n] for n in unknowns))
     f = ca.vertcat(*(residuals[k] for k in equations))
     jacobian = ca.jacobian(f, x)
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     if len(unknowns) == 1:
-        return _finish(equations, unknowns, (x,), (f,), (), sample)
-    numbers = sample_values(jacobian, sample)
-    torn = tear(jacobian, numbers, x, relaxed=linear)
+        return _finish(equations, unknowns, (x,), (f,), (), guide, ((equations[0], unknowns[0]),))
+    numbers = guide.around(jacobian)
+    partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
+    places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
+    partner = {i: places.get(name, -1) for i, name in partners.items()}
+    first = {j for j, name in enumerate(unknowns) if name in guide.rates}
+    torn = tear(jacobian, numbers, x, relaxed=linear, partner=partner, first=first)
     inner: list[tuple[ca.SX, ca.SX]] = []
     rows, columns = ca.vertsplit(f), ca.vertsplit(x)
     for i, j in torn.assignments:
@@ -69,7 +103,8 @@ def solve_block(
     left = [rows[i] for i in torn.residuals]
     if inner and left:
         left = substitute_inner(inner, left)
-    return _finish(equations, unknowns, tears, tuple(left), tuple(inner), sample)
+    pairs = tuple((equations[i], unknowns[j]) for i, j in torn.assignments)
+    return _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, pairs)
 
 
 def substitute_inner(inner: Sequence[tuple[ca.SX, ca.SX]], expressions: Sequence[ca.SX]) -> list[ca.SX]:
@@ -80,11 +115,11 @@ def substitute_inner(inner: Sequence[tuple[ca.SX, ca.SX]], expressions: Sequence
     return list(found)
 
 
-def _finish(equations, unknowns, tears, residuals, inner, sample) -> Block:
+def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block:
     """Closed form for what is left after tearing, if there is one."""
 
     def block(kind: str, solution=None, root=None) -> Block:
-        return Block(kind, equations, unknowns, tears, residuals, inner, solution, root)
+        return Block(kind, equations, unknowns, tears, residuals, inner, solution, root, pairs)
 
     if not tears:
         return block("explicit", ())
@@ -95,63 +130,73 @@ def _finish(equations, unknowns, tears, residuals, inner, sample) -> Block:
             return block("explicit" if not inner else "linear", (-_at_zero(f, y) / jacobian,))
         if len(tears) > LARGEST_CLOSED_FORM:
             return block("linear")
-        return block("linear", tuple(eliminate(jacobian, -_at_zero(f, y), sample)))
+        found = eliminate(jacobian, -_at_zero(f, y), guide)
+        return block("linear", None if found is None else tuple(found))
     curvature = ca.jacobian(ca.vec(ca.densify(jacobian)), y)
-    if not ca.depends_on(curvature, y):
-        if len(tears) == 1:
-            root = quadratic_root(f, tears[0], jacobian, curvature, sample)
-            return block("quadratic", (root.middle + root.side * ca.sqrt(root.radicand),), root)
+    if len(tears) == 1 and not ca.depends_on(curvature, y):
+        root = quadratic_root(f, tears[0], jacobian, curvature, guide)
+        return block("quadratic", (root.middle + root.side * ca.sqrt(root.radicand),), root)
     return block("nonlinear")
 
 
-def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, sample: Mapping[str, float]) -> Root:
+def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, guide: Guide) -> Root:
     """The root of a quadratic on the branch where the sample lies, by completing the square."""
     middle = -_at_zero(slope, x) / curvature
     # f = f(middle) + curvature / 2 * (x - middle)^2
     value = ca.substitute(f, x, middle)
-    side = float(sample_values(slope / curvature, sample)[0, 0])
+    side = float(guide.at_start(slope / curvature)[0, 0])
     return Root(middle, 1.0 if side >= 0 else -1.0, -2 * value / curvature)
 
 
-def eliminate(matrix: ca.SX, right: ca.SX, sample: Mapping[str, float]) -> list[ca.SX]:
-    """Solution of a small linear system by elimination, pivots chosen by their numbers at the sample."""
+def eliminate(matrix: ca.SX, right: ca.SX, guide: Guide) -> list[ca.SX] | None:
+    """Solution of a small linear system by elimination, or None if it is singular at the start.
+
+    Pivots are chosen by their numbers at the sample points.
+    """
     n = matrix.shape[0]
     a = [[matrix[i, j] for j in range(n)] + [right[i]] for i in range(n)]
-    numbers = sample_values(ca.horzcat(matrix, right), sample)
-    order: list[int] = []
-    rows = list(range(n))
-    columns = list(range(n))
+    numbers = guide.around(matrix)
+    pivots: list[tuple[int, int]] = []
+    rows, columns = list(range(n)), list(range(n))
     for _ in range(n):
-        scaled = {
-            (i, j): abs(numbers[i, j]) / max(np.abs(numbers[i, columns]).max(), 1e-300)
-            for i in rows
-            for j in columns
-        }
-        # the sparsest of the rows and columns with a good pivot keeps the formulas short
-        p, q = min(
-            (key for key, size in scaled.items() if size >= 0.1),
-            key=lambda key: (_fill(a, rows, columns, *key), -scaled[key]),
-        )
+        pivot = _pivot(a, numbers, rows, columns)
+        if pivot is None:
+            return None
+        p, q = pivot
         rows.remove(p)
         columns.remove(q)
-        order.append(p * n + q)
+        pivots.append((p, q))
         for i in rows:
             if a[i][q].is_zero():
                 continue
             factor = a[i][q] / a[p][q]
-            number = numbers[i, q] / numbers[p, q]
-            numbers[i] -= number * numbers[p]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                numbers[:, i] -= (numbers[:, i, q] / numbers[:, p, q])[:, None] * numbers[:, p]
             for j in (*columns, n):
                 a[i][j] = a[i][j] - factor * a[p][j]
     x: list[ca.SX] = [ca.SX(0)] * n
-    for code in reversed(order):
-        p, q = divmod(code, n)
-        done = order[order.index(code) + 1 :]
+    for place in reversed(range(n)):
+        p, q = pivots[place]
         total = a[p][n]
-        for other in done:
-            total = total - a[p][other % n] * x[other % n]
+        for _, other in pivots[place + 1 :]:
+            total = total - a[p][other] * x[other]
         x[q] = total / a[p][q]
     return x
+
+
+def _pivot(a, numbers: np.ndarray, rows: list[int], columns: list[int]) -> tuple[int, int] | None:
+    """The most harmless row and column to divide by; at the start alone if none is good everywhere."""
+    for seen in (numbers, numbers[:1]):
+        inside = seen[:, rows][:, :, columns]
+        sizes = reliable(inside, np.abs(inside).max(axis=2, keepdims=True))
+        good = [(k, m) for k, m in np.ndindex(sizes.shape) if sizes[k, m] >= 0.1]
+        if good:
+            # the sparsest of the rows and columns with a good pivot keeps the formulas short
+            best = min(
+                good, key=lambda at: (_fill(a, rows, columns, rows[at[0]], columns[at[1]]), -sizes[at])
+            )
+            return rows[best[0]], columns[best[1]]
+    return None
 
 
 def _fill(a, rows, columns, p, q) -> int:
@@ -162,10 +207,3 @@ def _fill(a, rows, columns, p, q) -> int:
 
 def _at_zero(expression: ca.SX, symbols: ca.SX) -> ca.SX:
     return ca.substitute(expression, symbols, ca.SX.zeros(*symbols.shape))
-
-
-def sample_values(expression: ca.SX, sample: Mapping[str, float]) -> np.ndarray:
-    """The numbers of an expression at the sample point, as a dense array."""
-    leaves = ca.symvar(expression)
-    function = ca.Function("sample", [ca.vertcat(*leaves)], [ca.densify(expression)])
-    return np.array(function(ca.DM([sample[leaf.name()] for leaf in leaves]))).reshape(expression.shape)

@@ -14,8 +14,8 @@ import numpy as np
 from gantrytau.aliases import Chains
 from gantrytau.declarations import StateSelect
 from gantrytau.errors import StructureError
+from gantrytau.guide import sample_values
 from gantrytau.index_reduction import Indexed
-from gantrytau.solution import sample_values
 from gantrytau.symbols import derivative_name
 
 GOOD_PIVOT = 0.05  # of the column before elimination: smaller ones wait for a better preferred variable
@@ -63,8 +63,8 @@ def choose_states(
     missing = [n for n in wanted if n not in states]
     if missing:
         raise StructureError(
-            f"{title}: {missing[0]} cannot be a state together with the others asked for; the states of this model "
-            f"can be {', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer"
+            f"{title}: {missing[0]} cannot be a state together with the others asked for; the states of this "
+            f"model can be {', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer"
         )
     return StateChoice(states, tuple(sorted(dummies)), condition)
 

@@ -3,12 +3,15 @@
 Elmqvist and Otter, ESM 1994. The unknown to tear is the one after which most others follow at once.
 """
 
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-RELAXED_PIVOT = 0.1  # smallest pivot relative to its row that a linear block accepts
+from gantrytau.guide import reliable
+
+RELAXED_PIVOT = 0.1  # smallest pivot relative to its row, at all sample points, that is divided by
 
 
 @dataclass(frozen=True)
@@ -20,28 +23,43 @@ class Torn:
     residuals: tuple[int, ...]
 
 
-def tear(jacobian: ca.SX, numbers: np.ndarray, x: ca.SX, *, relaxed: bool) -> Torn:
-    """Tear a square block with the given symbolic Jacobian and its numbers at a sample point.
+def tear(
+    jacobian: ca.SX,
+    numbers: np.ndarray,
+    x: ca.SX,
+    *,
+    relaxed: bool,
+    partner: Mapping[int, int],
+    first: Set[int],
+) -> Torn:
+    """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
 
-    relaxed: accept pivots that are not constant but large at the sample point (linear blocks only).
+    relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
+    partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
+    first: columns that are torn before others.
     """
+    largest = np.abs(numbers).max(axis=2, keepdims=True)
+    sizes = reliable(numbers, largest)
     rows, columns = jacobian.sparsity().get_triplet()
     incidence: dict[int, set[int]] = {i: set() for i in range(jacobian.shape[0])}
     solvable: set[tuple[int, int]] = set()
     for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
         incidence[i].add(j)
-        if entry.is_constant() and float(entry) != 0.0:
-            large = abs(numbers[i, j]) >= 1e-6 * np.abs(numbers[i]).max()
-        elif relaxed or not ca.depends_on(entry, x):
-            large = abs(numbers[i, j]) >= RELAXED_PIVOT * np.abs(numbers[i]).max() > 0
+        if i in partner:
+            large = partner[i] == j and sizes[i, j] > 0
+        elif entry.is_constant():
+            large = sizes[i, j] >= 1e-6
         else:
-            large = False
+            large = (relaxed or not ca.depends_on(entry, x)) and sizes[i, j] >= RELAXED_PIVOT
         if large:
             solvable.add((i, j))
-    return _search(incidence, solvable)
+    return _search(incidence, solvable, first, set(partner.values()))
 
 
-def _search(incidence: dict[int, set[int]], solvable: set[tuple[int, int]]) -> Torn:
+def _search(
+    incidence: dict[int, set[int]], solvable: set[tuple[int, int]], first: Set[int], last: Set[int]
+) -> Torn:
+    """Tear until every equation is solved or left over; columns in these are torn first or last."""
     holders: dict[int, list[int]] = {}
     for i, row in incidence.items():
         for j in row:
@@ -49,7 +67,8 @@ def _search(incidence: dict[int, set[int]], solvable: set[tuple[int, int]]) -> T
     open_rows = {i: set(row) for i, row in incidence.items()}
     assignments, tears = _follow(open_rows, holders, solvable, []), []
     while any(open_rows.values()):
-        candidates = sorted({j for row in open_rows.values() for j in row})
+        candidates = set().union(*open_rows.values())
+        candidates = sorted(candidates & first or candidates - last or candidates)
         best = max(candidates, key=lambda j: (_gain(open_rows, holders, solvable, j), len(holders[j])))
         tears.append(best)
         for i in holders[best]:

@@ -12,11 +12,12 @@ from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
+from gantrytau.guide import Guide
 from gantrytau.index_reduction import Indexed, reduce_index
 from gantrytau.initialization import consistent_start, starting_guess
 from gantrytau.model import Model
 from gantrytau.parameters import parameter_table
-from gantrytau.solution import solve_block
+from gantrytau.solution import solve_blocks
 from gantrytau.statements import Equation
 from gantrytau.states import choose_states
 from gantrytau.symbols import derivative_name, split_derivative
@@ -83,9 +84,11 @@ def translate_flat(
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.residuals, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
-    blocks = tuple(solve_block(e, u, indexed.residuals, by_name, sample) for e, u in pattern.blocks)
+    blocks = solve_blocks(
+        pattern.blocks, indexed.residuals, by_name, Guide(sample, table.values, choice.states)
+    )
     settings |= dict(started=guess.started, fixed=guess.fixed)
-    return Dae(flat, table, reduced, indexed, choice, blocks, tuple(known), sample, settings)
+    return Dae(flat, table, reduced, indexed, choice, tuple(blocks), tuple(known), sample, settings)
 
 
 def retranslate(dae: Dae, flat: FlatModel) -> Dae:
