@@ -79,7 +79,7 @@ def draw_paths(optima: Mapping[str, Any], file: Path) -> "Figure":
     """The paths of the tool, from above and from the side (thesis Figure 3.9)."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 4.2), layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 4.8), layout="constrained")
     for row in ROWS:
         r = optima[row.key]["robot.tool.r"]
         style = {"linestyle": "--", "color": "black"} if row.line else {}
@@ -96,7 +96,7 @@ def draw_paths(optima: Mapping[str, Any], file: Path) -> "Figure":
         axis.set_aspect("equal")
         axis.margins(0.08)
         axis.grid(alpha=0.3)
-    axes[0].legend(fontsize="small", loc="upper left")
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", ncols=2, loc="outside lower center")
     figure.suptitle("Path of the tool")
     return _saved(figure, file)
 
@@ -118,7 +118,7 @@ def draw_torques(optima: Mapping[str, Any], limit: float, file: Path) -> "Figure
             ylim=(-1.25 * limit, 1.25 * limit),
         )
         axis.grid(alpha=0.3)
-    axes[0].legend(fontsize="small", ncols=3, loc="lower left")
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", ncols=3, loc="outside lower center")
     axes[-1].set_xlabel("time [s]")
     return _saved(figure, file)
 
