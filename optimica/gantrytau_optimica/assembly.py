@@ -148,7 +148,7 @@ def _expand(matrix: sparse.csr_matrix | sparse.csc_matrix, lines: Array) -> tupl
 def _sum_into(shape, entries, nonzeros: list[ca.MX], fixed) -> ca.MX:
     """Sparse matrix of `shape` from entries (row, column, number of the nonzero in its block, factor)."""
     offsets = np.cumsum([0] + [part.numel() for part in nonzeros])
-    parts = [(r, c, place + offset, factor) for (r, c, place, factor), offset in zip(entries, offsets)]  # noqa: B905
+    parts = [(r, c, place + offset, factor) for (r, c, place, factor), offset in zip(entries, offsets, strict=False)]
     fixed_row, fixed_column, fixed_value = fixed if fixed is not None else (np.zeros(0),) * 3
     row = np.concatenate([part[0] for part in parts] + [fixed_row]).astype(np.int64)
     column = np.concatenate([part[1] for part in parts] + [fixed_column]).astype(np.int64)

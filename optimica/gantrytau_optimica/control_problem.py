@@ -114,6 +114,7 @@ class ControlProblem:
         self._require_shapes()
         self._require_unique_names()
         self._require_finite()
+        self._require_known_symbols()
 
     @property
     def signals(self) -> tuple[Signal, ...]:
@@ -143,6 +144,28 @@ class ControlProblem:
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"control problem: two variables are called '{name}'; give each a name of its own")
+
+    def _require_known_symbols(self) -> None:
+        numbers = [item.symbol for item in (*self.free, *self.parameters)]
+        running = [*numbers, self.time, *(signal.symbol for signal in self.signals)]
+        points = [*numbers, *(point.symbol for point in self.points)]
+        checks = [("ode", self.ode, running), ("residuals", self.residuals, running),
+                  ("integrand", self.integrand, running), ("objective", self.objective, points),
+                  ("start_time", self.start_time, numbers), ("final_time", self.final_time, numbers)]
+        checks += [(f"limit '{x.name}'", e, running) for x in self.path_limits for e in (x.expression, x.lower, x.upper)]
+        checks += [(f"limit '{x.name}'", e, points) for x in self.boundary for e in (x.expression, x.lower, x.upper)]
+        checks += [(f"point {x.symbol}", x.expression, running) for x in self.points]
+        checks += [(f"time of point {x.symbol}", x.time, numbers) for x in self.points]
+        for what, expression, known in checks:
+            if not isinstance(expression, ca.SX):
+                continue
+            names = {symbol.element_hash() for part in known for symbol in ca.symvar(part)}
+            strangers = [str(symbol) for symbol in ca.symvar(expression) if symbol.element_hash() not in names]
+            if strangers:
+                raise ValueError(f"control problem: {what} contains {', '.join(strangers)}, unknown there; "
+                                 + ("a signal is used at a time, as a point" if known is points else
+                                    "expected the signals, time, free numbers and parameters"
+                                    if known is running else "expected free numbers and parameters"))
 
     def _require_finite(self) -> None:
         for item in (*self.signals, *self.free):

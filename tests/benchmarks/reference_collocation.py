@@ -113,7 +113,7 @@ def solve(task: Task, elements: int = 50, points: int = 3) -> Outcome:
         for j in range(points):
             _, _, acceleration, reach = guess((element + c[j]) / elements)
             a.append(unknowns.add(acceleration))
-            dX.append(unknowns.add(reach, 0.1, max(task.robot.lengths)))
+            dX.append(unknowns.add(reach, 0.0))  # an upper bound of L would lead to other branches
             torque.append(unknowns.add(np.zeros(3), -task.torque_limit, task.torque_limit))
         accelerations = ca.horzcat(*a)
         for j in range(points):

@@ -1,0 +1,61 @@
+"""The minimum-time motion GT-A from components, beside programs written by hand for this one robot."""
+
+import statistics
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from gantrytau.cli import _motion
+from gantrytau_optimica import optimize
+from gantrytau_optimica.reading import read_problem
+from tests.benchmarks import reference_collocation
+from tests.benchmarks.gta import Task
+from tests.benchmarks.table import Row, at_most, shown
+
+KNOWN = {  # T + w * energy at 50 elements of 3 Radau points
+    ("free path", 0.0): 0.913510,
+    ("free path", 0.001): None,
+    ("free path", 0.01): None,
+    ("straight line", 0.0): 0.974057,
+}
+TIMES = {("free path", 0.001): 0.92103, ("free path", 0.01): 0.97598}
+
+
+def rows() -> Iterator[Row]:
+    """Values of the four rows, and the time of the free row against its peers."""
+    free, line, _ = _motion()
+    for (title, weight), value in KNOWN.items():
+        problem: Any = (line if title == "straight line" else free)(weight=weight)
+        found = optimize(problem).final_time
+        expected = value or TIMES[title, weight]
+        allowed = 1.5e-4 if (title, weight) == ("free path", 0.0) else 2e-5
+        # the free row may also end on the faster branch
+        error = max(found - expected, 0.0) if allowed > 1e-4 else abs(found - expected)
+        yield at_most(f"GT-A {title}, w = {weight:g}: |T - {expected:g} s|", error, allowed, "s")
+    yield from _against_peers(free)
+
+
+def _against_peers(problem: Any) -> Iterator[Row]:
+    read = read_problem(problem)
+    times: dict[str, list[float]] = {}
+    details = ""
+    for _ in range(5):
+        begin = time.perf_counter()
+        optimum = optimize(read)
+        times.setdefault("model", []).append(time.perf_counter() - begin)
+        hand = reference_collocation.solve(Task())
+        times.setdefault("hand", []).append(hand.build + hand.solve)
+        details = f"{optimum.iterations} / {hand.iterations}"
+    medians = {name: statistics.median(found) for name, found in times.items()}
+    yield shown("GT-A free row, seconds: model / by hand", f"{medians['model']:.3f} / {medians['hand']:.3f}")
+    yield shown("GT-A free row, iterations: model / by hand", details)
+    yield at_most("GT-A free row, build and solve against by hand", medians["model"] / medians["hand"], 1.5, "x")
+    try:
+        from tests.benchmarks import rockit_reference
+    except ImportError:
+        yield shown("GT-A free row against rockit", "rockit is not installed")
+        return
+    begin = time.perf_counter()
+    rockit_reference.solve(Task())
+    peer = time.perf_counter() - begin
+    yield at_most("GT-A free row, build and solve against rockit", medians["model"] / peer, 0.25, "x")

@@ -1,0 +1,39 @@
+"""Rows of the bench table."""
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure: what, measured, target, and whether it is met (None: no target)."""
+
+    figure: str
+    measured: str
+    target: str
+    met: bool | None
+
+
+def at_most(figure: str, value: float, limit: float, unit: str = "") -> Row:
+    """A row whose figure must not exceed a limit."""
+    space = f" {unit}" if unit else ""
+    return Row(figure, f"{value:.4g}{space}", f"<= {limit:g}{space}", value <= limit)
+
+
+def shown(figure: str, value: str) -> Row:
+    """A row without a target."""
+    return Row(figure, value, "", None)
+
+
+def in_turn(programs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+    """Median wall time in s of each program, run in turn so that a drifting machine hits all alike."""
+    times: dict[str, list[float]] = {name: [] for name in programs}
+    for _ in range(rounds):
+        for name, program in programs.items():
+            begin = time.perf_counter()
+            program()
+            times[name].append(time.perf_counter() - begin)
+    return {name: statistics.median(found) for name, found in times.items()}
