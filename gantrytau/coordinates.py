@@ -164,7 +164,8 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
     last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
     guide = Guide(dae.start, dae.table.values, dae.choice.states)
     for block in dae.blocks:
-        block.enter(guide)
+        if not highest.keys() & set(block.unknowns):
+            block.enter(guide)
     blocks = solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
     known = _known_symbols(dae, signals, sampled, w, t0)
     numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
