@@ -11,6 +11,7 @@ import numpy as np
 
 from gantrytau.guide import Guide, reliable
 from gantrytau.index_reduction import Key
+from gantrytau.quadrics import intersection
 from gantrytau.symbols import split_derivative
 from gantrytau.tearing import tear
 
@@ -136,7 +137,8 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block
     if len(tears) == 1 and not ca.depends_on(curvature, y):
         root = quadratic_root(f, tears[0], jacobian, curvature, guide)
         return block("quadratic", (root.middle + root.side * ca.sqrt(root.radicand),), root)
-    return block("nonlinear")
+    found = intersection(f, y, guide)
+    return block("nonlinear") if found is None else block("spheres", tuple(found))
 
 
 def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, guide: Guide) -> Root:
