@@ -1,6 +1,6 @@
 """Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -10,7 +10,7 @@ from gantrytau.errors import ModelError, StructureError
 from gantrytau.guide import Guide
 from gantrytau.solution import Block, solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative
-from gantrytau.translation import all_symbols, translate_flat
+from gantrytau.translation import all_symbols, names, translate_flat
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
@@ -18,18 +18,20 @@ if TYPE_CHECKING:
 
 def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Function:
     """See Dae.function."""
+    given, find = names(given), names(find)
     dae = _with_parameters(dae, given)
     columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
     known = _known(dae, given, columns)
     targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
     blocks = _blocks(dae, known, targets, find)
     if blocks is None:
+        inputs = _sufficient_inputs(dae, known, targets)
         dae = _flipped(dae, given, find)
         known = _known(dae, given, columns)
         targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
         blocks = _blocks(dae, known, targets, find)
         if blocks is None:
-            raise StructureError(_undetermined(dae, known, targets, given, find))
+            raise StructureError(_undetermined(dae, known, targets, inputs, given, find))
     return _compose(dae, blocks, known, targets, given, find, columns)
 
 
@@ -62,7 +64,7 @@ def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict
                 offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
                 value = (argument - offset) / alias.factor
             if symbol in known:
-                raise StructureError(f"{scalar} is given twice under two names; leave one of them out")
+                raise StructureError(f"{scalar} is given twice, directly or by an alias; leave one out")
             known[symbol] = value
     return known
 
@@ -102,15 +104,45 @@ def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
     return translate_flat(dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start)
 
 
-def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], given, find) -> str:
+def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
+    """What to give as well: the lowest derivatives that suffice, or the inputs of the model."""
     unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
-    missing = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
+    driving = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
     text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."
-    if missing:
-        return f"{text} Give also {', '.join(missing[:6])}."
-    return (
-        f"{text} Give more names: states, inputs, or derivatives such as der({given[0] if given else 'x'})."
-    )
+    ways: list[str] = []
+    for highest in sorted({split_derivative(n)[1] for n in driving}):
+        more = [n for n in driving if split_derivative(n)[1] <= highest]
+        if _suffices(dae, known, targets, more):
+            ways.append(", ".join(_whole(dae, more)))
+            break
+    ways += [", ".join(_whole(dae, inputs))] if inputs else []
+    return f"{text} Give also {', or '.join(dict.fromkeys(ways)) or 'states, inputs or derivatives'}."
+
+
+def _sufficient_inputs(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX]) -> list[str]:
+    """The inputs that are missing if these alone are, else nothing."""
+    missing = [n for n in dae.known if n not in known]
+    return missing if missing and _suffices(dae, known, targets, missing) else []
+
+
+def _suffices(dae: "Dae", known: Collection[str], targets: list[ca.SX], more: list[str]) -> bool:
+    """Whether the targets follow from the known symbols and some more."""
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known and n not in more]
+    wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() in unknowns]
+    return not block_pattern(dae.indexed.residuals, unknowns, wanted).undetermined
+
+
+def _whole(dae: "Dae", scalars: Sequence[str]) -> list[str]:
+    """The names with complete vectors under one name."""
+    left = dict.fromkeys(scalars)
+    for vector in dae.vectors.values():
+        for order in {split_derivative(n)[1] for n in scalars}:
+            elements = [derivative_name(n, order) for n in vector.elements]
+            if len(elements) > 1 and all(n in left for n in elements):
+                left = dict.fromkeys(
+                    derivative_name(vector.name, order) if n in elements else n for n in left
+                )
+    return list(left)
 
 
 def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> ca.Function:

@@ -212,7 +212,7 @@ class Dae:
         """
         from gantrytau.causality import function
 
-        return function(self, list(given), list(find))
+        return function(self, given, find)
 
     def evaluate(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """All variables and derivatives at a consistent point that holds `values` exactly.
@@ -226,7 +226,7 @@ class Dae:
 
     def numbers(self, names: Iterable[str], values: Mapping[str, float]) -> np.ndarray:
         """Values of scalars, from numbers of all symbols of the reduced equations."""
-        expressions = ca.vertcat(*(self.expression(n) for n in names))
+        expressions = ca.SX(ca.vertcat(*(self.expression(n) for n in names)))
         leaves = ca.symvar(expressions)
         function = ca.Function("numbers", [ca.vertcat(*leaves)], [ca.densify(expressions)])
         return np.array(function(ca.DM([values[leaf.name()] for leaf in leaves]))).ravel()

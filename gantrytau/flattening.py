@@ -1,5 +1,6 @@
 """Writes an instantiated model out as one flat list of variables, parameters and scalar equations."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -7,18 +8,19 @@ import casadi as ca
 
 from gantrytau.connections import connection_equations
 from gantrytau.declarations import Parameter, evaluate
-from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.errors import GantryTauError, ModelError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
-from gantrytau.model import Model
+from gantrytau.model import Declared, Model
 from gantrytau.propagation import propagate
 from gantrytau.statements import Branch, Connection, Equation, Root, equality
 from gantrytau.symbols import scalars, time, writing
 
 HINTS = {
-    "truth value": "Python's if, and, or, max and chained comparisons cannot work on symbols; "
-    "use if_else, between, casadi.fmax",
+    "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; "
+    "use if_else, between, casadi.fmax, casadi.vertcat",
     "Dimension mismatch": "the two operands have different shapes",
+    "not iterable": "equations(self) yields its equations one by one: `yield a == b`",
 }
 
 
@@ -51,6 +53,7 @@ def write_out(instance: Instance) -> FlatModel:
         equations += _bindings(instance)
         equations += connection_equations(instance, connections)
         definitions = propagate(instance, connections, branches, roots)
+        _refuse_nan((*equations, *initial))
         flat_variables = tuple(
             _variable(placed) for placed in instance.quantities if not _is_parameter(placed)
         )
@@ -90,7 +93,7 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
     except GantryTauError as error:
         if str(error).startswith(path or "the model"):
             raise
-        raise type(error)(f"{path or 'the model'} ({model}), after equation {number}: {error}") from error
+        raise type(error)(f"{path or 'the model'} ({model}), equation {number + 1}: {error}") from error
     except (
         RuntimeError,
         TypeError,
@@ -100,10 +103,33 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
         IndexError,
         KeyError,
     ) as error:
-        lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
-        words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
-        hint = next((f"; {text}" for key, text in HINTS.items() if key in str(error)), "")
-        raise ModelError(f"{path or 'the model'} ({model}), equation {number + 1}: {words}{hint}") from error
+        raise ModelError(
+            f"{path or 'the model'} ({model}), equation {number + 1}: {_words(error)}"
+        ) from error
+
+
+def _words(error: Exception) -> str:
+    """What a Python or CasADi error says, in one line, with a remedy where one is known."""
+    if isinstance(error, AttributeError) and isinstance(error.obj, Declared):
+        names = [n for n in dir(error.obj) if not n.startswith("_")]
+        return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(error.name, names)}"
+    lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
+    if "Assertion" in lines[0] and len(lines) > 1:
+        lines = lines[1:]
+    words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
+    return words.rstrip(".") + next((f"; {text}" for key, text in HINTS.items() if key in str(error)), "")
+
+
+def _refuse_nan(equations: Iterable[Equation]) -> None:
+    """Functions of the module math turn a symbol into nan without a word."""
+    equations = tuple(equations)
+    if equations and re.search(r"\bnan\b", str(ca.vertcat(*(e.residual for e in equations)))):
+        for equation in equations:
+            if re.search(r"\bnan\b", equation.text):
+                raise ModelError(
+                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and finite numbers; "
+                    "functions of the module math do not work on symbols, use those of gantrytau or casadi"
+                )
 
 
 def _bindings(instance: Instance) -> list[Equation]:
@@ -143,9 +169,10 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
         value = evaluate(value, leaf.scope)
         found = ca.densify(ca.SX(ca.vertcat(*value) if isinstance(value, list) else value))
     except (RuntimeError, TypeError, NotImplementedError, AttributeError) as error:
+        why = "" if isinstance(error, NotImplementedError) else f": {_words(error)}"
         raise ModelError(
             f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
-            f"parameters ({error.__class__.__name__}: {str(error).splitlines()[0]})"
+            f"parameters{why}"
         ) from error
     size = len(placed.elements)
     if found.numel() == 1 and (size == 1 or attribute != "value"):
@@ -153,7 +180,7 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     elif found.numel() == size and (len(placed.shape) < 2 or found.shape == placed.shape):
         elements = found.elements()
     else:
-        shape = found.shape if found.shape[1] != 1 else (found.shape[0],)
+        shape = () if found.numel() == 1 else found.shape if found.shape[1] != 1 else (found.shape[0],)
         raise ModelError(f"{placed.name}: {attribute} has shape {shape}, expected {placed.shape}")
     bad = [e for e in elements if e.is_constant() and not _allowed(float(e), attribute)]
     if bad:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gantrytau.aliases import Reduced
 from gantrytau.errors import StructureError
+from gantrytau.flat_model import FlatModel
 from gantrytau.matching import best_matching, largest_matching
 from gantrytau.symbols import derivative_name, split_derivative
 
@@ -42,12 +43,12 @@ class Indexed:
         return [derivative_name(n, k) for n, top in self.orders.items() for k in range(top + 1)]
 
 
-def reduce_index(reduced: Reduced, hints: Mapping[str, str], title: str) -> Indexed:
+def reduce_index(reduced: Reduced, flat: FlatModel) -> Indexed:
     """Differentiate what must be differentiated; StructureError if equations and unknowns do not match."""
     signature = _signature(reduced)
     if len(reduced.residuals) != len(reduced.unknowns):
-        raise StructureError(unbalanced(reduced, signature, hints, title))
-    counts, tops = _offsets(reduced, signature, hints, title)
+        raise StructureError(unbalanced(reduced, signature, flat))
+    counts, tops = _offsets(reduced, signature, flat)
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     return Indexed(residuals, tuple(int(c) for c in counts), orders)
@@ -67,11 +68,11 @@ def _signature(reduced: Reduced) -> list[dict[int, int]]:
     return rows
 
 
-def _offsets(reduced: Reduced, signature: list[dict[int, int]], hints: Mapping[str, str], title: str):
+def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel):
     n = len(signature)
     matched = best_matching(signature)
     if matched is None:
-        raise StructureError(unbalanced(reduced, signature, hints, title))
+        raise StructureError(unbalanced(reduced, signature, flat))
     counts = np.zeros(n, dtype=int)
     while True:
         tops = np.zeros(n, dtype=int)
@@ -104,36 +105,50 @@ def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
     return residuals
 
 
-def unbalanced(
-    reduced: Reduced, signature: list[dict[int, int]], hints: Mapping[str, str], title: str
-) -> str:
+def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel) -> str:
     """Which unknowns stay undetermined and which equations are one too many, in the model's words."""
-    m, n = len(signature), len(reduced.unknowns)
-    of_row = largest_matching(signature, n)
+    of_row = largest_matching(signature, len(reduced.unknowns))
     of_column = {int(j): i for i, j in enumerate(of_row) if j >= 0}
-    text = f"{title}: {n} unknowns, {m} equations."
-    free = [j for j in range(n) if j not in of_column]
+    free = [j for j in range(len(reduced.unknowns)) if j not in of_column]
+    extra = [i for i in range(len(signature)) if of_row[i] < 0]
+    n, m = sum(len(v.elements) for v in flat.variables) - len(reduced.known), len(flat.equations)
+    text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
     if free:
-        reached = _reach_columns(free, signature, of_column)
-        names = [reduced.unknowns[j] for j in sorted(reached, key=lambda j: (j not in free, j))]
-        first = names[0]
-        why = f" ({hints[first]})" if first in hints else ""
-        others = f"; one of it and {', '.join(names[1:6])} is free" if len(names) > 1 else ""
-        text += (
-            f" Undetermined: {first}{why}{others}. Add {len(free)} equation{'s' if len(free) > 1 else ''} for it in "
-            f"{first.rpartition('.')[0] or 'the model'}, declare it an Input, or connect a component that determines it."
-        )
-    extra = [i for i in range(m) if of_row[i] < 0]
+        reached = {reduced.unknowns[j]: j in free for j in _reach_columns(free, signature, of_column)}
+        text += _undetermined(reached, len(free), reduced, flat)
     if extra:
-        reached = _reach_rows(extra, signature, of_row)
-        where = "; ".join(
-            f"{reduced.equations[i].name}: {reduced.equations[i].text[:100]}" for i in sorted(reached)[:4]
-        )
-        text += (
-            f" Overdetermined by {len(extra)}: these equations contradict or repeat each other: {where}. "
-            "Remove one of them, or name one more unknown."
-        )
+        text += _overdetermined(sorted(_reach_rows(extra, signature, of_row)), len(extra), reduced, signature)
     return text
+
+
+def _undetermined(reached: Mapping[str, bool], count: int, reduced: Reduced, flat: FlatModel) -> str:
+    """reached: names of which `count` are free, True for those that no equation was found for."""
+    inputs = {reduced.aliases[n].root: n for n in flat.inputs if n not in reduced.known}
+    names = sorted(reached, key=lambda n: (n not in inputs, not reached[n], n.count(".")))
+    first = inputs.get(names[0], names[0])
+    hint = flat.hints.get(names[0])
+    others = ", ".join(inputs.get(n, n) for n in names[1:6]) + (", ..." if len(names) > 6 else "")
+    text = f" Undetermined: {first}" + (f" ({hint})" if hint else "")
+    text += f"; {count} of it and {others} {'is' if count == 1 else 'are'} free" if others else ""
+    if names[0] in inputs:
+        return f"{text}. Name {first} among the given, or add {count} equation{'s' if count > 1 else ''}."
+    where = first.rpartition(".")[0] or "the model"
+    return (
+        f"{text}. Add {count} equation{'s' if count > 1 else ''} for it in {where}, declare it an Input, or "
+        "connect a component that determines it."
+    )
+
+
+def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: list[dict[int, int]]) -> str:
+    lines = []
+    for i in rows[:4]:
+        found = "" if signature[i] else ", whose variables all follow from other equations"
+        lines.append(f"{reduced.equations[i].name} `{reduced.equations[i].text[:80]}`{found}")
+    more = f"; and {len(rows) - 4} others" if len(rows) > 4 else ""
+    return (
+        f" Overdetermined by {count}: these equations contradict or repeat each other: {'; '.join(lines)}{more}. "
+        "Remove one of them, or let one more variable be unknown."
+    )
 
 
 def _reach_columns(

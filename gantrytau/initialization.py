@@ -71,9 +71,7 @@ def levels(indexed: Indexed, reduced: Reduced) -> list[Level]:
             Level(
                 tuple(indexed.residuals[k] for k in keys),
                 tuple(
-                    f"{reduced.equations[i].name} `{reduced.equations[i].text[:90]}`"
-                    + (f" (derivative {m})" if m else "")
-                    for i, m in keys
+                    reduced.equations[i].name + (f", differentiated {m} times" if m else "") for i, m in keys
                 ),
                 tuple(unknowns),
             )

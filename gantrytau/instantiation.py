@@ -91,7 +91,7 @@ class _Builder:
         self.paths[id(instance)] = path
         modifications = _merge(_wrap(template.modifications, scope), outer)
         for name in modifications:
-            check_member(cls, name, path or cls.__name__)
+            check_member(cls, name, f"{path} ({cls.__name__})" if path else cls.__name__)
             if is_setting(getattr(cls, name), name):
                 instance.__dict__[name] = _setting(modifications[name], f"{path}.{name}")
         if isinstance(instance, Connector):

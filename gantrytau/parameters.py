@@ -78,6 +78,13 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
     bindings = {n: v for p in flat.parameters for n, v in zip(p.elements, p.value, strict=True)}
     folded = {n for p in flat.parameters if p.fold for n in p.elements}
     needs = {n: [s.name() for s in ca.symvar(v)] for n, v in bindings.items()}
+    for name, others in needs.items():
+        foreign = [other for other in others if other not in bindings]
+        if foreign:
+            raise ModelError(
+                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a parameter is "
+                "constant, declare it Real if it is not"
+            )
     order = _sorted(needs)
     for name in reversed(order):  # what decides a folded value is folded too
         if name in folded:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.functions import Between
-from gantrytau.model import Connector
+from gantrytau.model import Connector, Declared
 from gantrytau.symbols import scalars
 
 
@@ -71,9 +71,10 @@ def connect(a: Any, b: Any) -> Connection:
 
     Raises ModelError if the two are not of the same kind.
     """
-    if isinstance(a, Connector) != isinstance(b, Connector):
+    if not all(isinstance(end, Connector) for end in (a, b)) and any(isinstance(x, Declared) for x in (a, b)):
         raise ModelError(
-            f"connect({_kind(a)}, {_kind(b)}): found a connector and something else, expected two connectors"
+            f"connect({_kind(a)}, {_kind(b)}): expected two connectors; name those of the components, such as "
+            "connect(mass.flange, spring.flange_a)"
         )
     return Connection(a, b)
 

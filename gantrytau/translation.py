@@ -54,7 +54,7 @@ def translate_flat(
     start: Mapping[str, float] | None = None,
 ) -> Dae:
     """Like `translate`, from the flattened model; `start`: numbers of symbols that replace start values."""
-    given, find, states = tuple(given), tuple(find), tuple(states or ())
+    given, find, states = (names(x) for x in (given, find, states or ()))
     settings = dict(given=given, find=find, states=states)
     flat = _with_wanted(flat, find)
     scalars = [n for name in given for n in expand(flat, name)]
@@ -67,7 +67,7 @@ def translate_flat(
         if name.startswith("der("):
             raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
     reduced = eliminate_aliases(flat, table, frozenset(known))
-    indexed = reduce_index(reduced, flat.hints, flat.name)
+    indexed = reduce_index(reduced, flat)
     symbols = all_symbols(indexed, reduced.known)
     guess = starting_guess(flat, table, reduced, symbols)
     if start:
@@ -89,6 +89,13 @@ def translate_flat(
     )
     settings |= dict(started=guess.started, fixed=guess.fixed)
     return Dae(flat, table, reduced, indexed, choice, tuple(blocks), tuple(known), sample, settings)
+
+
+def names(found: Sequence[str]) -> tuple[str, ...]:
+    """A list of names as a tuple; ModelError for a text, which Python would take for a list of letters."""
+    if isinstance(found, str):
+        raise ModelError(f"found the text '{found}', expected a list of names; write ['{found}']")
+    return tuple(found)
 
 
 def retranslate(dae: Dae, flat: FlatModel) -> Dae:
@@ -114,7 +121,7 @@ def expand(flat: FlatModel, name: str) -> tuple[str, ...]:
     found = flat.find(base)
     if found is not None:
         return tuple(derivative_name(n, order) for n in found.elements)
-    known = [n for v in (*flat.variables, *flat.parameters) for n in v.elements]
+    known = [n for v in (*flat.variables, *flat.parameters) for n in dict.fromkeys((v.name, *v.elements))]
     if base not in known:
         raise ModelError(f"{flat.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
     return (name,)
