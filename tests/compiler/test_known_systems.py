@@ -1,0 +1,466 @@
+"""Models with known answers: index, states, closed forms, and what causality asks for."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from gantrytau import (
+    Array,
+    Connector,
+    Flow,
+    Input,
+    Model,
+    Parameter,
+    Real,
+    StructureError,
+    connect,
+    cos,
+    der,
+    exp,
+    sin,
+    time,
+    translate,
+)
+from gantrytau.mechanics import rotational, translational
+from gantrytau_models.pendulum import Pendulum
+
+
+class Pin(Connector):
+    u = Real(unit="V", description="potential")
+    i = Flow(unit="A", description="current into the component")
+
+
+class TwoPins(Model):
+    u = Real(unit="V")
+    i = Real(unit="A")
+    p, n = Pin(), Pin()
+
+    def equations(self):
+        yield self.u == self.p.u - self.n.u
+        yield self.i == self.p.i
+        yield self.p.i + self.n.i == 0
+
+
+class Resistor(TwoPins):
+    R = Parameter(1.0, unit="Ohm")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.u == self.R * self.i
+
+
+class Capacitor(TwoPins):
+    C = Parameter(1.0, unit="F")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.i == self.C * der(self.u)
+
+
+class Inductor(TwoPins):
+    L = Parameter(1.0, unit="H")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.u == self.L * der(self.i)
+
+
+class Source(TwoPins):
+    voltage = Input(unit="V")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.u == self.voltage
+
+
+class Ground(Model):
+    p = Pin()
+
+    def equations(self):
+        yield self.p.u == 0
+
+
+class Parallel(Model):
+    """Two resistors inside a component whose outer pins pass the current on."""
+
+    p, n = Pin(), Pin()
+    first, second = Resistor(R=2.0), Resistor(R=3.0)
+
+    def equations(self):
+        for resistor in (self.first, self.second):
+            yield connect(self.p, resistor.p)
+            yield connect(resistor.n, self.n)
+
+
+class Circuit(Model):
+    """A source, a resistor, a pair of parallel resistors one level down, and a capacitor in a ring."""
+
+    source, resistor, pair, capacitor, ground = (
+        Source(),
+        Resistor(R=0.8),
+        Parallel(),
+        Capacitor(C=0.5),
+        Ground(),
+    )
+
+    def equations(self):
+        yield connect(self.source.p, self.resistor.p)
+        yield connect(self.resistor.n, self.pair.p)
+        yield connect(self.pair.n, self.capacitor.p)
+        yield connect(self.capacitor.n, self.source.n)
+        yield connect(self.capacitor.n, self.ground.p)
+
+
+def test_circuit_with_inside_and_outside_connectors():
+    dae = translate(Circuit())
+    assert len(dae.states) == 1
+    at = dae.evaluate({"capacitor.u": 2.0, "source.voltage": 6.0})
+    # 4 V over 0.8 Ohm + 2 || 3 Ohm = 2 Ohm
+    assert at["capacitor.i"] == pytest.approx(2.0, rel=1e-14)
+    assert at["der(capacitor.u)"] == pytest.approx(4.0, rel=1e-14)
+    assert at["pair.first.i"] == pytest.approx(1.2, rel=1e-14)
+    assert at["pair.p.i"] == pytest.approx(2.0, rel=1e-14)
+    assert at["pair.n.i"] == pytest.approx(-2.0, rel=1e-14)
+    assert at["source.p.i"] == pytest.approx(-2.0, rel=1e-14)
+    assert at["ground.p.i"] == pytest.approx(0.0, abs=1e-14)
+    rate = dae.function(["capacitor.u", "source.voltage"], ["der(capacitor.u)"])
+    assert float(rate(2.0, 6.0)) == pytest.approx(4.0, rel=1e-14)
+
+
+def test_capacitors_in_parallel_and_coils_in_series_are_one_state_each():
+    class Doubled(Model):
+        source, coil, second, a, b, ground = (
+            Source(),
+            Inductor(L=1.0),
+            Inductor(L=3.0),
+            Capacitor(C=1.0),
+            Capacitor(C=2.0),
+            Ground(),
+        )
+
+        def equations(self):
+            yield connect(self.source.p, self.coil.p)
+            yield connect(self.coil.n, self.second.p)
+            yield connect(self.second.n, self.a.p)
+            yield connect(self.a.p, self.b.p)
+            yield connect(self.a.n, self.b.n)
+            yield connect(self.a.n, self.source.n)
+            yield connect(self.a.n, self.ground.p)
+
+    dae = translate(Doubled())
+    assert len(dae.states) == 2
+    at = dae.evaluate({"a.u": 1.0, "coil.i": 6.0, "source.voltage": 9.0})
+    assert at["der(coil.i)"] == pytest.approx(2.0, rel=1e-13)
+    assert at["der(b.u)"] == pytest.approx(2.0, rel=1e-13)
+    assert at["a.i"] == pytest.approx(2.0, rel=1e-13)
+
+
+def test_unconnected_connectors_carry_no_flow():
+    at = translate(translational.Mass(m=2.0)).evaluate({"v": 3.0})
+    assert (at["flange.f"], at["der(v)"], at["der(flange.s)"]) == (0.0, 0.0, 3.0)
+
+
+def test_pendulum_has_index_three_and_two_states():
+    dae = translate(Pendulum())
+    assert dae.indexed.structural_index == 3
+    assert len(dae.states) == 2
+    at = dae.evaluate({"x": 0.6, "v_x": 1.6})  # y < 0 as at the start
+    assert at["y"] == pytest.approx(-0.8, abs=1e-15)
+    assert at["v_y"] == pytest.approx(1.2, rel=1e-13)  # x v_x + y v_y = 0
+    assert at["tension"] == pytest.approx(1.6**2 + 1.2**2 + 9.81 * 0.8, rel=1e-13)  # m v^2 / L^2 + weight
+    # a force at right angles to the speed does no work: the energy stays
+    power = at["der(kinetic_energy)"] + at["der(potential_energy)"] if "der(kinetic_energy)" in at else 0.0
+    assert power == pytest.approx(0.0, abs=1e-12)
+
+
+def test_pendulum_on_both_sides():
+    dae = translate(Pendulum(), states=["x", "v_x"])
+    assert float(dae.function(["x"], ["y"])(0.6)) == pytest.approx(-0.8, abs=1e-15)
+    upside = translate(Pendulum(y=dict(start=0.6)), states=["x", "v_x"])
+    assert float(upside.function(["x"], ["y"])(0.6)) == pytest.approx(0.8, abs=1e-15)
+
+
+def test_cooled_reactor_with_given_temperature_has_index_three():
+    # Pantelides 1988: concentration, temperature, and the cooling that holds the temperature
+    class Reactor(Model):
+        c = Real(unit="1", start=0.5)
+        T = Real(unit="1", start=1.0)
+        cooling = Real(unit="1")
+
+        def equations(self):
+            rate = self.c * exp(-1 / self.T)
+            yield der(self.c) == 1 - self.c - rate
+            yield der(self.T) == 1 - self.T + rate - self.cooling
+            yield self.c == 0.5 + 0.1 * sin(time)
+
+    dae = translate(Reactor(), units=False)
+    assert dae.indexed.structural_index == 3
+    assert dae.states == ()
+    at = dae.evaluate({"time": 0.0})
+    # c' = 0.1 = 0.5 - r, so r = 0.4 = 0.5 exp(-1/T)
+    assert at["T"] == pytest.approx(-1 / np.log(0.8), rel=1e-12)
+
+
+def test_index_two_and_index_one():
+    class Held(Model):
+        x, force = Real(unit="1"), Real(unit="1")
+
+        def equations(self):
+            yield der(self.x) == (1 + self.x**2) * self.force
+            yield self.x == sin(time)
+
+    dae = translate(Held(), units=False)
+    assert dae.indexed.structural_index == 2
+    assert float(dae.function(["time"], ["force"])(0.3)) == pytest.approx(
+        np.cos(0.3) / (1 + np.sin(0.3) ** 2), rel=1e-14
+    )
+    with pytest.raises(StructureError, match="depends on time explicitly; name 'time' among the given"):
+        dae.function([], ["force"])
+
+
+class Chain(Model):
+    """Masses between walls, joined by springs."""
+
+    count = 5
+    left, right = translational.Fixed(), translational.Fixed()
+    masses = Array(translational.Mass, 5, m=2.0)
+    springs = Array(translational.Spring, 6, c=50.0)
+
+    def equations(self):
+        ends = [self.left, *self.masses, self.right]
+        for spring, a, b in zip(self.springs, ends, ends[1:], strict=False):
+            yield connect(a.flange, spring.flange_a)
+            yield connect(spring.flange_b, b.flange)
+
+
+def test_eigenfrequencies_of_a_chain_of_oscillators():
+    dae = translate(Chain())
+    assert len(dae.states) == 10
+    s = [f"masses[{k}].s" for k in range(5)]
+    function = dae.function(s, [f"der(masses[{k}].v)" for k in range(5)])
+    x = ca.SX.sym("x", 5)
+    matrix = np.array(ca.evalf(ca.jacobian(ca.vertcat(*function(*ca.vertsplit(x))), x)))
+    expected = 2 * np.sqrt(50.0 / 2.0) * np.sin(np.arange(1, 6) * np.pi / 12)
+    np.testing.assert_allclose(np.sort(np.sqrt(-np.linalg.eigvals(matrix).real)), expected, rtol=1e-12)
+
+
+class TwoMasses(Model):
+    """A motor moves a mass, and another one through a spring."""
+
+    motor, spring = translational.Force(), translational.Spring(c=50.0)
+    near, far = translational.Mass(m=2.0), translational.Mass(m=3.0)
+
+    def equations(self):
+        yield connect(self.motor.flange, self.near.flange)
+        yield connect(self.near.flange, self.spring.flange_a)
+        yield connect(self.spring.flange_b, self.far.flange)
+
+
+def test_inverse_dynamics_through_an_elastic_joint_need_the_fourth_derivative():
+    dae = translate(TwoMasses())
+    motion = ["far.s", "der(far.s)", "der(der(far.s))", "der(der(der(far.s)))", "der(der(der(der(far.s))))"]
+    inverse = dae.function(motion, ["motor.f", "near.s"])
+    force, near = (float(x) for x in inverse(0.1, 0.2, 0.3, 0.4, 0.5))
+    assert near == pytest.approx(0.1 + 3.0 * 0.3 / 50.0, rel=1e-14)
+    assert force == pytest.approx(2.0 * (0.3 + 3.0 * 0.5 / 50.0) + 3.0 * 0.3, rel=1e-13)
+    with pytest.raises(
+        StructureError, match=r"does not determine motor\.f\. Give also der\(der\(der\(der\(far\.s\)\)\)\)"
+    ):
+        dae.function(motion[:4], ["motor.f"])
+
+
+def test_gears_make_one_inertia_of_two():
+    class Gear(Model):
+        ratio = Parameter(5.0, unit="1")
+        a, b = rotational.Flange(), rotational.Flange()
+
+        def equations(self):
+            yield self.a.phi == self.ratio * self.b.phi
+            yield self.b.tau == -self.ratio * self.a.tau
+
+    class Drive(Model):
+        motor = rotational.Torque()
+        rotor, load = rotational.Inertia(J=0.1), rotational.Inertia(J=2.0)
+        gear = Gear()
+        damper, wall = rotational.Damper(d=4.0), rotational.Fixed()
+
+        def equations(self):
+            yield connect(self.motor.flange, self.rotor.flange_a)
+            yield connect(self.rotor.flange_b, self.gear.a)
+            yield connect(self.gear.b, self.load.flange_a)
+            yield connect(self.load.flange_b, self.damper.flange_a)
+            yield connect(self.damper.flange_b, self.wall.flange)
+
+    dae = translate(Drive())
+    assert len(dae.states) == 2
+    forward = dae.function(["load.w", "motor.tau"], ["der(load.w)", "rotor.w"])
+    acceleration, speed = (float(x) for x in forward(0.5, 3.0))
+    assert acceleration == pytest.approx((5 * 3.0 - 4.0 * 0.5) / (2.0 + 25 * 0.1), rel=1e-14)
+    assert speed == 2.5
+    parameters = dae.function(["load.w", "motor.tau", "gear.ratio"], ["der(load.w)"])
+    assert float(parameters(0.5, 3.0, 2.0)) == pytest.approx((6.0 - 2.0) / 2.4, rel=1e-14)
+
+
+def test_a_position_source_and_a_force_source_are_inverse_to_each_other():
+    class Moved(Model):
+        source, mass, damper, wall = (
+            translational.Position(),
+            translational.Mass(m=2.0),
+            translational.Damper(d=3.0),
+            translational.Fixed(),
+        )
+
+        def equations(self):
+            yield connect(self.source.flange, self.mass.flange)
+            yield connect(self.mass.flange, self.damper.flange_a)
+            yield connect(self.damper.flange_b, self.wall.flange)
+
+    dae = translate(Moved())
+    assert dae.states == ()
+    force = dae.function(["source.s", "der(source.s)", "der(der(source.s))"], ["source.flange.f"])
+    assert float(force(1.0, 0.5, 0.2)) == pytest.approx(-(2.0 * 0.2 + 3.0 * 0.5), rel=1e-14)
+
+
+def test_tanks_with_a_rigid_pipe_share_a_state():
+    class Tank(Model):
+        area = Parameter(2.0, unit="m2")
+        level = Real(unit="m", start=1.0)
+        inflow = Real(unit="m3/s")
+
+        def equations(self):
+            yield self.area * der(self.level) == self.inflow
+
+    class Plant(Model):
+        first, second = Tank(), Tank(area=3.0)
+        pump = Input(unit="m3/s")
+        pipe = Real(unit="m3/s")
+
+        def equations(self):
+            yield self.first.level == self.second.level + 0.5
+            yield self.first.inflow == self.pump - self.pipe
+            yield self.second.inflow == self.pipe
+
+    dae = translate(Plant())
+    assert len(dae.states) == 1
+    at = dae.evaluate({"first.level": 2.0, "pump": 1.0})
+    assert at["second.level"] == 1.5
+    assert at["der(first.level)"] == pytest.approx(0.2, rel=1e-14)
+    assert at["pipe"] == pytest.approx(0.6, rel=1e-14)
+
+
+def test_planar_four_bar_from_rods():
+    class Joint(Connector):
+        r = Real(2, unit="m")
+        f = Flow(2, unit="N")
+
+    class Rod(Model):
+        L = Parameter(1.0, unit="m")
+        tension = Real(unit="N/m")
+        a, b = Joint(), Joint()
+
+        def equations(self):
+            way = self.b.r - self.a.r
+            yield ca.dot(way, way) == self.L**2
+            yield self.a.f == -self.tension * way
+            yield self.b.f == self.tension * way
+
+    class Knot(Model):
+        m = Parameter(1.0, unit="kg")
+        joint = Joint()
+
+        def equations(self):
+            yield self.m * (der(der(self.joint.r)) + ca.vertcat(0, 9.81)) == self.joint.f
+
+    class Wall(Model):
+        r = Parameter([0.0, 0.0], unit="m")
+        joint = Joint()
+
+        def equations(self):
+            yield self.joint.r == self.r
+
+    class FourBar(Model):
+        left, right = Wall(), Wall(r=[2.0, 0.0])
+        rods = Array(Rod, [dict(L=1.0), dict(L=2.0), dict(L=1.0)])
+        p, q = Knot(joint=dict(r=dict(start=[0.1, -1.0]))), Knot(joint=dict(r=dict(start=[2.1, -1.0])))
+
+        def equations(self):
+            joints = [self.left.joint, self.p.joint, self.q.joint, self.right.joint]
+            for rod, a, b in zip(self.rods, joints, joints[1:], strict=False):
+                yield connect(a, rod.a)
+                yield connect(rod.b, b)
+
+    dae = translate(FourBar())
+    assert len(dae.states) == 2
+    assert dae.diagnosis.mobility == 1
+    angle = 0.4  # a parallelogram: both knots swing as a pendulum does
+    at = dae.evaluate({"p.joint.r[0]": np.sin(angle), "der(p.joint.r[0])": 0.0})
+    assert at["q.joint.r"] == pytest.approx([2 + np.sin(angle), -np.cos(angle)], abs=1e-12)
+    swing = -9.81 * np.sin(angle)
+    assert at["der(der(p.joint.r))"] == pytest.approx(
+        [swing * np.cos(angle), swing * np.sin(angle)], rel=1e-11
+    )
+
+
+def test_algebraic_loops():
+    class Nonlinear(Model):
+        x, y = Real(unit="1", start=1.0), Real(unit="1", start=1.0)
+        u = Input(unit="1")
+
+        def equations(self):
+            yield self.x + exp(self.y) == self.u
+            yield self.y == cos(self.x)
+
+    dae = translate(Nonlinear())
+    x, y = (float(v) for v in dae.function(["u"], ["x", "y"])(3.0))
+    assert x + np.exp(y) == pytest.approx(3.0, abs=1e-13)
+    assert y == pytest.approx(np.cos(x), abs=1e-13)
+    slope = dae.function(["u"], ["x"]).jacobian()(3.0, 0.0)
+    assert float(slope) == pytest.approx(1 / (1 - np.exp(y) * np.sin(x)), rel=1e-10)
+
+
+def test_models_without_states_and_without_variables():
+    class Plain(Model):
+        a = Parameter(3.0, unit="m")
+        b = Parameter(2 * a, unit="m")
+
+    dae = translate(Plain())
+    assert (dae.states, dae.variables) == ((), ())
+    assert dae.evaluate({"a": 4.0})["b"] == 8.0
+    assert float(dae.function(["a"], ["b"])(5.0)) == 10.0
+
+    class Statics(Model):
+        x = Real(2, unit="1")
+
+        def equations(self):
+            yield ca.DM([[2, 1], [1, 3]]) @ self.x == ca.DM([3, 5])
+
+    np.testing.assert_allclose(translate(Statics()).evaluate({})["x"], [0.8, 1.4], rtol=1e-14)
+
+
+def test_aliases_carry_signs_offsets_and_derivatives():
+    class Signs(Model):
+        offset = Parameter(0.5, unit="m")
+        x, y, z = Real(unit="m"), Real(unit="m"), Real(unit="m")
+        v, w, a = Real(unit="m/s"), Real(unit="m/s"), Real(unit="m/s2")
+
+        def equations(self):
+            yield self.x + self.y == self.offset
+            yield 2 * self.z == -self.y
+            yield self.v == der(self.y)
+            yield self.w + der(self.z) == 0
+            yield self.a == der(self.v)
+            yield self.a == -4.0 * self.y
+
+    dae = translate(Signs(), units=False, states=["y", "v"])
+    assert len(dae.reduced.residuals) == 1
+    at = dae.evaluate({"y": 0.2, "v": 0.6})
+    wanted = {"x": 0.3, "z": -0.1, "w": 0.3, "a": -0.8, "der(x)": -0.6, "der(z)": -0.3, "der(der(x))": 0.8}
+    assert {n: at[n] for n in wanted} == pytest.approx(wanted, rel=1e-14)
+
+
+def test_the_text_of_the_equations_names_blocks_and_their_origin():
+    text = translate(Circuit()).equations("text")
+    assert "known: source.voltage" in text
+    assert "states: capacitor.u" in text
+    assert "capacitor (Capacitor), equation 4" in text
+    assert all("from" in line for line in text.splitlines() if line.startswith("["))

@@ -1,0 +1,106 @@
+"""Matching, blocks, tearing and elimination on random systems with known solutions."""
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gantrytau.blocks import block_pattern
+from gantrytau.guide import Guide
+from gantrytau.matching import best_matching, largest_matching, strong_components
+from gantrytau.solution import solve_blocks
+
+FIXED = settings(derandomize=True, deadline=None, max_examples=60)
+
+
+@FIXED
+@given(st.integers(1, 5), st.integers(0, 2**32 - 1), st.floats(0.2, 1.0))
+def test_best_matching_has_the_largest_sum_of_all(n, seed, density):
+    random = np.random.default_rng(seed)
+    rows = [{j: int(random.integers(0, 3)) for j in range(n) if random.random() < density} for _ in range(n)]
+    sums = [
+        sum(row[j] for row, j in zip(rows, order, strict=True))
+        for order in itertools.permutations(range(n))
+        if all(j in row for row, j in zip(rows, order, strict=True))
+    ]
+    matched = best_matching(rows)
+    if matched is None:
+        assert not sums
+        assert -1 in largest_matching(rows, n)
+    else:
+        assert sorted(matched) == list(range(n))
+        assert sum(row[j] for row, j in zip(rows, matched, strict=True)) == max(sums)
+
+
+@FIXED
+@given(st.integers(1, 8), st.integers(0, 2**32 - 1))
+def test_strong_components_are_mutually_reachable_and_in_order(n, seed):
+    random = np.random.default_rng(seed)
+    graph = [[j for j in range(n) if j != i and random.random() < 0.25] for i in range(n)]
+    reach = (
+        np.linalg.matrix_power(np.eye(n) + np.array([[j in row for j in range(n)] for row in graph]), n) > 0
+    )
+    found = strong_components(graph)
+    assert sorted(itertools.chain(*found)) == list(range(n))
+    place = {i: k for k, component in enumerate(found) for i in component}
+    for i, j in itertools.product(range(n), repeat=2):
+        assert (place[i] == place[j]) == (reach[i, j] and reach[j, i])
+        if reach[i, j]:
+            assert place[j] <= place[i]
+
+
+@FIXED
+@given(st.integers(1, 14), st.integers(0, 2**32 - 1), st.floats(0.05, 0.5))
+def test_sparse_linear_systems_are_solved_to_their_condition(n, seed, density):
+    random = np.random.default_rng(seed)
+    matrix = np.where(random.random((n, n)) < density, random.normal(size=(n, n)), 0.0)
+    matrix += np.diag(random.choice([-1.0, 1.0], n) * random.uniform(0.5, 2.0, n))
+    matrix = matrix[random.permutation(n)]
+    expected = random.normal(size=n)
+    right = matrix @ expected
+    x = [ca.SX.sym(f"x{k}") for k in range(n)]
+    u = ca.SX.sym("u")  # the coefficients are symbols, as parameters would be
+    residuals = {
+        (i, 0): u * sum((matrix[i, j] * x[j] for j in range(n) if matrix[i, j]), ca.SX(0)) - right[i]
+        for i in range(n)
+    }
+    symbols = {s.name(): s for s in x}
+    pattern = block_pattern(residuals, symbols)
+    assert not pattern.undetermined
+    assert not pattern.surplus
+    start = {**dict.fromkeys(symbols, 0.0), "u": 1.0}
+    blocks = solve_blocks(pattern.blocks, residuals, symbols, Guide(start, {"u"}, ()))
+    if any(block.solution is None for block in blocks):
+        assert n > 12 or np.linalg.cond(matrix) > 1e6
+        return
+    definitions = [pair for block in blocks for pair in block.definitions]
+    _, found = ca.substitute_inplace([s for s, _ in definitions], [e for _, e in definitions], x, False)
+    numbers = np.ravel(ca.evalf(ca.substitute(ca.vertcat(*found), u, 1.0))).astype(float)
+    # unrolled elimination with pivots of a tenth of their row: a growth of ten per step, seldom reached
+    np.testing.assert_allclose(numbers, expected, atol=1e-12 * max(10.0, np.linalg.cond(matrix)))
+
+
+def test_undetermined_and_surplus_parts_are_told_apart():
+    a, b, c, d = (ca.SX.sym(n) for n in "abcd")
+    residuals = {(0, 0): a - 1, (1, 0): a + 2, (2, 0): b + c, (3, 0): d * d - 4}
+    pattern = block_pattern(residuals, "abcd")
+    assert set(pattern.undetermined) == {"b", "c"}
+    assert len(pattern.surplus) == 1
+    assert pattern.surplus[0] in {(0, 0), (1, 0)}
+    wanted = block_pattern(residuals, "abcd", ["d"])
+    assert [unknowns for _, unknowns in wanted.blocks] == [("d",)]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_quadratic_takes_the_branch_of_the_start(side):
+    x, c = ca.SX.sym("x"), ca.SX.sym("c")
+    residuals = {(0, 0): 2 * x**2 - 4 * x + c}
+    guide = Guide({"x": 1.0 + side, "c": -6.0}, (), ())
+    (block,) = solve_blocks([(((0, 0),), ("x",))], residuals, {"x": x}, guide)
+    assert block.kind == "quadratic"
+    assert block.solution is not None
+    found = ca.substitute(block.solution[0], c, -6.0)
+    assert float(ca.evalf(found)) == pytest.approx(1.0 + 2.0 * side, rel=1e-15)
