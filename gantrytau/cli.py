@@ -14,6 +14,7 @@ app = typer.Typer(
 )
 
 INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
+UNFINISHED = "unfinished.csv"
 
 
 @app.callback()
@@ -52,6 +53,7 @@ def demo(
     screen = Console(stderr=json)
     try:
         output.mkdir(parents=True, exist_ok=True)
+        (output / UNFINISHED).unlink(missing_ok=True)
     except OSError as error:
         screen.print(f"Cannot write into {output}: {error.strerror}; name another folder with --output")
         raise typer.Exit(2) from None
@@ -60,7 +62,7 @@ def demo(
     except SolveError as error:
         screen.print(str(error), markup=False)
         if error.optimum is not None:
-            partial = output / "unfinished.csv"
+            partial = output / UNFINISHED
             demonstration.save_trajectory(error.optimum, partial)
             screen.print(f"The unfinished trajectory is in {partial}")
         stopped = error.optimum is not None and error.optimum.status == "interrupted"
@@ -68,6 +70,9 @@ def demo(
     except GantryTauError as error:
         screen.print(str(error), markup=False)
         raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        screen.print("Interrupted; no files were written")
+        raise typer.Exit(INTERRUPTED) from None
     summaries = [demonstration.summary(row, optima[row.key]) for row in demonstration.ROWS]
     files = [output / "paths.png", output / "torques.png"]
     with screen.status("drawing"):
