@@ -13,6 +13,7 @@ from gantrytau.parameters import ParameterTable
 from gantrytau.statements import Equation
 from gantrytau.symbols import derivative_name, split_derivative
 
+ZERO = ca.SX(0)
 LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
 
 
@@ -66,7 +67,7 @@ class _Terms:
 
     def __init__(self) -> None:
         self.factors: dict[str, float] = {}
-        self.offset = ca.SX(0)
+        self.offset = ZERO
 
 
 def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Reduced:
@@ -121,10 +122,10 @@ class _Elimination:
 
     def resolve(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""
-        factor, offset = 1.0, ca.SX(0)
+        factor, offset = 1.0, ZERO
         while (alias := self.parents.get(name)) is not None:
             if order == 0:
-                offset = offset + factor * alias.offset
+                offset = _plus(offset, factor, alias.offset)
             if alias.root is None:
                 return Alias(None, 0, 0.0, offset)
             factor *= alias.factor
@@ -173,7 +174,7 @@ class _Elimination:
         offset = terms.offset
         for name, factor in terms.factors.items():
             alias = self.resolve(*split_derivative(name))
-            offset = offset + factor * alias.offset
+            offset = _plus(offset, factor, alias.offset)
             if alias.root is not None:
                 key = (alias.root, alias.order)
                 factors[key] = factors.get(key, 0.0) + factor * alias.factor
@@ -184,7 +185,7 @@ class _Elimination:
             ((name, order), factor) = left[0]
             if order > 0 or name in self.known:
                 return False
-            self.parents[name] = Alias(None, 0, 0.0, -offset / factor)
+            self.parents[name] = Alias(None, 0, 0.0, _plus(ZERO, -1 / factor, offset))
             return True
         (a, factor_a), (b, factor_b) = left
         if a[1] == b[1] == 0:
@@ -192,10 +193,9 @@ class _Elimination:
                 a, b, factor_a, factor_b = b, a, factor_b, factor_a
         elif a[1] > 0 and b[1] == 0:
             a, b, factor_a, factor_b = b, a, factor_b, factor_a
-        constant = offset.is_constant() and float(offset) == 0.0
-        if a[1] > 0 or a[0] in self.known or a[0] == b[0] or (b[1] > 0 and not constant):
+        if a[1] > 0 or a[0] in self.known or a[0] == b[0] or (b[1] > 0 and not offset.is_zero()):
             return False
-        self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, -offset / factor_a)
+        self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, _plus(ZERO, -1 / factor_a, offset))
         return True
 
     def _substitute(self, residuals: list[ca.SX]) -> list[ca.SX]:
@@ -215,11 +215,18 @@ class _Elimination:
         return alias_expression(alias, self.chains)
 
 
+def _plus(total: ca.SX, factor: float, offset: ca.SX) -> ca.SX:
+    """Total + factor * offset; offsets are nearly always zero, and arithmetic on symbols is slow."""
+    if offset.is_zero():
+        return total
+    scaled = offset if factor == 1.0 else (-offset if factor == -1.0 else factor * offset)
+    return scaled if total.is_zero() else total + scaled
+
+
 def alias_expression(alias: Alias, chains: Chains) -> ca.SX:
     """The alias written out."""
     if alias.root is None:
         return alias.offset
     symbol = chains.sx(alias.root, alias.order)
     scaled = symbol if alias.factor == 1.0 else (-symbol if alias.factor == -1.0 else alias.factor * symbol)
-    zero = alias.offset.is_constant() and float(alias.offset) == 0.0
-    return scaled if zero else scaled + alias.offset
+    return _plus(scaled, 1.0, alias.offset)

@@ -53,7 +53,9 @@ def write_out(instance: Instance) -> FlatModel:
         equations += _bindings(instance)
         equations += connection_equations(instance, connections)
         definitions = propagate(instance, connections, branches, roots)
-        _refuse_nan((*equations, *initial))
+        written = substituted(equations, definitions, instance)
+        written_initial = substituted(initial, definitions, instance)
+        _refuse_nan((*written, *written_initial))
         flat_variables = tuple(
             _variable(placed) for placed in instance.quantities if not _is_parameter(placed)
         )
@@ -69,8 +71,8 @@ def write_out(instance: Instance) -> FlatModel:
         time=time,
         variables=tuple(v for v in flat_variables if v.kind != "propagated"),
         parameters=parameters,
-        equations=substituted(equations, definitions, instance),
-        initial_equations=substituted(initial, definitions, instance),
+        equations=written,
+        initial_equations=written_initial,
         derivatives={
             n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0 and s.base not in propagated
         },

@@ -3,6 +3,7 @@
 An instance remembers its modifications and nothing else; `gantrytau.instantiation` makes symbols of it.
 """
 
+import functools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -50,6 +51,7 @@ class Declared(_Part):
         return self._modifications
 
     @classmethod
+    @functools.cache
     def members(cls) -> dict[str, Any]:
         """Declarations, components and arrays of the class and its bases, in order of declaration."""
         found: dict[str, Any] = {}

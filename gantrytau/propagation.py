@@ -44,18 +44,20 @@ def propagate(
             edges.append(_Edge(instance.path(connection.a), instance.path(connection.b), None, None))
     tree, closing = _spanning_tree(nodes, edges, [instance.path(r.connector) for r in roots])
     values: dict[str, ca.SX] = {}
-    order: list[ca.SX] = []
 
     def settle(path: str, given: Mapping[str, Any]) -> None:
         for name, declaration in _propagated(nodes[path]).items():
             symbol = getattr(nodes[path], name)
             value = ca.SX(given[name]) if name in given else ca.SX(declaration.start)
-            here = ca.substitute(value, ca.vertcat(*order), ca.vertcat(*values.values())) if order else value
+            leaves = [leaf for leaf in ca.symvar(value) if leaf.name() in values]
+            here = value
+            if leaves:
+                known = ca.vertcat(*(values[leaf.name()] for leaf in leaves))
+                here = ca.substitute(value, ca.vertcat(*leaves), known)
             for element, expression in zip(scalars(symbol), scalars(here), strict=True):
                 found = instance.symbols.find(element)
                 assert found is not None
                 values[found.name] = expression
-                order.append(element)
 
     given_roots = {instance.path(r.connector): r.values for r in roots}
     for path, edge in _from_the_roots(nodes, tree, given_roots):

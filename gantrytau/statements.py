@@ -1,6 +1,7 @@
 """What `equations(self)` yields: equations, connections, and the branches of orientation trees."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -23,7 +24,7 @@ class Equation:
     number: int
     element: int | None = None
 
-    @property
+    @cached_property
     def residual(self) -> ca.SX:
         """Left - right."""
         return self.left - self.right

@@ -114,4 +114,6 @@ def der(expression: Any) -> ca.SX:
 
 def scalars(expression: Iterable[Any] | Any) -> list[ca.SX]:
     """The elements of an SX (or of numbers), column after column."""
-    return ca.densify(ca.SX(expression)).elements()
+    if not isinstance(expression, ca.SX):
+        expression = ca.SX(expression)
+    return (expression if expression.is_dense() else ca.densify(expression)).elements()

@@ -32,7 +32,25 @@ RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
 ANGLES = {
     getattr(ca, f"OP_{name}"): name.lower()
-    for name in ["SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SINH", "COSH", "TANH", "ASINH", "ACOSH", "ATANH", "EXP", "LOG", "LOG1P", "EXPM1", "ERF"]
+    for name in [
+        "SIN",
+        "COS",
+        "TAN",
+        "ASIN",
+        "ACOS",
+        "ATAN",
+        "SINH",
+        "COSH",
+        "TANH",
+        "ASINH",
+        "ACOSH",
+        "ATANH",
+        "EXP",
+        "LOG",
+        "LOG1P",
+        "EXPM1",
+        "ERF",
+    ]
 }
 POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
 
@@ -168,6 +186,10 @@ def _product(first: Unit, second: Unit, sign: Fraction) -> Unit:
 
 
 def _times(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
+    if second == ONE:
+        return first
+    if power == 1:
+        return tuple(a + b for a, b in zip(first, second, strict=True))
     return tuple(a + power * b for a, b in zip(first, second, strict=True))
 
 
