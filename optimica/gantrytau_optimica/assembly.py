@@ -1,19 +1,20 @@
 """Many copies of a small function, summed into one nonlinear program with exact sparse derivatives.
 
-A block evaluates `values(local, parameters, constants)` for N columns of local variables. It is tied to the program by
-two constant sparse matrices:
+A block evaluates `values(local, parameters, constants)` for N columns of local variables. It is tied to the
+program by two constant sparse matrices:
 
     local = gather w              w: variables of the program, (n,); local: (m N,)
     g     = linear w + sum over the blocks of scatter values
 
-Hence the nonzeros of Jacobian and Hessian are linear in the nonzeros of the small functions' derivatives, and the
-matrices of these relations are computed once. Nothing is differentiated at the size of the program.
+Hence the nonzeros of Jacobian and Hessian are linear in the nonzeros of the small functions' derivatives,
+and the matrices of these relations are computed once. Nothing is differentiated at the size of the program.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,6 +22,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Sparse = Any  # a matrix of scipy.sparse
+Entries = tuple[Indices, Indices, Indices, Array]  # row, column, number of the nonzero in its block, factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +36,23 @@ class Block:
     constants: ca.SX  # (c,), differ from copy to copy
     values: ca.SX  # (k,)
     constant_values: Array  # (c, N)
-    gather: sparse.csr_matrix  # (m N, n)
-    scatter: sparse.csr_matrix  # (rows, k N)
+    gather: Sparse  # (m N, n)
+    scatter: Sparse  # (rows, k N)
 
     @property
     def copies(self) -> int:
         """N."""
         return self.constant_values.shape[1]
 
-    def call(self, name: str, result: ca.SX, w: ca.MX, p: ca.MX, weights: ca.SX | None = None,
-             weight_values: ca.MX | None = None) -> ca.MX:
+    def call(
+        self,
+        name: str,
+        result: ca.SX,
+        w: ca.MX,
+        p: ca.MX,
+        weights: ca.SX | None = None,
+        weight_values: ca.MX | None = None,
+    ) -> ca.MX:
         """All copies of an expression of the local variables, stacked into one column."""
         symbols = [self.local, self.parameters, self.constants]
         local = ca.reshape(ca.mtimes(_dm(self.gather), w), self.local.numel(), self.copies)
@@ -66,7 +77,7 @@ class Program:
 
 
 def assemble(
-    objective: Sequence[Block], constraints: Sequence[Block], linear: sparse.csr_matrix, parameters: int
+    objective: Sequence[Block], constraints: Sequence[Block], linear: Sparse, parameters: int
 ) -> Program:
     """The program: minimise the objective blocks' sum; the rows are linear w + the constraint blocks' sum."""
     rows, n = linear.shape
@@ -76,15 +87,23 @@ def assemble(
     gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
     jacobian = _jacobian(constraints, linear, w, p)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    hessian = _hessian([(block, lam_f) for block in objective] + [(block, lam_g) for block in constraints], w, p)
+    hessian = _hessian(
+        [(block, lam_f) for block in objective] + [(block, lam_g) for block in constraints], w, p
+    )
     # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
     return Program(
         nlp=ca.Function("nlp", [w, p], [f, g], ["x", "p"], ["f", "g"]),
-        grad_f=ca.Function("nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)],
-                           ["x", "p"], ["f", "grad_f_x"]),
+        grad_f=ca.Function(
+            "nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)], ["x", "p"], ["f", "grad_f_x"]
+        ),
         jac_g=ca.Function("nlp_jac_g", [w, p], [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        hess_lag=ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [hessian],
-                             ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]),
+        hess_lag=ca.Function(
+            "nlp_hess_l",
+            [w, p, lam_f, lam_g],
+            [hessian],
+            ["x", "p", "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        ),
         variables=n,
         rows=rows,
     )
@@ -94,7 +113,7 @@ def _values(block: Block, w: ca.MX, p: ca.MX) -> ca.MX:
     return ca.mtimes(_dm(block.scatter), block.call("values", block.values, w, p))
 
 
-def _jacobian(blocks: Sequence[Block], linear: sparse.csr_matrix, w: ca.MX, p: ca.MX) -> ca.MX:
+def _jacobian(blocks: Sequence[Block], linear: Sparse, w: ca.MX, p: ca.MX) -> ca.MX:
     """Jacobian of the rows: nonzeros of the small Jacobians times their scatter and gather factors."""
     nonzeros, entries = [], []
     for block in blocks:
@@ -107,8 +126,7 @@ def _jacobian(blocks: Sequence[Block], linear: sparse.csr_matrix, w: ca.MX, p: c
         source, rows, up = _expand(block.scatter.tocsc(), (copy * block.values.numel() + row).ravel())
         inner, columns, down = _expand(block.gather, (copy * block.local.numel() + column).ravel()[source])
         entries.append((rows[inner], columns, source[inner], up[inner] * down))
-    fixed = linear.tocoo()
-    return _sum_into(linear.shape, entries, nonzeros, (fixed.row, fixed.col, fixed.data))
+    return _sum_into(entries, nonzeros, linear.tocoo())
 
 
 def _hessian(blocks: Sequence[tuple[Block, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
@@ -133,11 +151,11 @@ def _hessian(blocks: Sequence[tuple[Block, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX
         place = (copy * small.nnz() + number).ravel()[source][inner]
         keep = rows <= columns
         entries.append((rows[keep], columns[keep], place[keep], factor[keep]))
-    return _sum_into((w.numel(), w.numel()), entries, nonzeros, None)
+    return _sum_into(entries, nonzeros, sparse.coo_matrix((w.numel(), w.numel())))
 
 
-def _expand(matrix: sparse.csr_matrix | sparse.csc_matrix, lines: Array) -> tuple[Array, Array, Array]:
-    """The nonzeros of the named lines (rows of a csr, columns of a csc): position in `lines`, index, value."""
+def _expand(matrix: Sparse, lines: Indices) -> tuple[Indices, Indices, Array]:
+    """The nonzeros of the named lines (rows of csr, columns of csc): position in `lines`, index, value."""
     first, count = matrix.indptr[lines], np.diff(matrix.indptr)[lines]
     source = np.repeat(np.arange(len(lines)), count)
     within = np.arange(len(source)) - np.repeat(np.cumsum(count) - count, count)
@@ -145,11 +163,15 @@ def _expand(matrix: sparse.csr_matrix | sparse.csc_matrix, lines: Array) -> tupl
     return source, matrix.indices[place], matrix.data[place]
 
 
-def _sum_into(shape, entries, nonzeros: list[ca.MX], fixed) -> ca.MX:
-    """Sparse matrix of `shape` from entries (row, column, number of the nonzero in its block, factor)."""
+def _sum_into(entries: Sequence[Entries], nonzeros: Sequence[ca.MX], fixed: Sparse) -> ca.MX:
+    """The constant matrix `fixed` (coo) and, on top of it, the nonzeros of the blocks times their factors."""
+    shape = fixed.shape
     offsets = np.cumsum([0] + [part.numel() for part in nonzeros])
-    parts = [(r, c, place + offset, factor) for (r, c, place, factor), offset in zip(entries, offsets, strict=False)]
-    fixed_row, fixed_column, fixed_value = fixed if fixed is not None else (np.zeros(0),) * 3
+    parts = [
+        (r, c, place + offset, factor)
+        for (r, c, place, factor), offset in zip(entries, offsets, strict=False)
+    ]
+    fixed_row, fixed_column, fixed_value = fixed.row, fixed.col, fixed.data
     row = np.concatenate([part[0] for part in parts] + [fixed_row]).astype(np.int64)
     column = np.concatenate([part[1] for part in parts] + [fixed_column]).astype(np.int64)
     keys, slot = np.unique(column * shape[0] + row, return_inverse=True)
@@ -163,7 +185,7 @@ def _sum_into(shape, entries, nonzeros: list[ca.MX], fixed) -> ca.MX:
     return ca.MX(pattern, values)
 
 
-def _dm(matrix: sparse.csr_matrix) -> ca.DM:
+def _dm(matrix: Sparse) -> ca.DM:
     """A constant sparse matrix for CasADi; zeros stay structural."""
     columns = matrix.tocsc()
     columns.sum_duplicates()

@@ -53,12 +53,12 @@ def scheme(name: SchemeName, points: int) -> Scheme:
         points=tau,
         differentiation=_derivatives(nodes)[1:],
         end=np.array(lagrange(nodes, 1.0)),
-        quadrature=np.linalg.solve(powers.T, moments),
+        quadrature=np.linalg.solve(powers.T, moments).astype(np.float64),
     )
 
 
 def lagrange(nodes: Any, s: Any) -> list[Any]:
-    """The Lagrange polynomials of the nodes at s; entries of nodes and s may be numbers, arrays or symbols."""
+    """The Lagrange polynomials of the nodes at s; nodes and s hold numbers, arrays or symbols."""
     basis = []
     for k in range(len(nodes)):
         value = 1.0 + 0 * s
@@ -70,7 +70,7 @@ def lagrange(nodes: Any, s: Any) -> list[Any]:
 
 
 def _derivatives(nodes: Array) -> Array:
-    """Differentiation matrix of the nodes by the barycentric formula; the rows sum to zero by construction."""
+    """Differentiation matrix of the nodes, barycentric; the rows sum to zero by construction."""
     distance = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
     weights = 1 / distance.prod(axis=1)
     matrix = weights[None, :] / weights[:, None] / distance

@@ -6,9 +6,9 @@
                 lower <= path_limits(t, x, z, u, free, p) <= upper
                 lower <= boundary(points, free, p) <= upper
 
-All expressions are SX in the symbols of the record. A point is the value of an expression at one time, under a symbol
-of its own, which objective and boundary use. Free numbers are chosen by the optimiser; parameters keep their value
-during a solve and may have another in the next.
+All expressions are SX in the symbols of the record. A point is the value of an expression at one time, under
+a symbol of its own, which objective and boundary use. Free numbers are chosen by the optimiser; parameters
+keep their value during a solve and may have another in the next.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class Parameter:
 class PointValue:
     """`symbol` stands for the value of `expression` at one time, on the mesh or between.
 
-    time: "initial", "final", a number, or an expression of free numbers and parameters. Algebraics and inputs at a
-    point are those of the collocation polynomial of its element.
+    time: "initial", "final", a number, or an expression of free numbers and parameters. Algebraics and
+    inputs at a point are those of the collocation polynomial of its element.
     """
 
     symbol: ca.SX
@@ -80,7 +80,7 @@ class PointValue:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """lower <= expression <= upper, elementwise; bounds are numbers, arrays, or expressions like the limited one."""
+    """lower <= expression <= upper, elementwise; bounds are numbers, arrays or expressions."""
 
     expression: ca.SX
     lower: Bound
@@ -129,43 +129,68 @@ class ControlProblem:
             if found != expected:
                 raise ValueError(f"control problem: {found} {what}, expected {expected}, one for each")
         if self.residual_names and len(self.residual_names) != len(self.algebraics):
-            raise ValueError(f"control problem: {len(self.residual_names)} names of residuals, "
-                             f"expected {len(self.algebraics)}")
+            raise ValueError(
+                f"control problem: {len(self.residual_names)} names of residuals, "
+                f"expected {len(self.algebraics)}"
+            )
         for item in (*self.signals, *self.free):
             if not (item.symbol.is_scalar() and item.symbol.is_symbolic()):
                 raise ValueError(f"{item.name}: expected a scalar symbol, found {item.symbol}")
         for point in self.points:
             if point.symbol.shape != point.expression.shape:
-                raise ValueError(f"point {point.symbol}: shape {point.symbol.shape}, "
-                                 f"its expression has {point.expression.shape}")
+                raise ValueError(
+                    f"point {point.symbol}: shape {point.symbol.shape}, "
+                    f"its expression has {point.expression.shape}"
+                )
 
     def _require_unique_names(self) -> None:
         names = [item.name for item in (*self.signals, *self.free, *self.parameters)]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"control problem: two variables are called '{name}'; give each a name of its own")
+                raise ValueError(
+                    f"control problem: two variables are called '{name}'; give each a name of its own"
+                )
 
     def _require_known_symbols(self) -> None:
         numbers = [item.symbol for item in (*self.free, *self.parameters)]
         running = [*numbers, self.time, *(signal.symbol for signal in self.signals)]
         points = [*numbers, *(point.symbol for point in self.points)]
-        checks = [("ode", self.ode, running), ("residuals", self.residuals, running),
-                  ("integrand", self.integrand, running), ("objective", self.objective, points),
-                  ("start_time", self.start_time, numbers), ("final_time", self.final_time, numbers)]
-        checks += [(f"limit '{x.name}'", e, running) for x in self.path_limits for e in (x.expression, x.lower, x.upper)]
-        checks += [(f"limit '{x.name}'", e, points) for x in self.boundary for e in (x.expression, x.lower, x.upper)]
+        checks = [
+            ("ode", self.ode, running),
+            ("residuals", self.residuals, running),
+            ("integrand", self.integrand, running),
+            ("objective", self.objective, points),
+            ("start_time", self.start_time, numbers),
+            ("final_time", self.final_time, numbers),
+        ]
+        checks += [
+            (f"limit '{x.name}'", e, running)
+            for x in self.path_limits
+            for e in (x.expression, x.lower, x.upper)
+        ]
+        checks += [
+            (f"limit '{x.name}'", e, points) for x in self.boundary for e in (x.expression, x.lower, x.upper)
+        ]
         checks += [(f"point {x.symbol}", x.expression, running) for x in self.points]
         checks += [(f"time of point {x.symbol}", x.time, numbers) for x in self.points]
         for what, expression, known in checks:
             if not isinstance(expression, ca.SX):
                 continue
             names = {symbol.element_hash() for part in known for symbol in ca.symvar(part)}
-            strangers = [str(symbol) for symbol in ca.symvar(expression) if symbol.element_hash() not in names]
+            strangers = [
+                str(symbol) for symbol in ca.symvar(expression) if symbol.element_hash() not in names
+            ]
             if strangers:
-                raise ValueError(f"control problem: {what} contains {', '.join(strangers)}, unknown there; "
-                                 + ("a signal is used at a time, as a point" if known is points else
-                                    "expected the signals, time, free numbers and parameters"
-                                    if known is running else "expected free numbers and parameters"))
+                raise ValueError(
+                    f"control problem: {what} contains {', '.join(strangers)}, unknown there; "
+                    + (
+                        "a signal is used at a time, as a point"
+                        if known is points
+                        else "expected the signals, time, free numbers and parameters"
+                        if known is running
+                        else "expected free numbers and parameters"
+                    )
+                )
 
     def _require_finite(self) -> None:
         for item in (*self.signals, *self.free):

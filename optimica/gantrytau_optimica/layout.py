@@ -1,8 +1,9 @@
 """Which variable of the nonlinear program is which value of which signal.
 
-Within one element every signal is a polynomial through some nodes: a state through the start of the element and its
-collocation points, an algebraic or a free input through the collocation points, a constant input through one node, a
-linear one through the ends of its group of elements. Nodes are in element coordinates, 0 to 1 over the element.
+Within one element every signal is a polynomial through some nodes: a state through the start of the element
+and its collocation points, an algebraic or a free input through the collocation points, a constant input
+through one node, a linear one through the ends of its group of elements. Nodes are in element coordinates, 0
+to 1 over the element.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ class Layout:
     borders: Array  # (elements + 1,) from 0 to 1, relative time
     scheme: Scheme
     tracks: tuple[Track, ...]  # of states, algebraics, inputs
-    chains: tuple[tuple[Indices, float], ...]  # consecutive values of an input that may not step further than that
+    chains: tuple[
+        tuple[Indices, float], ...
+    ]  # consecutive values of an input that may not step further than that
     starts: Indices  # (elements + 1, states): the state at every border
     size: int
     owner: Indices  # (size,): number of the signal a variable belongs to, -1 for free numbers
@@ -85,8 +88,10 @@ def lay_out(problem: ControlProblem, borders: Array, scheme: Scheme, pieces: Map
     free_inputs = [i for i, signal in enumerate(problem.inputs) if signal.name not in pieces]
     unknown = set(pieces) - {signal.name for signal in problem.inputs}
     if unknown:
-        raise ValueError(f"controls: '{sorted(unknown)[0]}' is no input; inputs are "
-                         + ", ".join(signal.name for signal in problem.inputs))
+        raise ValueError(
+            f"controls: '{sorted(unknown)[0]}' is no input; inputs are "
+            + ", ".join(signal.name for signal in problem.inputs)
+        )
     local = nx + nz + len(free_inputs)
     radau = scheme.name == "radau"  # the last point is the end of the element
     stride = k * local + (0 if radau else nx)
@@ -123,7 +128,7 @@ def lay_out(problem: ControlProblem, borders: Array, scheme: Scheme, pieces: Map
 
 
 def _piecewise(signal: Signal, piece: Pieces, borders: Array, offset: int) -> tuple[Track, Array]:
-    """Track of a piecewise input and the relative times of its values: middles of the pieces, or their ends."""
+    """Track of a piecewise input, and the relative times of its values: middles or ends of the pieces."""
     elements = len(borders) - 1
     if piece.max_step is not None and not piece.max_step >= 0:
         raise ValueError(f"{signal.name}: max_step {piece.max_step}, expected a number that is not negative")

@@ -56,7 +56,9 @@ def _finite(bound: ca.SX) -> bool:
 
 
 def _column(limit: Limit, bound: Bound, count: int) -> ca.SX:
-    column = ca.vec(bound) if isinstance(bound, ca.SX) else ca.SX(ca.DM(np.asarray(bound, dtype=float).ravel()))
+    column = (
+        ca.vec(bound) if isinstance(bound, ca.SX) else ca.SX(ca.DM(np.asarray(bound, dtype=float).ravel()))
+    )
     if column.numel() not in (1, count):
         raise ValueError(f"limit '{limit.name}': {column.numel()} bounds for {count} elements")
     if any(entry.is_constant() and np.isnan(float(entry)) for entry in ca.vertsplit(column)):

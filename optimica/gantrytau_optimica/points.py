@@ -1,9 +1,10 @@
 """Values of signals at single times, as expressions of the variables of the nonlinear program.
 
-At relative time m = (t - start) / (final - start), in the element with borders a < b, a signal is the Lagrange
-polynomial of its values at the nodes, taken at s = (m - a) / (b - a). Where m does not depend on free numbers, element
-and s are numbers. Otherwise s is an expression of them and the element is that of their values when the problem is
-transcribed: exact as long as the point stays in it, which `Place.strayed` tells.
+At relative time m = (t - start) / (final - start), in the element with borders a < b, a signal is the
+Lagrange polynomial of its values at the nodes, taken at s = (m - a) / (b - a). Where m does not depend on
+free numbers, element and s are numbers. Otherwise s is an expression of them and the element is that of
+their values when the problem is transcribed: exact as long as the point stays in it, which `Place.strayed`
+tells.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ class Place:
 
     element: int
     coordinate: float | ca.SX
-    moment: ca.Function | None  # (free, parameters) -> relative time, of a point that moves between the elements
+    moment: (
+        ca.Function | None
+    )  # (free, parameters) -> relative time, of a point that moves between the elements
 
     def strayed(self, layout: Layout, free: Array, parameters: Array) -> bool:
         """Whether the point has left the element that it was placed in."""
@@ -41,24 +44,40 @@ class Place:
         return not left - 1e-9 <= moment <= right + 1e-9
 
 
-def place(problem: ControlProblem, layout: Layout, point: PointValue, free: Array, parameters: Array) -> Place:
+def place(
+    problem: ControlProblem, layout: Layout, point: PointValue, free: Array, parameters: Array
+) -> Place:
     """Element and coordinate of a point, near the given values of free numbers and parameters."""
     last = len(layout.widths) - 1
     if isinstance(point.time, str):
         if point.time not in ("initial", "final"):
-            raise ValueError(f"time of point {point.symbol}: found '{point.time}', expected 'initial' or 'final'")
+            raise ValueError(
+                f"time of point {point.symbol}: found '{point.time}', expected 'initial' or 'final'"
+            )
         return Place(0, 0.0, None) if point.time == "initial" else Place(last, 1.0, None)
     start, final = ca.SX(problem.start_time), ca.SX(problem.final_time)
     relative = (point.time - start) / (final - start)
-    symbols = [ca.vertcat(*(x.symbol for x in problem.free)), ca.vertcat(*(ca.vec(x.symbol) for x in problem.parameters))]
+    symbols = [
+        ca.vertcat(*(x.symbol for x in problem.free)),
+        ca.vertcat(*(ca.vec(x.symbol) for x in problem.parameters)),
+    ]
     moment = ca.Function("moment", symbols, [relative], {"allow_free": False})
     found = float(moment(free, parameters))
     if not -1e-9 <= found <= 1 + 1e-9:
-        raise ValueError(f"point {point.symbol}: its time lies at {found:.6g} of the horizon, expected 0 to 1")
+        raise ValueError(
+            f"point {point.symbol}: its time lies at {found:.6g} of the horizon, expected 0 to 1"
+        )
     element, s = (value[0] for value in layout.locate(np.array([min(max(found, 0.0), 1.0)])))
     random = np.random.default_rng(0)
-    nearby = [float(moment(free + random.uniform(0.1, 0.3, len(free)), parameters + random.uniform(0.1, 0.3, len(parameters))))
-              for _ in range(3)]
+    nearby = [
+        float(
+            moment(
+                free + random.uniform(0.1, 0.3, len(free)),
+                parameters + random.uniform(0.1, 0.3, len(parameters)),
+            )
+        )
+        for _ in range(3)
+    ]
     if np.allclose(nearby, found, rtol=0, atol=1e-12):
         return Place(int(element), float(s), None)
     coordinate = (relative - layout.borders[element]) / layout.widths[element]
@@ -71,15 +90,18 @@ def point_block(
     """A block of one copy: an expression of points, free numbers and parameters."""
     symbols: dict[int, ca.SX] = {}
     values = [
-        _value(problem, layout, point, where, symbols) if ca.depends_on(expression, point.symbol) else point.symbol
+        _value(problem, layout, point, where, symbols)
+        if ca.depends_on(expression, point.symbol)
+        else point.symbol
         for point, where in zip(problem.points, places, strict=True)
     ]
     if problem.points:
         expression = ca.substitute([expression], [point.symbol for point in problem.points], values)[0]
     free = [number.symbol for number in problem.free]
     variables = np.array([*symbols, *range(len(free))], dtype=np.int64)
-    gather = sparse.csr_matrix((nominal[variables], (np.arange(len(variables)), variables)),
-                               shape=(len(variables), layout.size))
+    gather = sparse.csr_matrix(
+        (nominal[variables], (np.arange(len(variables)), variables)), shape=(len(variables), layout.size)
+    )
     return Block(
         local=ca.vertcat(*symbols.values(), *free),
         parameters=ca.vertcat(*(ca.vec(item.symbol) for item in problem.parameters)),
@@ -91,7 +113,9 @@ def point_block(
     )
 
 
-def _value(problem: ControlProblem, layout: Layout, point: PointValue, where: Place, symbols: dict[int, ca.SX]) -> ca.SX:
+def _value(
+    problem: ControlProblem, layout: Layout, point: PointValue, where: Place, symbols: dict[int, ca.SX]
+) -> ca.SX:
     """The point's expression with every signal replaced by its polynomial; new variables join `symbols`."""
     olds, news = [], []
     for signal, track in zip(problem.signals, layout.tracks, strict=True):
@@ -127,6 +151,8 @@ def parameter_values(problem: ControlProblem, given: Mapping[str, object] | None
             raise ValueError(f"{item.name}: found {value.tolist()}, expected finite numbers")
         columns.append(np.broadcast_to(value, (count,)))
     if given:
-        raise ValueError(f"'{next(iter(given))}' is no parameter of the problem; parameters are "
-                         + (", ".join(item.name for item in problem.parameters) or "none"))
+        raise ValueError(
+            f"'{next(iter(given))}' is no parameter of the problem; parameters are "
+            + (", ".join(item.name for item in problem.parameters) or "none")
+        )
     return np.concatenate(columns) if columns else np.zeros(0)

@@ -1,22 +1,23 @@
 """Direct collocation: an optimal-control problem becomes a nonlinear program.
 
-Per element of relative width d, horizon H = final - start, points c_j with differentiation matrix D and quadrature
-weights b, and row by row in the program:
+Per element of relative width d, horizon H = final - start, points c_j with differentiation matrix D and
+quadrature weights b, and row by row in the program:
 
     sum_k D_jk x_k - d H ode(t_j, x_j, z_j, u_j) = 0      divided by the state's nominal value
     residuals(t_j, x_j, z_j, u_j) = 0
     lower <= path limits(t_j, x_j, z_j, u_j) <= upper     those of a bare signal are bounds of its variables
-    x(next element) - sum_k e_k x_k = 0                   Gauss only; with Radau the last point is the next start
-    |next value - value| <= max_step                      of a piecewise input
+    x(next element) - sum_k e_k x_k = 0                   Gauss only; with Radau the last point is the next
+    start |next value - value| <= max_step                      of a piecewise input
     boundary conditions
 
-Objective: Mayer term + sum of d H b_j integrand(t_j, x_j, z_j, u_j). The variables are divided by nominal values.
+Objective: Mayer term + sum of d H b_j integrand(t_j, x_j, z_j, u_j). The variables are divided by nominal
+values.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +62,7 @@ class Transcription:
     row_bounds: Bounds
     groups: tuple[RowGroup, ...]
     places: tuple[Place, ...]
+    controls: Mapping[str, Pieces]
     seconds: float  # spent on building
 
     def horizon(self, free: Array, parameters: Array) -> tuple[float, float]:
@@ -73,9 +75,11 @@ class Transcription:
     def first_guess(self, parameters: Array, guess: Mapping[str, Any] | None = None) -> Array:
         """The variables (not divided) from the guesses of the record, or from `guess` where it names one.
 
-        guess: name of a signal -> number or function of an array of times (s); name of a free number -> number.
+        guess: name of a signal -> number or function of an array of times (s); name of a free number ->
+        number.
         """
-        given, problem, layout = dict(guess or {}), self.problem, self.layout
+        given: dict[str, Any] = dict(guess or {})
+        problem, layout = self.problem, self.layout
         values = np.zeros(layout.size)
         for i, number in enumerate(problem.free):
             values[i] = float(given.pop(number.name, number.guess))
@@ -84,11 +88,13 @@ class Transcription:
             raise ValueError(f"first guess: final time {final:.6g} s is not after start time {start:.6g} s")
         for i, signal in enumerate(problem.signals):
             mine = np.flatnonzero(layout.owner == i)
-            function = given.pop(signal.name, signal.guess)
+            function: Any = given.pop(signal.name, signal.guess)
             times = start + layout.moment[mine] * (final - start)
             values[mine] = function(times) if callable(function) else function
         if given:
-            raise ValueError(f"first guess: '{next(iter(given))}' is neither a signal nor a free number of the problem")
+            raise ValueError(
+                f"first guess: '{next(iter(given))}' is neither a signal nor a free number of the problem"
+            )
         strange = np.flatnonzero(~np.isfinite(values))
         if len(strange):
             owner = layout.owner[strange[0]]
@@ -105,7 +111,6 @@ def transcribe(
     scheme_name: SchemeName = "radau",
     controls: Mapping[str, Pieces] | None = None,
     located: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] | None = None,
 ) -> Transcription:
     """The program of a problem.
 
@@ -135,26 +140,44 @@ def transcribe(
 
     rows = _Rows(problem, layout, paths, rows_of(problem.boundary, problem.parameters))
     located_free = np.array([float((located or {}).get(x.name, x.guess)) for x in problem.free])
-    places = [place(problem, layout, point, located_free, parameter_values(problem)) for point in problem.points]
+    places = [
+        place(problem, layout, point, located_free, parameter_values(problem)) for point in problem.points
+    ]
     scale = sparse.diags(nominal).tocsr()
     gather = _gather(layout, nf) @ scale
     constraints = [_dynamics(problem, layout, paths, rows, gather)]
     if rows.boundary:
         column = ca.vertcat(*(row.expression for row in rows.boundary))
-        scatter = sparse.csr_matrix((np.ones(len(rows.boundary)),
-                                     (rows.boundary_start + np.arange(len(rows.boundary)),
-                                      np.arange(len(rows.boundary)))), shape=(rows.count, len(rows.boundary)))
+        scatter = sparse.csr_matrix(
+            (
+                np.ones(len(rows.boundary)),
+                (rows.boundary_start + np.arange(len(rows.boundary)), np.arange(len(rows.boundary))),
+            ),
+            shape=(rows.count, len(rows.boundary)),
+        )
         constraints.append(point_block(problem, layout, places, column, nominal, scatter))
-    objective = [point_block(problem, layout, places, ca.SX(problem.objective), nominal, sparse.csr_matrix([[1.0]]))]
+    objective = [
+        point_block(problem, layout, places, ca.SX(problem.objective), nominal, sparse.csr_matrix([[1.0]]))
+    ]
     integrand = ca.SX(problem.integrand)
     if not integrand.is_zero():
         weights = (layout.widths[:, None] * layout.scheme.quadrature).reshape(1, -1)
-        objective.append(_running(problem, layout, integrand * _horizon(problem), gather, sparse.csr_matrix(weights)))
+        objective.append(
+            _running(problem, layout, integrand * _horizon(problem), gather, sparse.csr_matrix(weights))
+        )
     program = assemble(objective, constraints, rows.linear() @ scale, _parameters(problem).numel())
     parameters = _parameters(problem)
     return Transcription(
-        problem, layout, program, nominal, draft.finish(parameters), rows.bounds.finish(parameters),
-        tuple(rows.groups), tuple(places), time.perf_counter() - began,
+        problem,
+        layout,
+        program,
+        nominal,
+        draft.finish(parameters),
+        rows.bounds.finish(parameters),
+        tuple(rows.groups),
+        tuple(places),
+        dict(controls or {}),
+        time.perf_counter() - began,
     )
 
 
@@ -165,7 +188,13 @@ def _borders(mesh: int | Array) -> Array:
             raise ValueError(f"elements: found {mesh}, expected at least 1")
         return np.linspace(0.0, 1.0, int(mesh) + 1)
     borders = np.asarray(mesh, dtype=float)
-    if borders.ndim != 1 or len(borders) < 2 or borders[0] != 0 or borders[-1] != 1 or (np.diff(borders) <= 0).any():
+    if (
+        borders.ndim != 1
+        or len(borders) < 2
+        or borders[0] != 0
+        or borders[-1] != 1
+        or (np.diff(borders) <= 0).any()
+    ):
         raise ValueError("mesh: expected increasing relative times from 0 to 1")
     return borders
 
@@ -216,7 +245,9 @@ def _running(problem: ControlProblem, layout: Layout, values: ca.SX, gather, sca
 def _dynamics(problem: ControlProblem, layout: Layout, paths: list[Row], rows: _Rows, gather) -> Block:
     """Derivatives, residuals and path limits at every collocation point."""
     states, count = len(problem.states), rows.per_point
-    values = ca.vertcat(problem.ode * _horizon(problem), problem.residuals, *(row.expression for row in paths))
+    values = ca.vertcat(
+        problem.ode * _horizon(problem), problem.residuals, *(row.expression for row in paths)
+    )
     factor = np.ones((len(layout.widths), len(layout.scheme.points), count))
     nominal = np.array([state.nominal for state in problem.states])
     factor[:, :, :states] = -layout.widths[:, None, None] / nominal
@@ -228,7 +259,9 @@ def _dynamics(problem: ControlProblem, layout: Layout, paths: list[Row], rows: _
 class _Rows:
     """Numbers the rows of the program, and draws up their bounds and their linear part."""
 
-    def __init__(self, problem: ControlProblem, layout: Layout, paths: list[Row], boundary: list[Row]) -> None:
+    def __init__(
+        self, problem: ControlProblem, layout: Layout, paths: list[Row], boundary: list[Row]
+    ) -> None:
         self.problem, self.layout, self.boundary = problem, layout, boundary
         nx, nz = len(problem.states), len(problem.algebraics)
         elements, k = layout.times.shape
@@ -253,8 +286,13 @@ class _Rows:
             self._limit(row, "path", at_points + nx + nz + i, moments)
         if continuity:
             for i, state in enumerate(problem.states):
-                self._equation(state.name, "continuity", self.continuity_start + nx * np.arange(elements) + i,
-                               layout.borders[1:], 1 / state.nominal)
+                self._equation(
+                    state.name,
+                    "continuity",
+                    self.continuity_start + nx * np.arange(elements) + i,
+                    layout.borders[1:],
+                    1 / state.nominal,
+                )
         first = self.steps_start
         for (chain, step), count in zip(layout.chains, steps, strict=True):
             entries = first + np.arange(count)
@@ -290,8 +328,11 @@ class _Rows:
         first = self.steps_start
         for chain, _ in layout.chains:
             row = first + np.arange(len(chain) - 1)
-            parts.append(np.broadcast_arrays(row[:, None], np.column_stack([chain[1:], chain[:-1]]),
-                                             np.array([[1.0, -1.0]])))
+            parts.append(
+                np.broadcast_arrays(
+                    row[:, None], np.column_stack([chain[1:], chain[:-1]]), np.array([[1.0, -1.0]])
+                )
+            )
             first += len(chain) - 1
         row, column, value = (np.concatenate([part[n].ravel() for part in parts]) for n in range(3))
         return sparse.csr_matrix((value, (row, column)), shape=(self.count, layout.size))

@@ -1,8 +1,9 @@
 """The closed form of the three-link Gantry-Tau, written by hand: the peer of the translated model.
 
 Dressler (2012), equations 6.3 to 6.8, derived again by Lagrange with a point mass in the middle of each link
-and all guideways along e_x. Base frame, z up, SI units. Letters: T tool position, q cart positions, D_i the link
-vector from cart to tool, W = J^-1 the matrix of q' = W T' (6.5), c_i = |D_i'|^2 the centripetal term (6.6).
+and all guideways along e_x. Base frame, z up, SI units. Letters: T tool position, q cart positions, D_i the
+link vector from cart to tool, W = J^-1 the matrix of q' = W T' (6.5), c_i = |D_i'|^2 the centripetal term
+(6.6).
 
     |D_i|^2 = L_i^2                         D_i = T - A_i - q_i e_x                     (6.3)
     q'' = W T'' + c / dX                                                                (6.6, solved for q'')
@@ -50,7 +51,7 @@ GT_A_HEAVY_LINKS = replace(GT_A, link_masses=(0.9, 1.7, 2.4))
 
 
 class Arm(NamedTuple):
-    """What one arm contributes: the slopes of its row of W = (1, y, z) and the speeds that follow from them."""
+    """What one arm contributes: the slopes in its row (1, y, z) of W, and the speeds that follow."""
 
     slope_y: ca.SX  # dY / dX
     slope_z: ca.SX  # dZ / dX
@@ -152,7 +153,8 @@ def arms(robot: ThreeLink, T: ca.SX, dT: ca.SX) -> list[Arm]:
 def forward_dynamics(robot: ThreeLink, T: ca.SX, dT: ca.SX, f: ca.SX) -> ca.SX:
     """T'' from the actuator forces f (before friction), (3,) in m/s2.
 
-    (M1 + M2 W) T'' = W' (f - friction) - G - M2 c/dX, the symmetric matrix on the left by Cholesky without roots.
+    (M1 + M2 W) T'' = W' (f - friction) - G - M2 c/dX, the symmetric matrix on the left by Cholesky without
+    roots.
     """
     quarter = [m / 4 for m in robot.link_masses]
     plate = robot.plate_mass + sum(quarter)
@@ -189,8 +191,9 @@ def inverse_dynamics(robot: ThreeLink, T: ca.SX, dT: ca.SX, ddT: ca.SX) -> ca.SX
     for i, arm in enumerate(arms(robot, T, dT)):
         ddq = ddT[0] + arm.slope_y * ddT[1] + arm.slope_z * ddT[2] + arm.centripetal
         inertia[0] += quarter[i] * ddq
-        rest.append(robot.cart_masses[i] * ddq + quarter[i] * (ddq + ddT[0])
-                    + friction_force(robot, i, arm.velocity))
+        rest.append(
+            robot.cart_masses[i] * ddq + quarter[i] * (ddq + ddT[0]) + friction_force(robot, i, arm.velocity)
+        )
         rows.append(ca.horzcat(1, arm.slope_y, arm.slope_z))
     return ca.vertcat(*rest) + ca.solve(ca.vertcat(*rows).T, inertia)
 
@@ -198,5 +201,6 @@ def inverse_dynamics(robot: ThreeLink, T: ca.SX, dT: ca.SX, ddT: ca.SX) -> ca.SX
 def forward_dynamics_function(robot: ThreeLink) -> ca.Function:
     """T'' = f(T, T', f) as a CasADi function: the reference for counting instructions and for timing."""
     T, dT, f = ca.SX.sym("T", 3), ca.SX.sym("dT", 3), ca.SX.sym("f", 3)
-    return ca.Function("forward_dynamics", [T, dT, f], [forward_dynamics(robot, T, dT, f)],
-                       ["T", "dT", "f"], ["ddT"])
+    return ca.Function(
+        "forward_dynamics", [T, dT, f], [forward_dynamics(robot, T, dT, f)], ["T", "dT", "f"], ["ddT"]
+    )

@@ -1,7 +1,7 @@
 """GT-A: carry the tool of the L1 robot from A to B, the task that the thesis' Table 3.1 resembles.
 
-Motor torques (N.m) act through a gear: gear * torque = f is the actuator force before friction. Cost: the time plus
-`weight` times the sum of the integrals of the squared torques.
+Motor torques (N.m) act through a gear: gear * torque = f is the actuator force before friction. Cost: the
+time plus `weight` times the sum of the integrals of the squared torques.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""The minimum-time motion of GT-A as a careful engineer writes it down for one robot: the peer of the transcription.
+"""The minimum-time motion of GT-A as a careful engineer writes it down for one robot: the peer of the
+transcription.
 
-Direct collocation at Radau points in the derivative form: the accelerations a of the tool (or of the path coordinate)
-are the unknowns at every point, the positions and speeds there follow by two integrations, and only those at the
-borders of the elements are variables. The reaches dX (m) are bounded variables with the length of the link as their
-equation, so that no square root is evaluated. One SX function per point, exact Hessian, Ipopt with MUMPS.
+Direct collocation at Radau points in the derivative form: the accelerations a of the tool (or of the path
+coordinate) are the unknowns at every point, the positions and speeds there follow by two integrations, and
+only those at the borders of the elements are variables. The reaches dX (m) are bounded variables with the
+length of the link as their equation, so that no square root is evaluated. One SX function per point, exact
+Hessian, Ipopt with MUMPS.
 
     y = tool position (free path) or path coordinate (line);   h = final time / elements
     y'_j = y'_0 + h sum_k A_jk a_k           y_j = y_0 + h c_j y'_0 + h^2 sum_k (A A)_jk a_k
@@ -21,7 +23,13 @@ import numpy as np
 from tests.benchmarks.closed_form import friction_force
 from tests.benchmarks.gta import Task, reaches, trapezoid
 
-IPOPT = {"print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "linear_solver": "mumps", "max_wall_time": 60.0}
+IPOPT = {
+    "print_level": 0,
+    "sb": "yes",
+    "mu_strategy": "adaptive",
+    "linear_solver": "mumps",
+    "max_wall_time": 60.0,
+}
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,9 @@ def point_function(task: Task) -> ca.Function:
         ahead = slope_y * velocity[1] + slope_z * velocity[2]
         centripetal = (ahead**2 + velocity[1] ** 2 + velocity[2] ** 2) / dX[i]
         ddq = acceleration[0] + slope_y * acceleration[1] + slope_z * acceleration[2] + centripetal
-        net = task.gear * torque[i] - friction_force(robot, i, velocity[0] + ahead) - robot.cart_masses[i] * ddq
+        net = (
+            task.gear * torque[i] - friction_force(robot, i, velocity[0] + ahead) - robot.cart_masses[i] * ddq
+        )
         balance -= net * ca.vertcat(1, slope_y, slope_z)
         lengths.append(dX[i] ** 2 + dY**2 + dZ**2 - robot.lengths[i] ** 2)
     residual = ca.vertcat(*lengths, balance)
@@ -101,7 +111,12 @@ def solve(task: Task, elements: int = 50, points: int = 3) -> Outcome:
         position, speed, acceleration = (float(value) for value in trapezoid(np.array(fraction)))
         tool = np.array(task.start) + position * (np.array(task.end) - np.array(task.start))
         span, T = last - first, task.guessed_time
-        return first + position * span, speed * span / T, acceleration * span / T**2, reaches(task.robot, tool[None])[0]
+        return (
+            first + position * span,
+            speed * span / T,
+            acceleration * span / T**2,
+            reaches(task.robot, tool[None])[0],
+        )
 
     unknowns, g, energy = Unknowns(), [], ca.SX(0)
     final_time = unknowns.add(np.array(task.guessed_time), 0.1, 5.0)
@@ -136,5 +151,12 @@ def solve(task: Task, elements: int = 50, points: int = 3) -> Outcome:
     solved = time.perf_counter()
     used = float(ca.Function("energy", [w], [energy])(found["x"]))
     stats = solver.stats()
-    return Outcome(float(found["x"][0]), used, stats["iter_count"], built - began, solved - built,
-                   stats["success"], w.numel())
+    return Outcome(
+        float(found["x"][0]),
+        used,
+        stats["iter_count"],
+        built - began,
+        solved - built,
+        stats["success"],
+        w.numel(),
+    )

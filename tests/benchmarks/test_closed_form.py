@@ -19,7 +19,7 @@ ROBOTS = {
 
 
 def lagrange(robot: cf.ThreeLink, T, dT, f):
-    """(T'', q'') and (q, q') from kinetic and potential energy in the six coordinates (T, q) and three multipliers."""
+    """(T'', q'', q, q') from the energies in the six coordinates (T, q), and three multipliers."""
     x, v, net = ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("net", 3)
     carts = [ca.vertcat(x[3 + i], 0, 0) + ca.DM(robot.offsets[i]) for i in range(3)]
     constraint = ca.vertcat(*(ca.sumsqr(x[:3] - carts[i]) - robot.lengths[i] ** 2 for i in range(3)))
@@ -52,8 +52,11 @@ def states(n: int):
     """Random tool positions in the workspace, velocities and forces, fixed seed."""
     random = np.random.default_rng(2012)
     for _ in range(n):
-        yield (random.uniform([0.0, 2.5, -1.1], [1.8, 3.5, -0.2]), random.uniform(-2, 2, 3),
-               random.uniform(-1200, 1200, 3))
+        yield (
+            random.uniform([0.0, 2.5, -1.1], [1.8, 3.5, -0.2]),
+            random.uniform(-2, 2, 3),
+            random.uniform(-1200, 1200, 3),
+        )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -73,7 +76,9 @@ def test_forward_and_inverse_dynamics_are_lagranges_equations(name):
 def test_matrices_and_kinematics_satisfy_the_printed_relations():
     robot = cf.GT_A_HEAVY_LINKS
     T, dT, q, dq, ddq = (ca.SX.sym(n, 3) for n in ("T", "dT", "q", "dq", "ddq"))
-    kinematics = ca.Function("kinematics", [T], [cf.inverse_kinematics(robot, T), cf.velocity_jacobian(robot, T)])
+    kinematics = ca.Function(
+        "kinematics", [T], [cf.inverse_kinematics(robot, T), cf.velocity_jacobian(robot, T)]
+    )
     tool_of = ca.Function("tool", [q], [cf.forward_kinematics(robot, q)])
     relation = ca.Function("relation", [T, dT, dq, ddq], [cf.accelerations(robot, T, dT, dq, ddq)])
     matrices = ca.Function("matrices", [T], [cf.mass_matrix_tool(robot, T), cf.mass_matrix_carts(robot, T)])
