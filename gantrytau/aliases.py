@@ -31,7 +31,8 @@ class Alias:
 class Reduced:
     """Equations that are left, and for every variable what it is an alias of.
 
-    residuals: one scalar SX per remaining equation, in symbols of `chains`; equations: where they come from.
+    residuals: one scalar SX per remaining equation, in symbols of `chains`; equations: where they come from;
+    redundant: equations that turned out to say 0 == 0.
     """
 
     residuals: tuple[ca.SX, ...]
@@ -40,6 +41,7 @@ class Reduced:
     unknowns: tuple[str, ...]
     known: frozenset[str]
     chains: "Chains"
+    redundant: tuple[Equation, ...] = ()
 
 
 class Chains:
@@ -107,6 +109,9 @@ class _Elimination:
                 remaining, self._substitute([self.residuals[i] for i in remaining]), strict=True
             ):
                 self.residuals[i] = new
+        # what became 0 == 0 repeats other equations: two ends that both say that they carry no torque
+        redundant = [i for i in remaining if self.residuals[i].is_zero()]
+        remaining = [i for i in remaining if i not in redundant]
         names = [n for v in self.flat.variables for n in v.elements]
         aliases = {n: self.resolve(n, 0) for n in names}
         used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
@@ -118,6 +123,7 @@ class _Elimination:
             unknowns,
             self.known,
             self.chains,
+            tuple(self.flat.equations[i] for i in redundant),
         )
 
     def resolve(self, name: str, order: int) -> Alias:

@@ -1,6 +1,6 @@
 """Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -21,18 +21,28 @@ def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Functi
     given, find = names(given), names(find)
     dae = _with_parameters(dae, given)
     columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
-    known = _known(dae, given, columns)
-    targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
-    blocks = _blocks(dae, known, targets, find)
-    if blocks is None:
-        inputs = _sufficient_inputs(dae, known, targets)
-        dae = _flipped(dae, given, find)
+    inputs: list[str] | None = None
+    known, targets = {}, []
+    for dae in _translations(dae, given, find):
         known = _known(dae, given, columns)
         targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
         blocks = _blocks(dae, known, targets, find)
-        if blocks is None:
-            raise StructureError(_undetermined(dae, known, targets, inputs, given, find))
-    return _compose(dae, blocks, known, targets, given, find, columns)
+        if blocks is not None:
+            return _compose(dae, blocks, known, targets, given, find, columns)
+        inputs = _sufficient_inputs(dae, known, targets) if inputs is None else inputs
+    raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
+
+
+def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iterator["Dae"]:
+    """The model as it is translated, then with the wanted derivatives, then with other inputs."""
+    yield dae
+    orders = dae.indexed.orders
+    leaves = [leaf.name() for name in find for n in dae.expand(name) for leaf in ca.symvar(dae.expression(n))]
+    if any(split_derivative(n)[1] > orders.get(split_derivative(n)[0], 99) for n in leaves):
+        chosen = dict(find=find, states=dae.settings["states"], start=dae.start)
+        parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
+        yield translate_flat(dae.flat, given=(*dae.known, *parameters), **chosen)
+    yield _flipped(dae, given, find)
 
 
 def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":

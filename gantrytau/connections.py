@@ -5,6 +5,7 @@ from typing import Any
 
 import casadi as ca
 
+from gantrytau.declarations import Quantity
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.instantiation import Instance
 from gantrytau.model import Connector
@@ -36,18 +37,30 @@ def connection_equations(instance: Instance, connections: Iterable[tuple[str, Co
         if not isinstance(connection.a, Connector):
             equations += equality(connection.a == connection.b, where, "connection", number)
             continue
-        faces: list[Face] = []
-        for end in (connection.a, connection.b):
-            path = _path(instance, end, where)
-            faces.append((path, -1 if owners[path] == where else 1))
-        _check_same(connection, faces, where)
-        parent[find(faces[0])] = find(faces[1])
+        for pair in _nested(connection):
+            faces: list[Face] = []
+            for end in (pair.a, pair.b):
+                path = _path(instance, end, where)
+                faces.append((path, -1 if owners[path] == where else 1))
+            _check_same(pair, faces, where)
+            parent[find(faces[0])] = find(faces[1])
     sets: dict[Face, list[Face]] = {}
     for face in parent:
         sets.setdefault(find(face), []).append(face)
     for faces in sets.values():
         equations += _set_equations([(members[path], path, sign) for path, sign in faces])
     return equations
+
+
+def _nested(connection: Connection) -> Iterable[Connection]:
+    """The connection and those of the connectors inside the two."""
+    yield connection
+    for name in type(connection.a).members():
+        ends = [getattr(end, name, None) for end in (connection.a, connection.b)]
+        inside = [end if isinstance(end, tuple) else (end,) for end in ends]
+        for a, b in zip(*inside, strict=False):
+            if isinstance(a, Connector) and isinstance(b, Connector):
+                yield from _nested(Connection(a, b))
 
 
 def _path(instance: Instance, end: Any, where: str) -> str:
@@ -78,7 +91,8 @@ def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
     first, first_path, _ = members[0]
     where = " - ".join(path for _, path, _ in members)
     equations: list[Equation] = []
-    for number, (name, declaration) in enumerate(type(first).members().items(), start=1):
+    quantities = ((n, m) for n, m in type(first).members().items() if isinstance(m, Quantity))
+    for number, (name, declaration) in enumerate(quantities, start=1):
         columns = [scalars(getattr(connector, name)) for connector, _, _ in members]
         signs = [sign for _, _, sign in members]
         for row in range(len(columns[0])):

@@ -114,7 +114,7 @@ class Dae:
             aliases=len(self.flat.equations) - len(self.reduced.residuals),
             differentiated=sum(1 for c in self.indexed.counts if c),
             mobility=positions,
-            redundant=(),
+            redundant=tuple(e.name for e in self.reduced.redundant),
             states=self.states,
             condition=self.choice.condition,
             blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in self.blocks),

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.connections import connection_equations
 from gantrytau.declarations import Parameter, evaluate
@@ -169,8 +170,8 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
     try:
         value = evaluate(value, leaf.scope)
-        found = ca.densify(ca.SX(ca.vertcat(*value) if isinstance(value, list) else value))
-    except (RuntimeError, TypeError, NotImplementedError, AttributeError) as error:
+        found = ca.densify(ca.SX(_array(value)))
+    except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
         why = "" if isinstance(error, NotImplementedError) else f": {_words(error)}"
         raise ModelError(
             f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
@@ -188,6 +189,15 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     if bad:
         raise ModelError(f"{placed.name}: {attribute} is {bad[0]}, expected a finite number")
     return tuple(elements)
+
+
+def _array(value: Any) -> Any:
+    """A list of numbers, of rows of numbers, or of symbols as one array."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    if any(isinstance(item, (ca.SX, ca.DM)) for item in value):
+        return ca.vertcat(*value)
+    return ca.DM(np.asarray(value, dtype=float))
 
 
 def _allowed(value: float, attribute: str) -> bool:

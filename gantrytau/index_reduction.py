@@ -74,8 +74,9 @@ def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel)
     if matched is None:
         raise StructureError(unbalanced(reduced, signature, flat))
     counts = np.zeros(n, dtype=int)
+    mentioned = _mentioned(reduced, flat)
     while True:
-        tops = np.zeros(n, dtype=int)
+        tops = mentioned.copy()
         for i, row in enumerate(signature):
             for j, order in row.items():
                 tops[j] = max(tops[j], order + counts[i])
@@ -83,6 +84,18 @@ def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel)
         if np.array_equal(new, counts):
             return counts, tops
         counts = new
+
+
+def _mentioned(reduced: Reduced, flat: FlatModel) -> np.ndarray:
+    """For each unknown the highest derivative that the model or its user names, by whatever alias."""
+    place = {name: j for j, name in enumerate(reduced.unknowns)}
+    found = np.zeros(len(place), dtype=int)
+    for name in (*reduced.aliases, *flat.derivatives):
+        base, order = split_derivative(name)
+        alias = reduced.aliases[base]
+        if alias.root in place:
+            found[place[alias.root]] = max(found[place[alias.root]], alias.order + order)
+    return found
 
 
 def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
@@ -111,7 +124,10 @@ def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatMode
     of_column = {int(j): i for i, j in enumerate(of_row) if j >= 0}
     free = [j for j in range(len(reduced.unknowns)) if j not in of_column]
     extra = [i for i in range(len(signature)) if of_row[i] < 0]
-    n, m = sum(len(v.elements) for v in flat.variables) - len(reduced.known), len(flat.equations)
+    n, m = (
+        sum(len(v.elements) for v in flat.variables) - len(reduced.known),
+        len(flat.equations) - len(reduced.redundant),
+    )
     text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
     if free:
         reached = {reduced.unknowns[j]: j in free for j in _reach_columns(free, signature, of_column)}

@@ -193,7 +193,7 @@ def given_scalars(dae: Dae, given: Mapping[str, Any]) -> dict[str, float]:
 
 def named_values(dae: Dae, values: Mapping[str, float]) -> dict[str, Any]:
     """Every variable, parameter and derivative by name, scalars as float and vectors as arrays."""
-    chains = {n: top for n, top in dae.indexed.orders.items()}
+    chains = dae.indexed.orders
     names: list[str] = []
     groups: list[tuple[str, tuple[int, ...], list[str]]] = []
     for variable in dae.flat.variables:

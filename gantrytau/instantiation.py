@@ -95,7 +95,8 @@ class _Builder:
             if is_setting(getattr(cls, name), name):
                 instance.__dict__[name] = _setting(modifications[name], f"{path}.{name}")
         if isinstance(instance, Connector):
-            self.connectors.append((path, instance, self.paths[id(around[-1])] if around else ""))
+            owner = next((one for one in reversed(around) if not isinstance(one, Connector)), None)
+            self.connectors.append((path, instance, "" if owner is None else self.paths[id(owner)]))
         else:
             self.components.append((path, instance))
         members = cls.members()

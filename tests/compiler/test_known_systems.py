@@ -22,6 +22,7 @@ from gantrytau import (
     translate,
 )
 from gantrytau.mechanics import rotational, translational
+from gantrytau.mechanics.multibody import PointMass, Prismatic, SphericalSpherical, World
 from gantrytau_models.pendulum import Pendulum
 
 
@@ -399,6 +400,125 @@ def test_planar_four_bar_from_rods():
     assert at["der(der(p.joint.r))"] == pytest.approx(
         [swing * np.cos(angle), swing * np.sin(angle)], rel=1e-11
     )
+
+
+def test_speeds_and_accelerations_of_a_given_motion():
+    class Cam(Model):
+        s, v, a = Real(unit="m"), Real(unit="m/s"), Real(unit="m/s2")
+        push = Real(unit="N")
+
+        def equations(self):
+            yield self.s == sin(time)
+            yield self.v == der(self.s)
+            yield self.a == der(self.v)
+            yield self.push == 2.0 * self.a
+
+    dae = translate(Cam(), units=False)
+    assert dae.states == ()
+    at = dae.evaluate({"time": 0.3})
+    assert at["v"] == pytest.approx(np.cos(0.3), rel=1e-14)
+    assert at["push"] == pytest.approx(-2 * np.sin(0.3), rel=1e-14)
+    assert float(dae.function(["time"], ["push"])(0.3)) == pytest.approx(-2 * np.sin(0.3), rel=1e-14)
+
+
+class Growth(Model):
+    u = Input(unit="1")
+    x = Real(unit="1")
+
+    def equations(self):
+        yield der(self.x) == self.u * self.x
+
+
+@pytest.mark.parametrize("wanted", [(), ("der(der(x))",)])
+def test_higher_derivatives_of_a_state(wanted):
+    dae = translate(Growth(), units=False, find=wanted)
+    second = dae.function(["x", "u", "der(u)"], ["der(der(x))"])
+    assert float(second(2.0, 3.0, 5.0)) == 5.0 * 2.0 + 3.0 * 3.0 * 2.0
+
+
+def test_a_ball_on_a_rod_swings_in_space():
+    class Ball(Model):
+        world = World()
+        rod = SphericalSpherical(L=2.0)
+        body = PointMass(m=3.0, frame_a=dict(r=dict(start=[1.0, 1.0, -1.0])))
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.rod.frame_a)
+            yield connect(self.rod.frame_b, self.body.frame_a)
+
+    dae = translate(Ball())
+    assert len(dae.states) == 4
+    # both the rod and the ball say that the ball joint carries no torque
+    assert len(dae.diagnosis.redundant) == 3
+    at = dae.evaluate(
+        {"body.frame_a.r[1]": 0.2, "body.frame_a.r[0]": 0.5, "body.v[0]": 0.3, "body.v[1]": -0.2}
+    )
+    r, v, a = at["body.frame_a.r"], at["body.v"], at["der(body.v)"]
+    pull = (9.81 * r[2] - v @ v) / 4.0  # from r . a = -v . v
+    np.testing.assert_allclose(a, pull * r - [0, 0, 9.81], atol=1e-13)
+    assert at["rod.tension"] == pytest.approx(-3.0 * pull, rel=1e-13)
+
+
+def test_a_mass_on_an_inclined_rail():
+    class Incline(Model):
+        world, rail, body, motor = (
+            World(),
+            Prismatic(n=[1.0, 0.0, -1.0]),
+            PointMass(m=2.0),
+            translational.Force(),
+        )
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.rail.frame_a)
+            yield connect(self.rail.frame_b, self.body.frame_a)
+            yield connect(self.motor.flange, self.rail.axis)
+
+    at = translate(Incline()).evaluate({"rail.s": 1.0, "motor.f": 4.0})
+    assert at["der(rail.v)"] == pytest.approx(9.81 / np.sqrt(2) + 2.0, rel=1e-14)
+    assert at["body.frame_a.r"] == pytest.approx(np.array([1.0, 0.0, -1.0]) / np.sqrt(2), rel=1e-14)
+
+
+def test_connectors_inside_connectors():
+    class Cable(Connector):
+        line = Array(Pin, 2)
+
+    class Left(Model):
+        cable = Cable()
+
+        def equations(self):
+            yield self.cable.line[0].u == 1.0
+            yield self.cable.line[1].i == 0.5
+
+    class Right(Model):
+        cable = Cable()
+
+        def equations(self):
+            yield self.cable.line[1].u == 3.0
+            yield self.cable.line[0].i == 0.25
+
+    class Both(Model):
+        left, right = Left(), Right()
+
+        def equations(self):
+            yield connect(self.left.cable, self.right.cable)
+
+    at = translate(Both()).evaluate({})
+    names = ("right.cable.line[0].u", "left.cable.line[1].u", "left.cable.line[0].i", "right.cable.line[1].i")
+    assert [at[n] for n in names] == [1.0, 3.0, -0.25, -0.5]
+
+
+def test_matrices():
+    class Mapped(Model):
+        A = Parameter([[1.0, 2.0], [3.0, 4.0]], unit="1")
+        X, y, u = Real((2, 2), unit="1"), Real(2, unit="1"), Input(2, unit="1")
+
+        def equations(self):
+            yield self.X == self.A @ self.A
+            yield self.y == self.A.T @ self.u
+
+    at = translate(Mapped()).evaluate({"u": [1.0, 2.0]})
+    np.testing.assert_array_equal(at["X"], [[7.0, 10.0], [15.0, 22.0]])
+    np.testing.assert_array_equal(at["y"], [7.0, 10.0])
 
 
 def test_algebraic_loops():
