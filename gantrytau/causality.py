@@ -23,7 +23,8 @@ def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Functi
     columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
     inputs: list[str] | None = None
     known, targets = {}, []
-    for dae in _translations(dae, given, find):
+    for translated in _translations(dae, given, find):
+        dae = translated
         known = _known(dae, given, columns)
         targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
         blocks = _blocks(dae, known, targets, find)
@@ -39,9 +40,9 @@ def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iter
     orders = dae.indexed.orders
     leaves = [leaf.name() for name in find for n in dae.expand(name) for leaf in ca.symvar(dae.expression(n))]
     if any(split_derivative(n)[1] > orders.get(split_derivative(n)[0], 99) for n in leaves):
-        chosen = dict(find=find, states=dae.settings["states"], start=dae.start)
         parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
-        yield translate_flat(dae.flat, given=(*dae.known, *parameters), **chosen)
+        known, states = (*dae.known, *parameters), dae.settings["states"]
+        yield translate_flat(dae.flat, given=known, find=find, states=states, start=dae.start)
     yield _flipped(dae, given, find)
 
 

@@ -68,7 +68,8 @@ def _path(instance: Instance, end: Any, where: str) -> str:
         return instance.path(end)
     except KeyError:
         raise ModelError(
-            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of this model, "
+            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of "
+            "this model, "
             "expected a connector reached through self"
         ) from None
 
@@ -82,13 +83,14 @@ def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
         ]
         missing = sorted(a ^ b)[0]
         raise ModelError(
-            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: '{missing}' is in "
+            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: "
+            f"'{missing}' is in "
             f"one of them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
         )
 
 
 def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
-    first, first_path, _ = members[0]
+    first = members[0][0]
     where = " - ".join(path for _, path, _ in members)
     equations: list[Equation] = []
     quantities = ((n, m) for n, m in type(first).members().items() if isinstance(m, Quantity))

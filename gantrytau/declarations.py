@@ -164,8 +164,10 @@ class Quantity(Formula):
             found = self
         if found is self or isinstance(found, Quantity):
             raise ModelError(
-                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which is not a "
-                f"member of {type(scope).__name__}; refer to a parameter of the class that holds the expression"
+                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which "
+                "is not a "
+                f"member of {type(scope).__name__}; refer to a parameter of the class that holds the "
+                "expression"
             )
         return found
 
@@ -241,7 +243,7 @@ class Parameter(Quantity):
 
 
 class Array(Generic[Component]):
-    """Several components of one class: `Array(Cart, 3, m=2.0)` or `Array(Cart, [dict(m=1.0), dict(m=2.0)])`."""
+    """Several components of a class: `Array(Cart, 3, m=2.0)`, `Array(Cart, [dict(m=1.0), dict(m=2.0)])`."""
 
     def __init__(self, component: Callable[..., Component], count: int | list[Any], **modifications: Any):
         if isinstance(count, int):

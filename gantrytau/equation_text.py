@@ -22,7 +22,8 @@ def block_text(dae: "Dae") -> str:
             lines.append(f"[{number}] {block.unknowns[0]} = {_text(value)}    # {block.kind}, from {origin}")
             continue
         lines.append(
-            f"[{number}] {block.kind} block of {len(block.unknowns)} unknowns, torn to {len(block.tears)}    # from {origin}"
+            f"[{number}] {block.kind} block of {len(block.unknowns)} unknowns, torn to "
+            f"{len(block.tears)}    # from {origin}"
         )
         lines += [
             f"      0 = {_text(r)}    # determines {y}"

@@ -26,7 +26,7 @@ HINTS = {
 
 
 def flatten(model: Model) -> FlatModel:
-    """The model written out as variables, parameters and equations; raises ModelError with the path of a fault."""
+    """The model written out as variables, parameters and equations; ModelError with the path of a fault."""
     return write_out(instantiate(model))
 
 
@@ -113,7 +113,7 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
 
 def _words(error: Exception) -> str:
     """What a Python or CasADi error says, in one line, with a remedy where one is known."""
-    if isinstance(error, AttributeError) and isinstance(error.obj, Declared):
+    if isinstance(error, AttributeError) and isinstance(error.obj, Declared) and error.name:
         names = [n for n in dir(error.obj) if not n.startswith("_")]
         return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(error.name, names)}"
     lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
@@ -130,7 +130,8 @@ def _refuse_nan(equations: Iterable[Equation]) -> None:
         for equation in equations:
             if re.search(r"\bnan\b", equation.text):
                 raise ModelError(
-                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and finite numbers; "
+                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and "
+                    "finite numbers; "
                     "functions of the module math do not work on symbols, use those of gantrytau or casadi"
                 )
 
@@ -165,7 +166,7 @@ def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str
 
 
 def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
-    """An attribute of a quantity as one SX per scalar; a scalar stands for all elements of a start or limit."""
+    """An attribute as one SX per scalar of a quantity; one number may stand for all starts or limits."""
     leaf: Leaf = placed.attributes[attribute]
     value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
     try:
@@ -263,5 +264,5 @@ def _hints(instance: Instance) -> dict[str, str]:
         if component is not None and type(component).failure_hint is not Model.failure_hint:
             words = component.failure_hint(placed.name.rsplit(".", 1)[-1])
             if words:
-                hints.update(dict.fromkeys(placed.elements, words))
+                hints |= dict.fromkeys(placed.elements, str(words))
     return hints

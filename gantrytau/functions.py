@@ -60,7 +60,7 @@ def between(lower: Any, expression: Any, upper: Any) -> Between:
 
 
 def if_else(condition: Any, then: Any, otherwise: Any) -> Any:
-    """`then` where `condition` holds, else `otherwise`; both are evaluated. Conditions: `<`, `>=`, `between`."""
+    """`then` where `condition` (`<`, `>=`, `between`) holds, else `otherwise`; both are evaluated."""
     if any(isinstance(argument, Formula) for argument in (condition, then, otherwise)):
         return Formula(if_else, condition, then, otherwise)
     if isinstance(condition, Between):

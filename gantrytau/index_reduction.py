@@ -162,7 +162,8 @@ def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: li
         lines.append(f"{reduced.equations[i].name} `{reduced.equations[i].text[:80]}`{found}")
     more = f"; and {len(rows) - 4} others" if len(rows) > 4 else ""
     return (
-        f" Overdetermined by {count}: these equations contradict or repeat each other: {'; '.join(lines)}{more}. "
+        f" Overdetermined by {count}: these equations contradict or repeat each other: "
+        f"{'; '.join(lines)}{more}. "
         "Remove one of them, or let one more variable be unknown."
     )
 

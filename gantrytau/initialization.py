@@ -50,7 +50,8 @@ def _place(variable: FlatVariable, name: str, number: float, table, reduced, val
     value = (number - float(table.number(alias.offset)[0])) / alias.factor
     if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
         raise InitializationError(
-            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which it is an alias; "
+            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
+            "it is an alias; "
             "release one with Start(...) instead of Fixed(...)"
         )
     rank = (not variable.fixed, name.count("."))

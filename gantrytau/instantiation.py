@@ -53,7 +53,7 @@ class Instance:
 
 
 def instantiate(model: Model) -> Instance:
-    """A fresh instance of `model` with symbols of its own. Raises ModelError with the path of what is wrong."""
+    """A fresh instance of `model` with symbols of its own; ModelError with the path of what is wrong."""
     if isinstance(model, type) and issubclass(model, Model):
         model = model()
     if not isinstance(model, Model):
@@ -186,7 +186,8 @@ class _Builder:
                 place = self.paths[id(instance)] or type(instance).__name__
                 kind = wanted.component.__name__
                 raise ModelError(
-                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, expected one; "
+                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, "
+                    "expected one; "
                     f"declare `{kind.lower()} = {kind}()` in the body of {type(around[0]).__name__}"
                 )
 

@@ -5,7 +5,7 @@ An instance remembers its modifications and nothing else; `gantrytau.instantiati
 
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 from gantrytau.declarations import Array, Quantity
 from gantrytau.errors import ModelError, did_you_mean
@@ -110,7 +110,7 @@ class Outer:
 
 
 def outer(component: type[Any]) -> Any:
-    """Declares a reference to the nearest enclosing `component` (Modelica's `outer`): `world = outer(World)`."""
+    """A reference to the nearest enclosing `component`, as Modelica's `outer`: `world = outer(World)`."""
     return Outer(component)
 
 
@@ -132,7 +132,7 @@ def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _elementwise(value: Any) -> bool:
+def _elementwise(value: Any) -> TypeGuard[list[Any]]:
     return isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value)
 
 

@@ -42,7 +42,7 @@ class ParameterTable:
 
 
 def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
-    """The model with other numbers for some parameters; raises ModelError for unknown names or wrong shapes."""
+    """The model with other numbers for some parameters; ModelError for unknown names or wrong shapes."""
     if not values:
         return flat
     remaining = dict(values)
@@ -82,7 +82,8 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
         foreign = [other for other in others if other not in bindings]
         if foreign:
             raise ModelError(
-                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a parameter is "
+                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a "
+                "parameter is "
                 "constant, declare it Real if it is not"
             )
     order = _sorted(needs)

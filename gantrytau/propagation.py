@@ -125,10 +125,12 @@ def _check_closes(
         pairs = zip(scalars(getattr(nodes[edge.a], name)), scalars(getattr(nodes[edge.b], name)), strict=True)
         for a, b in pairs:
             left, right = (instance.symbols.find(x) for x in (a, b))
-            assert left is not None and right is not None
+            assert left is not None
+            assert right is not None
             if not ca.is_equal(values[left.name], values[right.name], 20):
                 raise StructureError(
-                    f"connect({edge.a}, {edge.b}) closes a loop of rigid parts and joints: {left.name} is already "
+                    f"connect({edge.a}, {edge.b}) closes a loop of rigid parts and joints: "
+                    f"{left.name} is already "
                     f"{values[left.name]} on one side and {values[right.name]} on the other; "
                     "release one rotation of the loop with a joint that carries no torque"
                 )

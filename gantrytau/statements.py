@@ -74,14 +74,15 @@ def connect(a: Any, b: Any) -> Connection:
     """
     if not all(isinstance(end, Connector) for end in (a, b)) and any(isinstance(x, Declared) for x in (a, b)):
         raise ModelError(
-            f"connect({_kind(a)}, {_kind(b)}): expected two connectors; name those of the components, such as "
+            f"connect({_kind(a)}, {_kind(b)}): expected two connectors; name those of the components, "
+            "such as "
             "connect(mass.flange, spring.flange_a)"
         )
     return Connection(a, b)
 
 
 def branch(a: Connector, b: Connector, *, forward: dict[str, Any], backward: dict[str, Any]) -> Branch:
-    """State how propagated quantities of `b` follow from those of `a` (forward) and the reverse (backward)."""
+    """State how propagated quantities of `b` follow from those of `a` (forward), and the reverse."""
     return Branch(a, b, forward, backward)
 
 
@@ -131,6 +132,7 @@ def _check_shapes(rows: list[Equation], place: str) -> None:
         nodes = [getattr(row, side) for row in rows]
         if not nodes[0].is_constant() and len({node.element_hash() for node in nodes}) == 1:
             raise ModelError(
-                f"{place}: found shapes ({len(rows)},) and () in '{rows[0].text}' and the rows below, expected "
+                f"{place}: found shapes ({len(rows)},) and () in '{rows[0].text}' and the rows below, "
+                "expected "
                 "the same shape on both sides; index the vector, or repeat the scalar in separate equations"
             )

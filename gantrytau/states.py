@@ -64,7 +64,8 @@ def choose_states(
     if missing:
         raise StructureError(
             f"{title}: {missing[0]} cannot be a state together with the others asked for; the states of this "
-            f"model can be {', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer"
+            f"model can be {', '.join(states)} ({len(states)} in all). Name other variables in "
+            "states=, or fewer"
         )
     return StateChoice(states, tuple(sorted(dummies)), condition)
 
@@ -105,7 +106,9 @@ def _singular(indexed, rows, matrix, title) -> str:
     u, values, _ = np.linalg.svd(matrix)
     weak = np.argsort(-np.abs(u[:, -1]))[:4]
     return (
-        f"{title}: constraints depend on each other at the start (smallest singular value {values[-1]:.2g}): they "
-        f"include constraint{'s' if len(weak) > 1 else ''} number {', '.join(str(rows[i]) for i in sorted(weak))}. "
+        f"{title}: constraints depend on each other at the start (smallest singular value "
+        f"{values[-1]:.2g}): they "
+        f"include constraint{'s' if len(weak) > 1 else ''} number "
+        f"{', '.join(str(rows[i]) for i in sorted(weak))}. "
         "Start from another pose, or remove the redundant constraint"
     )

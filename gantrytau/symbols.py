@@ -114,6 +114,5 @@ def der(expression: Any) -> ca.SX:
 
 def scalars(expression: Iterable[Any] | Any) -> list[ca.SX]:
     """The elements of an SX (or of numbers), column after column."""
-    if not isinstance(expression, ca.SX):
-        expression = ca.SX(expression)
-    return (expression if expression.is_dense() else ca.densify(expression)).elements()
+    found: Any = expression if isinstance(expression, ca.SX) else ca.SX(expression)
+    return (found if found.is_dense() else ca.densify(found)).elements()

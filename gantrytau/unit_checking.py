@@ -143,7 +143,8 @@ def _unit(
         fault = None
         if not _agree(first, second):
             fault = (
-                f"units disagree: `{words[0][:60]}` is in {_text(first)}, `{words[1][:60]}` in {_text(second)}; "
+                f"units disagree: `{words[0][:60]}` is in {_text(first)}, `{words[1][:60]}` in "
+                f"{_text(second)}; "
                 "both must be the same to be added or compared"
             )
         merged = next((u for u in units if not isinstance(u, str)), ANY if ANY in units else NUMBER)
