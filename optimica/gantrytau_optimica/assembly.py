@@ -92,7 +92,7 @@ def assemble(
     )
     # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
     return Program(
-        nlp=ca.Function("nlp", [w, p], [f, g], ["x", "p"], ["f", "g"]),
+        nlp=ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"]),
         grad_f=ca.Function(
             "nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)], ["x", "p"], ["f", "grad_f_x"]
         ),

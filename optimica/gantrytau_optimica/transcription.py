@@ -88,9 +88,9 @@ class Transcription:
             raise ValueError(f"first guess: final time {final:.6g} s is not after start time {start:.6g} s")
         for i, signal in enumerate(problem.signals):
             mine = np.flatnonzero(layout.owner == i)
-            function: Any = given.pop(signal.name, signal.guess)
+            function = given.pop(signal.name, signal.guess)
             times = start + layout.moment[mine] * (final - start)
-            values[mine] = function(times) if callable(function) else function
+            values[mine] = np.asarray(function(times) if callable(function) else function, dtype=float)
         if given:
             raise ValueError(
                 f"first guess: '{next(iter(given))}' is neither a signal nor a free number of the problem"
@@ -120,7 +120,7 @@ def transcribe(
     """
     began = time.perf_counter()
     layout = lay_out(problem, _borders(mesh), scheme(scheme_name, points), controls or {})
-    nominal = np.array([x.nominal for x in (*problem.signals, *problem.free)])
+    nominal = np.array([float(x.nominal) for x in (*problem.signals, *problem.free)])
     nf = len(problem.free)
     owner = layout.owner.copy()
     owner[:nf] = len(problem.signals) + np.arange(nf)
