@@ -1,11 +1,10 @@
-"""Pairing of equations with unknowns, and the order in which they can be solved.
-
-SciPy is imported inside the functions: it takes longer to load than the rest of the package.
-"""
+"""Pairing of equations with unknowns, and the order in which they can be solved."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching, min_weight_full_bipartite_matching
 
 
 def best_matching(signature: Sequence[Mapping[int, int]]) -> list[int] | None:
@@ -13,9 +12,6 @@ def best_matching(signature: Sequence[Mapping[int, int]]) -> list[int] | None:
 
     signature: per row a mapping from column to weight (>= 0).
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
-
     n = len(signature)
     if n == 0:
         return []
@@ -36,9 +32,6 @@ def best_matching(signature: Sequence[Mapping[int, int]]) -> list[int] | None:
 
 def largest_matching(rows: Sequence[Iterable[int]], width: int) -> list[int]:
     """For each row the column it is paired with in a largest pairing, or -1."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
     pairs = [(i, j) for i, row in enumerate(rows) for j in row]
     if not pairs:
         return [-1] * len(rows)
