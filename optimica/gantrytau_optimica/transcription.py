@@ -5,7 +5,7 @@ quadrature weights b, and row by row in the program:
 
     sum_k D_jk x_k - d H ode(t_j, x_j, z_j, u_j) = 0      divided by the state's nominal value
     residuals(t_j, x_j, z_j, u_j) = 0
-    lower <= path limits(t_j, x_j, z_j, u_j) <= upper     those of a bare signal are bounds of its variables
+    lower <= path limits(t_j, x_j, z_j, u_j) <= upper     those of one signal times a number are bounds
     x(next element) - sum_k e_k x_k = 0                   Gauss only; with Radau the last point is the next
     start |next value - value| <= max_step                      of a piecewise input
     boundary conditions
@@ -120,24 +120,8 @@ def transcribe(
     """
     began = time.perf_counter()
     layout = lay_out(problem, _borders(mesh), scheme(scheme_name, points), controls or {})
-    nominal = np.array([float(x.nominal) for x in (*problem.signals, *problem.free)])
+    nominal, draft, paths = _limited_variables(problem, layout)
     nf = len(problem.free)
-    owner = layout.owner.copy()
-    owner[:nf] = len(problem.signals) + np.arange(nf)
-    nominal = nominal[owner]
-
-    draft = BoundsDraft(layout.size)
-    for i, x in enumerate((*problem.signals, *problem.free)):
-        draft.limit(np.flatnonzero(owner == i), x.min, x.max)
-    bare = {signal.symbol.element_hash(): i for i, signal in enumerate(problem.signals)}
-    paths = []
-    for row in rows_of(problem.path_limits, problem.parameters):
-        i = bare.get(row.expression.element_hash()) if row.expression.is_symbolic() else None
-        if i is None:
-            paths.append(row)
-        else:
-            draft.limit(np.flatnonzero(owner == i), row.lower, row.upper)
-
     rows = _Rows(problem, layout, paths, rows_of(problem.boundary, problem.parameters))
     located_free = np.array([float((located or {}).get(x.name, x.guess)) for x in problem.free])
     places = [
@@ -205,6 +189,42 @@ def _parameters(problem: ControlProblem) -> ca.SX:
 
 def _horizon(problem: ControlProblem) -> ca.SX:
     return ca.SX(problem.final_time) - problem.start_time
+
+
+def _limited_variables(problem: ControlProblem, layout: Layout) -> tuple[Array, BoundsDraft, list[Row]]:
+    """Nominal values and bounds of the variables, and the path limits that are no bounds of one signal."""
+    nominal = np.array([float(x.nominal) for x in (*problem.signals, *problem.free)])
+    nf = len(problem.free)
+    owner = layout.owner.copy()
+    owner[:nf] = len(problem.signals) + np.arange(nf)
+    nominal = nominal[owner]
+
+    draft = BoundsDraft(layout.size)
+    for i, x in enumerate((*problem.signals, *problem.free)):
+        draft.limit(np.flatnonzero(owner == i), x.min, x.max)
+    paths = []
+    for row in rows_of(problem.path_limits, problem.parameters):
+        one = _one_signal(row.expression, problem)
+        if one is None:
+            paths.append(row)
+        else:
+            i, slope, offset = one
+            ends = ((row.lower - offset) / slope, (row.upper - offset) / slope)
+            draft.limit(np.flatnonzero(owner == i), *(ends if slope > 0 else ends[::-1]))
+    return nominal, draft, paths
+
+
+def _one_signal(expression: ca.SX, problem: ControlProblem) -> tuple[int, float, float] | None:
+    """(number, slope, offset) where an expression is slope * signal + offset, else None."""
+    leaves = ca.symvar(expression)
+    numbers = {signal.symbol.element_hash(): i for i, signal in enumerate(problem.signals)}
+    if len(leaves) != 1 or leaves[0].element_hash() not in numbers:
+        return None
+    slope = ca.jacobian(expression, leaves[0])
+    if not slope.is_constant() or float(slope) == 0.0:
+        return None
+    offset = float(ca.substitute(expression, leaves[0], 0))
+    return numbers[leaves[0].element_hash()], float(slope), offset
 
 
 def _gather(layout: Layout, free: int) -> sparse.csr_matrix:

@@ -1,11 +1,14 @@
-"""`make bench`: every figure of the project as one table, measured now on this machine."""
+"""`make bench`: every figure of the project as one table, measured now on this machine.
+
+`python -m tests.benchmarks --full` adds the two hundred pose pairs.
+"""
 
 import sys
 
 from rich.console import Console
 from rich.table import Table
 
-from tests.benchmarks import engine, motion
+from tests.benchmarks import core, engine, motion
 
 
 def main() -> int:
@@ -16,8 +19,8 @@ def main() -> int:
     missed = False
     screen = Console()
     with screen.status("measuring") as status:
-        for part in (engine, motion):
-            for row in part.rows():
+        for part in (engine.rows(), motion.rows(), core.rows("--full" in sys.argv[1:])):
+            for row in part:
                 status.update(f"measured {row.figure}")
                 verdict = "" if row.met is None else "yes" if row.met else "NO"
                 table.add_row(row.figure, row.measured, row.target, verdict)

@@ -15,7 +15,7 @@ from tests.benchmarks.table import Row, at_most, in_turn, shown
 
 
 def rows(full: bool = False) -> Iterator[Row]:
-    """Durations of the four rows, total time of the free row against its peers, and with `full` the pose pairs."""
+    """Durations of the four rows, time of the free row against its peers, with `full` the pose pairs."""
     for name, (task, duration, _) in gta.ROWS.items():
         found = _core(task).free["final_time"]
         # converged runs of the free row without weight scatter; it may also end on the faster branch

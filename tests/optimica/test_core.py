@@ -19,6 +19,7 @@ from gantrytau_optimica.layout import Pieces
 from gantrytau_optimica.solver import Solver, SolverOptions, solve
 from gantrytau_optimica.transcription import transcribe
 from tests.benchmarks import gta, gta_problem
+from tests.benchmarks.pose_pairs import core_solver, sweep
 from tests.optimica import records
 
 
@@ -197,6 +198,29 @@ def test_rows_of_the_published_table(row):
     # converged runs of the free row without weight scatter by 1.5e-4
     tolerance = 1.5e-4 if task.weight == 0 and not task.line else 2e-5
     assert solution.free["final_time"] == pytest.approx(duration, abs=tolerance)
+
+
+def test_random_moves_converge_from_their_straight_line():
+    verdicts = sweep(core_solver(), count=12)  # the bench tries all two hundred
+    assert [verdict.status for verdict in verdicts] == ["solved"] * 12
+
+
+def test_a_limit_on_a_multiple_of_a_signal_is_a_bound():
+    problem = records.double_integrator()
+    v = problem.states[1].symbol
+    multiple = replace(problem, path_limits=(Limit(1 - 2 * v, 0.0, np.inf, "margin of speed"),))
+    transcription = transcribe(multiple, 50)
+    assert not any(group.kind == "path" for group in transcription.groups)
+    assert solve(transcription).objective == pytest.approx(2.5, abs=1e-6)
+
+
+def test_a_limit_that_moves_with_a_free_number_holds():
+    problem = records.double_integrator()
+    v, T = problem.states[1].symbol, problem.final_time
+    moving = replace(problem, path_limits=(Limit(v, -np.inf, T / 5, "speed"),))
+    motion = solve(transcribe(moving, 50)).trajectory
+    # T = 1 / top + top with top = T / 5 gives T = 2.5
+    assert motion.final == pytest.approx(2.5, abs=1e-6)
 
 
 def test_an_impossible_problem_is_explained_in_its_own_words():
