@@ -9,9 +9,9 @@ import numpy as np
 from gantrytau import Dae, ModelError, Result
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.system import System
-from gantrytau_optimica.records import ControlProblem
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint, ReadProblem
+from gantrytau_optimica.records import ControlProblem
 
 if TYPE_CHECKING:
     from gantrytau_optimica.optimum import Optimum
@@ -33,7 +33,7 @@ def first_guesses(
     dae = read.dae
     horizon = _horizon(draft)
     own = _given(dae, given, horizon)
-    ends = _ends(dae, points, constraints)
+    ends = _ends(dae, points, constraints, {n.name: n.guess for n in draft.free})
     found: dict[str, Guess] = {}
     symbols: dict[str, Guess] = {}
     for name, symbol in zip(system.states, system.x.elements(), strict=True):
@@ -63,8 +63,6 @@ def _constant(value: float) -> Guess:
 
 def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> dict[str, Guess]:
     """The caller's guesses by symbol of the reduced equations."""
-    from gantrytau_optimica.building import derivative_symbol
-
     found: dict[str, Guess] = {}
     span = horizon[1] - horizon[0]
     for name, value in given.items():
@@ -82,10 +80,17 @@ def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> 
 
 def _one(name, value, k: int, size: int, factor: float, offset: float, start: float, span: float) -> Guess:
     def guess(fraction: np.ndarray) -> np.ndarray:
-        if callable(value):
-            raw = np.array([np.ravel(value(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float)
-        else:
-            raw = np.tile(np.ravel(np.asarray(value, dtype=float)), (np.size(fraction), 1))
+        try:
+            if callable(value):
+                raw = np.array(
+                    [np.ravel(value(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float
+                )
+            else:
+                raw = np.tile(np.ravel(np.asarray(value, dtype=float)), (np.size(fraction), 1))
+        except Exception as error:  # of a function that is not ours
+            raise ModelError(
+                f"guess {name}: {type(error).__name__}: {error}; expected a number, an array or a function of time"
+            ) from error
         if raw.shape[1] != size:
             raise ModelError(f"guess {name}: found {raw.shape[1]} values, expected {size}")
         if not np.all(np.isfinite(raw)):
@@ -112,11 +117,9 @@ def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Callable[[float]
 
 
 def _ends(
-    dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint]
+    dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint], chosen: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
-    """Values given at the start and at the end, by symbol."""
-    from gantrytau_optimica.building import derivative_symbol
-
+    """Values given at the start and at the end, by symbol; `chosen`: free and held numbers."""
     meaning = {
         s.element_hash(): (p.time, e)
         for p in points
@@ -126,21 +129,30 @@ def _ends(
     }
     found: dict[str, dict[str, float]] = {}
     for constraint in constraints:
-        if not constraint.expression.is_symbolic() or not constraint.lower.is_constant():
-            continue
         known = meaning.get(constraint.expression.element_hash())
-        if (
-            known is None
-            or not constraint.upper.is_constant()
-            or float(constraint.lower) != float(constraint.upper)
-        ):
+        value = _number(dae, constraint.lower, chosen)
+        if known is None or value is None or value != _number(dae, constraint.upper, chosen):
             continue
         which, leaf = known
         target = derivative_symbol(dae, leaf.name())
         if target is not None:
             symbol, factor, offset = target
-            found.setdefault(symbol, {})[which] = (float(constraint.lower) - offset) / factor
+            found.setdefault(symbol, {})[which] = (value - offset) / factor
     return found
+
+
+def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None:
+    """The value of an expression of parameters, or None if others occur in it."""
+    if bound.is_constant():
+        return float(bound)
+    bound = dae.table.reduce(bound)
+    leaves = ca.symvar(bound)
+    if any(leaf.name() not in dae.table.values for leaf in leaves):
+        return None
+    numbers = {**dae.table.values, **chosen}
+    return float(
+        ca.evalf(ca.substitute(bound, ca.vertcat(*leaves), ca.DM([numbers[s.name()] for s in leaves])))
+    )
 
 
 def _from_ends(dae: Dae, symbol: str, ends: Mapping[str, Mapping[str, float]], span: float) -> Guess:
@@ -167,47 +179,56 @@ def trapezoid(fraction: Any) -> tuple[np.ndarray, np.ndarray]:
     return np.where(f < 0.5, half, 1 - half), top * np.minimum(left / RAMP, 1.0)
 
 
+LEAST_ROOT = (
+    0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
+)
+
+
 def _algebraics(
     draft, system: System, numbers, symbols: Mapping[str, Guess], own, horizon
 ) -> dict[str, Guess]:
-    """Algebraics from their closed forms along the guess of the rest, where they have one."""
-    found: dict[str, Guess] = {}
-    if not system.algebraics:
-        return found
-    closed = system.closed_algebraics
+    """Algebraics from their closed forms along the guess of the rest, where they have one, one after another."""
     dae = system.dae
-    for position, algebraic in enumerate(system.algebraics):
+    known = [*(dae.table.symbols[n] for n in numbers), *(n.symbol for n in draft.free)]
+    values = ca.DM([*numbers.values(), *(n.guess for n in draft.free)])
+    leaves = [*system.x.elements(), *system.u.elements()]
+    signals = [symbols[s.name()] for s in leaves]
+    found: dict[str, Guess] = {}
+    for algebraic in system.algebraics:
         if algebraic.name in own:
-            found[algebraic.name] = own[algebraic.name]
-        elif closed is None:
-            found[algebraic.name] = _constant(dae.start.get(algebraic.name, 1.0))
+            guess = own[algebraic.name]
+        elif algebraic.closed is None:
+            guess = _constant(dae.start.get(algebraic.name, 1.0))
         else:
-            found[algebraic.name] = _Closed(closed[position], draft, system, numbers, symbols, horizon)
+            closed = algebraic.closed
+            closed = ca.substitute(closed, ca.vertcat(*known), values) if known else closed
+            function = ca.Function("closed", [draft.time, ca.vertcat(*leaves)], [ca.densify(closed)])
+            guess = _Closed(function, tuple(signals), horizon, root=algebraic.min == 0.0)
+        found[algebraic.name] = guess
+        leaves.append(algebraic.symbol)
+        signals.append(guess)
     return found
 
 
 class _Closed:
-    """A closed form evaluated along the guess."""
+    """A closed form evaluated along the guess; remembers its last answer, which later ones ask for again."""
 
-    def __init__(self, expression: ca.SX, draft: ControlProblem, system: System, numbers, symbols, horizon):
-        table = system.dae.table
-        known = [*(table.symbols[n] for n in numbers), *(n.symbol for n in draft.free)]
-        values = [*numbers.values(), *(n.guess for n in draft.free)]
-        expression = ca.substitute(expression, ca.vertcat(*known), ca.DM(values)) if known else expression
-        self.signals = [symbols[s.name()] for s in (*system.x.elements(), *system.u.elements())]
-        self.horizon = horizon
-        self.function = ca.Function(
-            "closed", [draft.time, ca.vertcat(system.x, system.u)], [ca.densify(expression)]
-        )
+    def __init__(self, function: ca.Function, signals: tuple[Guess, ...], horizon, root: bool):
+        self.function, self.signals, self.horizon, self.root = function, signals, horizon, root
+        self.last: tuple[np.ndarray, np.ndarray] | None = None
 
     def __call__(self, fraction: np.ndarray) -> np.ndarray:
         fraction = np.atleast_1d(fraction)
+        if self.last is not None and np.array_equal(self.last[0], fraction):
+            return self.last[1]
         start, stop = self.horizon
-        columns = np.array([signal(fraction) for signal in self.signals]).reshape(
-            len(self.signals), fraction.size
-        )
+        columns = np.array([signal(fraction) for signal in self.signals]).reshape(-1, fraction.size)
         found = np.array(self.function(start + (stop - start) * fraction[None, :], columns)).ravel()
-        return np.where(np.isfinite(found), found, 1.0)
+        found = np.where(np.isfinite(found), found, 1.0)
+        if self.root:
+            found = np.maximum(found, LEAST_ROOT * (np.max(found) or 1.0))
+        self.last = (fraction, found)
+        return found
 
 
 def typical_size(guess: Guess, bounds: tuple[float, float]) -> float:
@@ -215,3 +236,13 @@ def typical_size(guess: Guess, bounds: tuple[float, float]) -> float:
     finite = [abs(b) for b in bounds if np.isfinite(b) and b != 0.0]
     size = max(finite) if finite else float(np.max(np.abs(guess(np.linspace(0.0, 1.0, 11)))))
     return size if 1e-6 < size < 1e9 else 1.0
+
+
+def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:
+    """(symbol, factor, offset) with name = factor * symbol + offset, or None for a constant."""
+    base, order = split_derivative(name)
+    alias = dae.reduced.aliases.get(base)
+    if alias is None or alias.root is None:
+        return None
+    offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
+    return derivative_name(alias.root, alias.order + order), alias.factor, offset

@@ -47,7 +47,7 @@ class Solution:
 
 
 class Solver:
-    """Ipopt with exact derivatives for one program; may be called again with other bounds and guesses."""
+    """Ipopt with exact derivatives for one program; may be called again with other numbers and guesses."""
 
     def __init__(
         self,
@@ -58,7 +58,6 @@ class Solver:
         max_time: float,
         progress: Progress | None,
     ):
-        self.program = program
         self.watch = _Watch(program.w.numel(), program.g.numel(), progress)
         options = {
             "iteration_callback": self.watch,
@@ -77,9 +76,26 @@ class Solver:
         nlp = {"x": program.w, "f": program.f, "g": program.g}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", nlp, options)
 
-    def solve(self, guess: np.ndarray) -> Solution:
-        """Solve from unknowns `guess` (unscaled)."""
-        program = self.program
+    def unsolved(self, program: Program, guess: np.ndarray) -> Solution:
+        """The guess as a solution that was not looked for, because there is none."""
+        constraints = ca.Function("constraints", [program.w], [program.f, program.g])
+        objective, found = constraints(guess / program.scale)
+        nothing = np.zeros(program.w.numel())
+        status = WORDS["Infeasible_Problem_Detected"]
+        return Solution(
+            w=guess,
+            multipliers=np.zeros(program.g.numel()),
+            bound_multipliers=nothing,
+            constraints=np.array(found).ravel(),
+            objective=float(objective),
+            success=False,
+            status=status,
+            iterations=0,
+            solve_time=0.0,
+        )
+
+    def solve(self, program: Program, guess: np.ndarray) -> Solution:
+        """Solve the program, with its limits as they are now, from unknowns `guess` (unscaled)."""
         begin = time.perf_counter()
         with self.watch.interruptible():
             found = self.nlpsol(
@@ -160,4 +176,4 @@ class _Interruptible:
 
     def __exit__(self, *exception: Any) -> None:
         if self.main:
-            signal.signal(signal.SIGINT, self.before)
+            signal.signal(signal.SIGINT, self.before or signal.SIG_DFL)

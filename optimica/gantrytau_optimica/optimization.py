@@ -18,7 +18,8 @@ from gantrytau import Model, ModelError, Parameter
 class Free(Parameter):
     """A number that the optimiser chooses: a time, a parameter, or with `Start(Free(...))` an initial value.
 
-    guess: where the search starts; min, max: limits; unit, description: as for any parameter.
+    guess: where the search starts; min, max: limits; unit, description: as for any parameter. The optimum has
+    times and parameters as numbers, `optimum["final_time"]`, an initial value as `optimum["x"][0]`.
     """
 
     free = True
@@ -114,10 +115,25 @@ def _point(words: str, expression: Any, time: Any) -> ca.SX:
         raise ModelError(
             f"{words} was used outside of an optimisation problem; use it in constraints() or objective()"
         )
-    expression = ca.densify(ca.SX(expression))
+    expression = _signals(words, expression, points)
     names = [
         f"{words}({e})" if words in ("initial", "final") else f"{words} of {e}" for e in expression.elements()
     ]
     symbol = ca.reshape(ca.vertcat(*(ca.SX.sym(name) for name in names)), *expression.shape)
     points.append(Point(ca.vec(symbol), ca.vec(expression), time))
     return symbol
+
+
+def _signals(words: str, expression: Any, points: list[Point]) -> ca.SX:
+    """What a point is asked for, refused if it is no expression or a value at a time already."""
+    try:
+        expression = ca.densify(ca.SX(expression))
+    except NotImplementedError:
+        raise ModelError(
+            f"{words}: found {type(expression).__name__}, expected a variable of the model or an expression"
+        ) from None
+    inside = {e.element_hash() for p in points for e in p.symbol.elements()}
+    nested = [leaf for leaf in ca.symvar(expression) if leaf.element_hash() in inside]
+    if nested:
+        raise ModelError(f"{words}: found {nested[0]}, which has its time already; name the variable itself")
+    return expression

@@ -11,10 +11,10 @@ import numpy as np
 from gantrytau import Dae, Result
 from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
-from gantrytau_optimica.scheme import interpolation
-from gantrytau_optimica.reporting import report
 from gantrytau_optimica.ipopt import Solution
 from gantrytau_optimica.program import Program
+from gantrytau_optimica.reporting import report
+from gantrytau_optimica.scheme import interpolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,11 @@ class Optimum:
     @cached_property
     def free(self) -> dict[str, float]:
         """The free numbers by name."""
+        return {n.name: self._numbers[n.name] for n in self.program.problem.free if not n.held}
+
+    @cached_property
+    def _numbers(self) -> dict[str, float]:
+        """Free and held numbers."""
         numbers = self.program.problem.free
         return dict(zip((n.name for n in numbers), self.solution.w[self.program.free].tolist(), strict=True))
 
@@ -71,7 +76,7 @@ class Optimum:
         problem = self.program.problem
         numbers = ca.vertcat(*(n.symbol for n in problem.free)) if problem.free else ca.SX(0, 1)
         evaluate = ca.Function("horizon", [numbers], [problem.start_time, problem.final_time])
-        start, stop = evaluate(ca.DM(list(self.free.values())))
+        start, stop = evaluate(ca.DM(list(self._numbers.values())))
         return float(start), float(stop)
 
     @property
@@ -112,6 +117,9 @@ class Optimum:
         """All names that can be asked for."""
         return (*self.result.names, *self.free)
 
+    def __repr__(self) -> str:
+        return f"<Optimum {self.name}: {self.status}, objective {self.objective:.8g}, {self.time.size} times>"
+
     def __contains__(self, name: object) -> bool:
         return name in self.free or name in self.result
 
@@ -140,7 +148,8 @@ class Optimum:
 
     def signal(self, name: str):
         """A variable or derivative as a vectorised function of time: (n,) -> (n,) or (n, k), from the polynomials
-        of the solution; between the collocation points they need not keep to limits."""
+        of the solution; between the collocation points they need not keep to limits.
+        """
         elements = self.dae.expand(name)
         whole = len(elements) > 1 or elements[0] != name
 
@@ -176,7 +185,7 @@ class Optimum:
         signals = ca.vertcat(*(s.symbol for s in problem.signals)) if problem.signals else ca.SX(0, 1)
         free = ca.vertcat(*(n.symbol for n in problem.free)) if problem.free else ca.SX(0, 1)
         function = ca.Function("values", [problem.time, signals, free], [ca.densify(found)])
-        p = np.tile(np.array(list(self.free.values()))[:, None], (1, times.size))
+        p = np.tile(np.array(list(self._numbers.values()))[:, None], (1, times.size))
         rows = np.array(function(times[None, :], self._signals(times), p))
         return rows if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)
 

@@ -4,22 +4,27 @@
                     the states x_j, algebraics z_j and inputs u_j, all divided by their typical size
     dynamics        sum_i D_ij x_i = h f(t_j, x_j, z_j, u_j, p)          at every point
     algebraic       0 = g(t_j, x_j, z_j, u_j, p)                         at every point
+    path            lower <= c(t_j, x_j, z_j, u_j, p) <= upper           at every point
     continuity      x_0 of the next element = value of this one's polynomial at its end
+    boundary        conditions on values at single times
     integral        sum over elements of h sum_j w_j L(t_j, ...)
 
-With Radau points the last point is the end of the element and shares its unknowns with the next start.
-One SX function is written per point and called for each, so that CasADi derives the sparsity itself.
+What happens at a point is one small function, evaluated and differentiated for all points at once; the rest is
+linear (see assembly). Nothing symbolic grows with the number of elements.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.scheme import Collocation, interpolation
-from gantrytau_optimica.records import ControlProblem, PointValue
+from gantrytau_optimica.assembly import Assembled, Block, assemble
+from gantrytau_optimica.places import Places, lay_out
+from gantrytau_optimica.records import ControlProblem, Limit, PointValue
+from gantrytau_optimica.scheme import Collocation
+from gantrytau_optimica.sorting import bare_limit, signal_limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,250 +38,171 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """The nonlinear program. w: unknowns (scaled by `scale`), g: constraints with their meaning in `rows`.
-
-    places: index in w of the states at element starts (n, nx) (the last row is the end), of states (n, k, nx),
-    algebraics and inputs (n, k, .) at the points, and of the free numbers.
-    """
+    """The nonlinear program in scaled unknowns, its limits, and what its rows and unknowns mean."""
 
     problem: ControlProblem
-    scheme: Collocation
-    mesh: np.ndarray
-    w: ca.SX
-    f: ca.SX
-    g: ca.SX
+    places: Places
+    assembled: Assembled
     rows: tuple[Row, ...]
     lbw: np.ndarray
     ubw: np.ndarray
     lbg: np.ndarray
     ubg: np.ndarray
-    scale: np.ndarray
-    starts: np.ndarray
-    states: np.ndarray
-    algebraics: np.ndarray
-    inputs: np.ndarray
-    free: np.ndarray
+
+    def with_numbers(self, problem: ControlProblem) -> "Program":
+        """The same program with other free numbers and first guesses."""
+        lower, upper, places = self.lbw.copy(), self.ubw.copy(), self.places
+        for place, number in zip(places.free, problem.free, strict=True):
+            lower[place], upper[place] = number.min / places.scale[place], number.max / places.scale[place]
+        return replace(self, problem=problem, lbw=lower, ubw=upper)
 
 
 def transcribe(problem: ControlProblem, mesh: np.ndarray, scheme: Collocation) -> Program:
     """The nonlinear program of `problem` on `mesh`, element borders from 0 to 1 (n + 1,)."""
-    return _Writer(problem, mesh, scheme).program()
-
-
-class _Writer:
-    def __init__(self, problem: ControlProblem, mesh: np.ndarray, scheme: Collocation):
-        self.problem, self.mesh, self.scheme = problem, mesh, scheme
-        n, k = mesh.size - 1, scheme.points.size
-        nx, nz, nu, np_ = (len(x) for x in (problem.states, problem.algebraics, problem.inputs, problem.free))
-        shared = scheme.points[-1] == 1.0  # the last point is the start of the next element
-        self.free = np.arange(np_)
-        place = np_
-        self.starts = np.zeros((n + 1, nx), dtype=int)
-        self.states = np.zeros((n, k, nx), dtype=int)
-        self.algebraics = np.zeros((n, k, nz), dtype=int)
-        self.inputs = np.zeros((n, k, nu), dtype=int)
-        self.starts[0] = np.arange(place, place + nx)
-        place += nx
-        for e in range(n):
-            for j in range(k):
-                for table, size in ((self.states, nx), (self.algebraics, nz), (self.inputs, nu)):
-                    table[e, j] = np.arange(place, place + size)
-                    place += size
-            if shared:
-                self.starts[e + 1] = self.states[e, -1]
-            else:
-                self.starts[e + 1] = np.arange(place, place + nx)
-                place += nx
-        self.size, self.shared = place, shared
-        self.w = ca.SX.sym("w", place)
-        self.scale = np.ones(place)
-        for signals, table in self._tables():
-            for column, signal in enumerate(signals):
-                self.scale[table[..., column]] = signal.nominal
-        for column, number in enumerate(problem.free):
-            self.scale[column] = max(abs(number.guess), 1e-3)
-        self.values = ca.SX(self.scale) * self.w
-        self.elements = np.array(self.values.elements(), dtype=object)
-
-    def _tables(self):
-        problem = self.problem
-        return (
-            (problem.states, self.starts),
-            (problem.states, self.states),
-            (problem.algebraics, self.algebraics),
-            (problem.inputs, self.inputs),
+    places = lay_out(problem, mesh, scheme)
+    path = [limit for limit in problem.path_limits if bare_limit(limit, problem) is None]
+    rows, lower, upper = _rows(places, path)
+    running = _point_block(places, path, len(rows))
+    objective = [_single_block(places, [problem.objective], sparse.csr_matrix([[1.0]]))]
+    constraints = [running]
+    if not problem.integrand.is_zero():
+        objective.append(_integral_block(places))
+    count = len(problem.boundary)
+    if count:
+        scatter = sparse.csr_matrix(
+            (np.ones(count), (np.arange(len(rows) - count, len(rows)), np.arange(count))), shape=(len(rows), count)
         )
+        constraints.append(_single_block(places, [m.expression for m in problem.boundary], scatter))
+    lbw, ubw = _bounds(places)
+    assembled = assemble(objective, constraints, _linear(places, len(path), len(rows)), 0)
+    return Program(problem, places, assembled, rows, lbw, ubw, lower, upper)
 
-    def program(self) -> Program:
-        problem, scheme = self.problem, self.scheme
-        p = self._at(self.free)
-        symbols = ca.vertcat(*(number.symbol for number in problem.free)) if problem.free else ca.SX(0, 1)
-        t0, tf = ca.substitute([problem.start_time, problem.final_time], [symbols], [p])
-        path = [limit for limit in problem.path_limits if _bound(limit, problem) is None]
-        point = self._point_function([limit.expression for limit in path], symbols)
-        self.lbw, self.ubw = self._bounds()
-        g: list[ca.SX] = []
-        lower: list[float] = []
-        upper: list[float] = []
-        rows: list[Row] = []
-        f = ca.SX(0)
 
-        def add(expression: ca.SX, kind: str, names: Sequence[str], place: float | None, low=None, high=None):
-            size = len(names)
-            g.append(expression)
-            lower.extend([0.0] * size if low is None else low)
-            upper.extend([0.0] * size if high is None else high)
-            rows.extend(Row(kind, name, place) for name in names)
+def _rows(places: Places, path: list[Limit]) -> tuple[tuple[Row, ...], np.ndarray, np.ndarray]:
+    """All rows with their limits: point after point, then continuity, then boundary."""
+    problem, states = places.problem, [s.name for s in places.problem.states]
+    kinds = [("dynamics", name) for name in states]
+    kinds += [("algebraic", name) for name in problem.residual_names]
+    kinds += [("path", limit.name) for limit in path]
+    rows = [Row(kind, name, float(fraction)) for fraction in places.fractions for kind, name in kinds]
+    equal = [0.0] * (len(kinds) - len(path))
+    lower = [*equal, *(limit.lower for limit in path)] * places.fractions.size
+    upper = [*equal, *(limit.upper for limit in path)] * places.fractions.size
+    jumps = places.jumps().shape[0]
+    borders = np.repeat(places.mesh[1:], len(states))[:jumps]
+    rows += [Row("continuity", states[k % len(states)], float(border)) for k, border in enumerate(borders)]
+    rows += [Row("boundary", limit.name, None) for limit in problem.boundary]
+    lower += [0.0] * jumps + [limit.lower for limit in problem.boundary]
+    upper += [0.0] * jumps + [limit.upper for limit in problem.boundary]
+    return tuple(rows), np.array(lower), np.array(upper)
 
-        sizes = self._sizes()
-        state_names = [s.name for s in problem.states]
-        for e in range(self.mesh.size - 1):
-            fraction = self.mesh[e + 1] - self.mesh[e]
-            h = fraction * (tf - t0)
-            nodes = [self._at(self.starts[e]), *(self._at(x) for x in self.states[e])]
-            matrix = ca.horzcat(*nodes)
-            for j, c in enumerate(scheme.points):
-                place = float(self.mesh[e] + c * fraction)
-                t = t0 + place * (tf - t0)
-                ode, residual, integrand, limits = point(
-                    t, nodes[j + 1], self._at(self.algebraics[e, j]), self._at(self.inputs[e, j]), p
-                )
-                if state_names:
-                    slope = matrix @ scheme.differentiation[:, j]
-                    add((slope - h * ode) / sizes, "dynamics", state_names, place)
-                add(residual, "algebraic", problem.residual_names, place)
-                add(
-                    limits,
-                    "path",
-                    [m.name for m in path],
-                    place,
-                    [m.lower for m in path],
-                    [m.upper for m in path],
-                )
-                f += h * scheme.weights[j] * integrand
-            if not self.shared and state_names:
-                end = matrix @ scheme.end
-                add(
-                    (end - self._at(self.starts[e + 1])) / sizes,
-                    "continuity",
-                    state_names,
-                    float(self.mesh[e + 1]),
-                )
-        boundary = problem.boundary
-        expressions = [problem.objective, *(limit.expression for limit in boundary)]
-        objective, *conditions = self._with_points(expressions, symbols, p, t0, tf)
-        if boundary:
-            low, high = [m.lower for m in boundary], [m.upper for m in boundary]
-            add(ca.vertcat(*conditions), "boundary", [m.name for m in boundary], None, low, high)
-        return Program(
-            problem, scheme, self.mesh, self.w, f + objective, ca.vertcat(*g) if g else ca.SX(0, 1), tuple(rows),
-            self.lbw, self.ubw, np.array(lower), np.array(upper), self.scale,
-            self.starts, self.states, self.algebraics, self.inputs, self.free,
-        )  # fmt: skip
 
-    def _sizes(self) -> ca.DM:
-        return ca.DM([s.nominal for s in self.problem.states])
-
-    def _at(self, places: np.ndarray) -> ca.SX:
-        found = self.elements[places].tolist()
-        return ca.vertcat(*found) if found else ca.SX(0, 1)
-
-    def _arguments(self, symbols: ca.SX) -> list[ca.SX]:
-        problem = self.problem
-        columns = [
-            ca.vertcat(*(s.symbol for s in signals)) if signals else ca.SX(0, 1)
-            for signals in (problem.states, problem.algebraics, problem.inputs)
+def _linear(places: Places, paths: int, count: int) -> sparse.csr_matrix:
+    """The rows' linear part: differentiation matrix and continuity."""
+    slopes, jumps = places.slopes().tocoo(), places.jumps().tocoo()
+    nx = len(places.problem.states)
+    per_point = nx + len(places.problem.algebraics) + paths
+    row = np.concatenate(
+        [
+            (slopes.row // max(nx, 1)) * per_point + slopes.row % max(nx, 1),
+            places.fractions.size * per_point + jumps.row,
         ]
-        return [problem.time, *columns, symbols]
+    )
+    column, value = np.concatenate([slopes.col, jumps.col]), np.concatenate([slopes.data, jumps.data])
+    return sparse.csr_matrix((value, (row, column)), shape=(count, places.size))
 
-    def _point_function(self, limits: list[ca.SX], symbols: ca.SX) -> ca.Function:
-        problem = self.problem
-        path = ca.vertcat(*limits) if limits else ca.SX(0, 1)
-        return ca.Function(
-            "point",
-            self._arguments(symbols),
-            [problem.ode, problem.residuals, problem.integrand, path],
-            {"cse": True},
+
+def _local(problem: ControlProblem) -> ca.SX:
+    """Signals and free numbers, as they stand in a column of the point function."""
+    return ca.vertcat(ca.SX(0, 1), *(s.symbol for s in problem.signals), *(n.symbol for n in problem.free))
+
+
+def _timed(problem: ControlProblem, expression: ca.SX, fraction: ca.SX) -> ca.SX:
+    """The expression with time written as a share of the horizon."""
+    t = problem.start_time + fraction * (problem.final_time - problem.start_time)
+    return ca.substitute(expression, problem.time, t) if ca.depends_on(expression, problem.time) else expression
+
+
+def _point_block(places: Places, path: list[Limit], count: int) -> Block:
+    problem, fraction = places.problem, ca.SX.sym("fraction")
+    horizon = problem.final_time - problem.start_time
+    values = ca.vertcat(problem.ode * horizon, problem.residuals, *(limit.expression for limit in path))
+    per_point, points = values.numel(), places.fractions.size
+    factor = np.ones((places.mesh.size - 1, places.scheme.points.size, per_point))
+    nx = len(problem.states)
+    sizes = np.array([s.nominal for s in problem.states])
+    factor[:, :, :nx] = -np.diff(places.mesh)[:, None, None] / sizes
+    index = np.arange(points * per_point)
+    scatter = sparse.csr_matrix((factor.ravel(), (index, index)), shape=(count, index.size))
+    values = _timed(problem, ca.densify(values), fraction)
+    return Block(
+        _local(problem), ca.SX(0, 1), fraction, values, places.fractions[None, :], places.at_points(), scatter
+    )
+
+
+def _integral_block(places: Places) -> Block:
+    problem, fraction = places.problem, ca.SX.sym("fraction")
+    value = _timed(problem, problem.integrand * (problem.final_time - problem.start_time), fraction)
+    weights = (np.diff(places.mesh)[:, None] * places.scheme.weights).reshape(1, -1)
+    return Block(
+        _local(problem),
+        ca.SX(0, 1),
+        fraction,
+        ca.densify(value),
+        places.fractions[None, :],
+        places.at_points(),
+        sparse.csr_matrix(weights),
+    )
+
+
+def _single_block(places: Places, expressions: list[ca.SX], scatter) -> Block:
+    """Expressions of values at single times and of free numbers, once."""
+    problem = places.problem
+    wanted = {leaf.element_hash() for e in expressions for leaf in ca.symvar(e)}
+    local, gather, old, new = [ca.vertcat(ca.SX(0, 1), *(n.symbol for n in problem.free))], [places.numbers()], [], []
+    signals = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in problem.signals))
+    for point in problem.points:
+        if not any(element.element_hash() in wanted for element in point.symbol.elements()):
+            continue
+        fraction = point_fraction(problem, point)
+        here = ca.SX.sym("point", signals.numel())
+        local.append(here)
+        gather.append(places.at_fraction(fraction))
+        old.append(point.symbol)
+        new.append(ca.substitute(_timed(problem, point.expression, ca.SX(fraction)), signals, here))
+    column = ca.vertcat(*expressions)
+    if old:
+        column = ca.substitute(column, ca.vertcat(*old), ca.vertcat(*new))
+    matrix = sparse.vstack(gather).tocsr()
+    return Block(ca.vertcat(*local), ca.SX(0, 1), ca.SX(0, 1), ca.densify(column), np.zeros((0, 1)), matrix, scatter)
+
+
+def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:
+    """Limits of the unknowns, those of bare signals on the path included."""
+    lower, upper = np.full(places.size, -np.inf), np.full(places.size, np.inf)
+    limits = signal_limits(places.problem, "limits")
+    for signals, table in places.tables():
+        for column, signal in enumerate(signals):
+            lower[table[..., column]], upper[table[..., column]] = limits[signal.name]
+    for place, number in zip(places.free, places.problem.free, strict=True):
+        lower[place], upper[place] = number.min, number.max
+    return lower / places.scale, upper / places.scale
+
+
+def point_fraction(problem: ControlProblem, point: PointValue) -> float:
+    """Where on [0, 1] a point lies. Raises ModelError if it depends on free numbers, or lies outside."""
+    if isinstance(point.time, str):
+        return 0.0 if point.time == "initial" else 1.0
+    place = (point.time - problem.start_time) / (problem.final_time - problem.start_time)
+    numbers = ca.vertcat(ca.SX(0, 1), *(n.symbol for n in problem.free))
+    evaluate = ca.Function("place", [numbers], [place])
+    guess = ca.DM([n.guess for n in problem.free])
+    found, other = float(evaluate(guess)), float(evaluate(1.37 * guess + 0.11))  # any other values
+    if abs(found - other) > 1e-12:
+        raise ModelError(
+            f"at({point.time}, ...): with a free horizon the time must be a fixed fraction of it; write it as "
+            "start_time + fraction * (final_time - start_time)"
         )
-
-    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Limits of the unknowns, those of bare signals on the path included."""
-        problem = self.problem
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        limits = {s.name: (s.min, s.max) for s in problem.signals}
-        for limit in problem.path_limits:
-            found = _bound(limit, problem)
-            if found is not None:
-                name, low, high = found
-                limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
-        for signals, table in self._tables():
-            for column, signal in enumerate(signals):
-                lower[table[..., column]], upper[table[..., column]] = limits[signal.name]
-        for column, number in enumerate(problem.free):
-            lower[column], upper[column] = number.min, number.max
-        return lower / self.scale, upper / self.scale
-
-    def _with_points(
-        self, expressions: list[ca.SX], symbols: ca.SX, p: ca.SX, t0: ca.SX, tf: ca.SX
-    ) -> list[ca.SX]:
-        """Expressions of points and free numbers in the unknowns."""
-        old, new = [symbols], [p]
-        for point in self.problem.points:
-            old.append(point.symbol)
-            new.append(self._point_value(point, symbols, p, t0, tf))
-        return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)])
-
-    def _point_value(self, point: PointValue, symbols: ca.SX, p: ca.SX, t0: ca.SX, tf: ca.SX) -> ca.SX:
-        place = self._fraction(point)
-        e = int(np.clip(np.searchsorted(self.mesh, place, side="right") - 1, 0, self.mesh.size - 2))
-        local = (place - self.mesh[e]) / (self.mesh[e + 1] - self.mesh[e])
-        x_weights = interpolation(self.scheme.nodes, np.array([local]))[0]
-        other_weights = interpolation(self.scheme.points, np.array([local]))[0]
-        x = ca.horzcat(self._at(self.starts[e]), *(self._at(s) for s in self.states[e])) @ _exact(x_weights)
-        z = ca.horzcat(*(self._at(s) for s in self.algebraics[e])) @ _exact(other_weights)
-        u = ca.horzcat(*(self._at(s) for s in self.inputs[e])) @ _exact(other_weights)
-        value = ca.Function("value", self._arguments(symbols), [point.expression])
-        found = value(t0 + place * (tf - t0), x, z, u, p)
-        assert isinstance(found, ca.SX)
-        return found
-
-    def _fraction(self, point: PointValue) -> float:
-        """Where on [0, 1] a point lies; it must not depend on the free numbers."""
-        if isinstance(point.time, str):
-            return 0.0 if point.time == "initial" else 1.0
-        problem = self.problem
-        span = problem.final_time - problem.start_time
-        place = (point.time - problem.start_time) / span
-        numbers = ca.vertcat(*(n.symbol for n in problem.free)) if problem.free else ca.SX(0, 1)
-        evaluate = ca.Function("place", [numbers], [place])
-        guess = ca.DM([n.guess for n in problem.free])
-        found, other = float(evaluate(guess)), float(evaluate(1.37 * guess + 0.11))  # any other values
-        if abs(found - other) > 1e-12:
-            raise ModelError(
-                f"at({point.time}, ...): with a free horizon the time must be a fixed fraction of it; write it as "
-                "start_time + fraction * (final_time - start_time)"
-            )
-        if not -1e-12 <= found <= 1 + 1e-12:
-            raise ModelError(
-                f"at({point.time}, ...): lies outside of the horizon; choose a time inside of it"
-            )
-        return min(max(found, 0.0), 1.0)
-
-
-def _exact(weights: np.ndarray) -> ca.DM:
-    # weights of a node are exactly 0 and 1 there, and stay structural zeros
-    return ca.sparsify(ca.DM(np.where(np.abs(weights) < 1e-14, 0.0, weights)))
-
-
-def _bound(limit, problem: ControlProblem) -> tuple[str, float, float] | None:
-    """(signal, lower, upper) where a path limit is one on a signal times a number, else None."""
-    leaves = ca.symvar(limit.expression)
-    if len(leaves) != 1:
-        return None
-    slope = ca.jacobian(limit.expression, leaves[0])
-    names = {s.symbol.element_hash(): s.name for s in problem.signals}
-    if not slope.is_constant() or leaves[0].element_hash() not in names or float(slope) == 0.0:
-        return None
-    offset = float(ca.substitute(limit.expression, leaves[0], 0))
-    ends = sorted(((limit.lower - offset) / float(slope), (limit.upper - offset) / float(slope)))
-    return names[leaves[0].element_hash()], ends[0], ends[1]
+    if not -1e-12 <= found <= 1 + 1e-12:
+        raise ModelError(f"at({point.time}, ...): lies outside of the horizon; choose a time inside of it")
+    return min(max(found, 0.0), 1.0)

@@ -17,17 +17,19 @@ class Signal:
     max: float
     nominal: float
     guess: Callable[[np.ndarray], np.ndarray]
+    words: str = ""  # what it is at a limit, where the name says nothing to the user
 
 
 @dataclass(frozen=True, eq=False)
 class FreeNumber:
-    """A number that is chosen."""
+    """A number that is chosen, or held at its guess for one solve and changed for the next."""
 
     name: str
     symbol: ca.SX
     min: float
     max: float
     guess: float
+    held: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,11 @@ def _violations(program: Program, solution: Solution, horizon: tuple[float, floa
         if key not in worst or amount[k] > worst[key][0]:
             worst[key] = (float(amount[k]), row.fraction)
     found = []
-    for (kind, name), (size, fraction) in sorted(worst.items(), key=lambda item: -item[1][0]):
+    # conditions of the user first: what the model does to meet them says less
+    order = ("boundary", "path", "continuity", "algebraic", "dynamics")
+    for (kind, name), (size, fraction) in sorted(
+        worst.items(), key=lambda m: (order.index(m[0][0]), -m[1][0])
+    ):
         when = "" if fraction is None else f" at t = {_at(fraction, horizon):.4g} s"
         how = "is not finite" if np.isinf(size) else f"is off by {size:.3g}"
         found.append(f"{MEANING[kind].format(name)} {how}{when}")
@@ -72,7 +76,9 @@ def _binding(program: Program, solution: Solution, horizon: tuple[float, float])
                 reached = _reached(value, bound)
                 if np.any(reached):
                     found.append(
-                        f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, times)}"
+                        f"{signal.words} {_intervals(reached, times)}"
+                        if signal.words and signal.words != signal.name
+                        else f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, times)}"
                     )
     rows: dict[str, list[int]] = {}
     for k, row in enumerate(program.rows):
@@ -85,6 +91,8 @@ def _binding(program: Program, solution: Solution, horizon: tuple[float, float])
             if np.any(reached):
                 found.append(f"`{name}` at its {word} limit {_intervals(reached, times)}")
     for number, place in zip(problem.free, program.free, strict=True):
+        if number.held:
+            continue
         for word, bound in (("lower", lower[place]), ("upper", upper[place])):
             if _reached(solution.w[place], bound):
                 found.append(f"{number.name} at its {word} limit {bound:.6g}")

@@ -1,0 +1,55 @@
+"""Dimensions of objective, integrand, times and constraints, checked like those of equations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.flat_model import FlatModel
+from gantrytau.statements import Equation
+from gantrytau.symbols import time
+from gantrytau.unit_checking import check_units
+from gantrytau_optimica.optimization import Point
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.reading import Constraint
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides(Equation):
+    """Two expressions of one dimension, at a place of an optimisation problem."""
+
+    @property
+    def name(self) -> str:
+        """The place."""
+        return self.path
+
+
+def check_problem_units(
+    flat: FlatModel,
+    name: str,
+    objective: ca.SX,
+    integrand: ca.SX,
+    constraints: Sequence["Constraint"],
+    points: Sequence[Point],
+    times: Sequence[ca.SX],
+) -> None:
+    """ModelError for terms or sides whose units disagree. A value at a time has the unit of its variable."""
+    pairs = [(objective, objective, f"{name}.objective"), (integrand, integrand, f"{name}.integrand")]
+    pairs += [
+        (t, time, f"{name}.{which}") for t, which in zip(times, ("start_time", "final_time"), strict=True)
+    ]
+    for constraint in constraints:
+        for bound in (constraint.lower, constraint.upper):
+            if not bound.is_constant():
+                pairs.append((constraint.expression, bound, constraint.place))
+        pairs.append((constraint.expression, constraint.expression, constraint.place))
+    sides = ca.vertcat(*(side for left, right, _ in pairs for side in (left, right)))
+    for point in reversed(points):
+        sides = ca.substitute(sides, point.symbol, point.expression)
+    elements = sides.elements()
+    equations = tuple(
+        _Sides(elements[2 * k], elements[2 * k + 1], place, "", k) for k, (_, _, place) in enumerate(pairs)
+    )
+    check_units(replace(flat, equations=equations, initial_equations=()))

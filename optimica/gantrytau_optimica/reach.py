@@ -1,0 +1,54 @@
+"""Ends that the model cannot reach, found before solving: a square root of what is negative there."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau_optimica.building import Built
+from gantrytau_optimica.sorting import known_states
+
+WORDS = {"initial": "start", "final": "end"}
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """An equation of the model without solution at an end that the problem demands."""
+
+    when: str  # "initial" or "final"
+    equation: str
+    conditions: tuple[str, ...]
+    missing: float  # how much its square falls short
+
+    def __str__(self) -> str:
+        return (
+            f"the {WORDS[self.when]} is out of reach: {', '.join(f'`{c}`' for c in self.conditions)} leave no "
+            f"solution of {self.equation} (the square in it would have to be {self.missing:.4g} larger)"
+        )
+
+
+def out_of_reach(built: Built) -> list[OutOfReach]:
+    """Equations that have no solution where the conditions decide them."""
+    problem, system = built.problem, built.system
+    held = {n.symbol.element_hash(): n.guess for n in problem.free if n.held}
+    found: list[OutOfReach] = []
+    for when, states in known_states(problem).items():
+        values = {h: (row.lower, row.name) for h, row in states.items()}
+        for k, algebraic in enumerate(system.algebraics):
+            if algebraic.closed is None or algebraic.min != 0.0:
+                continue
+            radicand = ca.substitute(-problem.residuals[k], algebraic.symbol, 0)
+            leaves = ca.symvar(radicand)
+            if not all(leaf.element_hash() in values or leaf.element_hash() in held for leaf in leaves):
+                continue
+            numbers = [values[h][0] if (h := leaf.element_hash()) in values else held[h] for leaf in leaves]
+            value = (
+                float(ca.evalf(ca.substitute(radicand, ca.vertcat(*leaves), ca.DM(numbers))))
+                if leaves
+                else 0.0
+            )
+            if value < -1e-9 * max(1.0, float(np.max(np.abs(numbers), initial=0.0)) ** 2):
+                names = tuple(values[h][1] for leaf in leaves if (h := leaf.element_hash()) in values)
+                equation = problem.residual_names[k].rstrip(",")
+                found.append(OutOfReach(when, equation, names, -value))
+    return found
