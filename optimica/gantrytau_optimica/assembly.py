@@ -65,7 +65,7 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Assembled:
     """A nonlinear program with its derivative functions, in the form that CasADi's nlpsol takes."""
 
     nlp: ca.Function  # (x, p) -> (f, g)
@@ -78,7 +78,7 @@ class Program:
 
 def assemble(
     objective: Sequence[Block], constraints: Sequence[Block], linear: Sparse, parameters: int
-) -> Program:
+) -> Assembled:
     """The program: minimise the objective blocks' sum; the rows are linear w + the constraint blocks' sum."""
     rows, n = linear.shape
     w, p = ca.MX.sym("x", n), ca.MX.sym("p", parameters)
@@ -91,7 +91,7 @@ def assemble(
         [(block, lam_f) for block in objective] + [(block, lam_g) for block in constraints], w, p
     )
     # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
-    return Program(
+    return Assembled(
         nlp=ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"]),
         grad_f=ca.Function(
             "nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)], ["x", "p"], ["f", "grad_f_x"]

@@ -58,7 +58,8 @@ class Solver:
         max_time: float,
         progress: Progress | None,
     ):
-        self.watch = _Watch(program.w.numel(), program.g.numel(), progress)
+        assembled = program.assembled
+        self.watch = _Watch(assembled.variables, assembled.rows, progress)
         options = {
             "iteration_callback": self.watch,
             "print_time": False,
@@ -73,19 +74,17 @@ class Solver:
                 "max_wall_time": max_time,
             },
         }
-        nlp = {"x": program.w, "f": program.f, "g": program.g}
-        self.nlpsol = ca.nlpsol("optimum", "ipopt", nlp, options)
+        options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
+        self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
 
     def unsolved(self, program: Program, guess: np.ndarray) -> Solution:
         """The guess as a solution that was not looked for, because there is none."""
-        constraints = ca.Function("constraints", [program.w], [program.f, program.g])
-        objective, found = constraints(guess / program.scale)
-        nothing = np.zeros(program.w.numel())
+        objective, found = program.assembled.nlp(guess / program.scale, [])
         status = WORDS["Infeasible_Problem_Detected"]
         return Solution(
             w=guess,
-            multipliers=np.zeros(program.g.numel()),
-            bound_multipliers=nothing,
+            multipliers=np.zeros(program.assembled.rows),
+            bound_multipliers=np.zeros(program.assembled.variables),
             constraints=np.array(found).ravel(),
             objective=float(objective),
             success=False,

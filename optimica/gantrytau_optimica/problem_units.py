@@ -1,4 +1,7 @@
-"""Dimensions of objective, integrand, times and constraints, checked like those of equations."""
+"""Dimensions of times and constraints, checked like those of equations.
+
+Objective and integrand are not: a cost may add what is not alike, with weights of one that nobody writes.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,15 +32,12 @@ class _Sides(Equation):
 def check_problem_units(
     flat: FlatModel,
     name: str,
-    objective: ca.SX,
-    integrand: ca.SX,
     constraints: Sequence["Constraint"],
     points: Sequence[Point],
     times: Sequence[ca.SX],
 ) -> None:
     """ModelError for terms or sides whose units disagree. A value at a time has the unit of its variable."""
-    pairs = [(objective, objective, f"{name}.objective"), (integrand, integrand, f"{name}.integrand")]
-    pairs += [
+    pairs = [
         (t, time, f"{name}.{which}") for t, which in zip(times, ("start_time", "final_time"), strict=True)
     ]
     for constraint in constraints:

@@ -72,7 +72,7 @@ def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
     check_problem_units(
-        replace(flat, derivatives=derivatives), name, objective, integrand, constraints, points, times
+        replace(flat, derivatives=derivatives), name, constraints, points, times
     )
     dae = translate_flat(flat, given=names(root.given), find=mentioned)
     read = ReadProblem(name, dae, objective, integrand, (*constraints, *starts), tuple(points), *times)

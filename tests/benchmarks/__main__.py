@@ -1,14 +1,11 @@
-"""`make bench`: every figure of the project as one table, measured now on this machine.
-
-`python -m tests.benchmarks --full` adds the two hundred pose pairs.
-"""
+"""`make bench`: every figure of the project as one table, measured now on this machine."""
 
 import sys
 
 from rich.console import Console
 from rich.table import Table
 
-from tests.benchmarks import core, engine, motion
+from tests.benchmarks import engine, motion
 
 
 def main() -> int:
@@ -19,7 +16,7 @@ def main() -> int:
     missed = False
     screen = Console()
     with screen.status("measuring") as status:
-        for part in (engine.rows(), motion.rows(), core.rows("--full" in sys.argv[1:])):
+        for part in (engine.rows(), motion.rows()):
             for row in part:
                 status.update(f"measured {row.figure}")
                 verdict = "" if row.met is None else "yes" if row.met else "NO"

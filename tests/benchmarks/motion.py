@@ -10,6 +10,7 @@ from gantrytau_optimica import optimize
 from gantrytau_optimica.reading import read_problem
 from tests.benchmarks import reference_collocation
 from tests.benchmarks.gta import Task
+from tests.benchmarks.pose_sweep import sweep
 from tests.benchmarks.table import Row, at_most, shown
 
 KNOWN = {  # T + w * energy at 50 elements of 3 Radau points
@@ -33,6 +34,11 @@ def rows() -> Iterator[Row]:
         error = max(found - expected, 0.0) if allowed > 1e-4 else abs(found - expected)
         yield at_most(f"GT-A {title}, w = {weight:g}: |T - {expected:g} s|", error, allowed, "s")
     yield from _against_peers(free)
+    verdicts = list(sweep(200, seed=0))
+    missed = sum(not verdict.success for verdict in verdicts)
+    yield at_most("pose pairs that do not converge, of 200", missed, 0)
+    median = statistics.median(verdict.seconds for verdict in verdicts)
+    yield shown("pose pairs, median time of one solve", f"{median:.3f} s")
 
 
 def _against_peers(problem: Any) -> Iterator[Row]:
