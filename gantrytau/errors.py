@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class GantryTauError(Exception):
@@ -29,10 +30,10 @@ class SolveError(GantryTauError):
 
     def __init__(self, message: str, *, time=None, equations=(), result=None, optimum=None):
         super().__init__(message)
-        self.time = time
+        self.time: Any = time
         self.equations = tuple(equations)
-        self.result = result
-        self.optimum = optimum
+        self.result: Any = result
+        self.optimum: Any = optimum
 
 
 def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:

@@ -52,7 +52,7 @@ def _names(dae: Dae, outputs: Sequence[str] | None) -> list[str]:
     orders = dae.indexed.orders
     for name in dae.variables:
         alias = dae.reduced.aliases.get(name)
-        if alias is not None and alias.root in orders:
+        if alias is not None and alias.root is not None and alias.root in orders:
             names += [derivative_name(name, k) for k in range(1, orders[alias.root] - alias.order + 1)]
     return names
 

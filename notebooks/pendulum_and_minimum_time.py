@@ -85,7 +85,7 @@ plt.show()
 # that are connected; `prototypes` holds the parameters that Dressler (2012) identified.
 
 # %%
-from gantrytau_models import GantryTau, prototypes  # noqa: E402
+from gantrytau_models import GantryTau, prototypes
 
 robot = translate(GantryTau(prototypes.GT_A))
 print(robot.diagnosis)
@@ -113,9 +113,9 @@ assert abs(holding.sum()) < 1e-9
 # A problem is the model plus objective, constraints, and what is free. It reads in the order of the mathematics.
 
 # %%
-from gantrytau_optimica import Free, Optimization, final, initial, optimize  # noqa: E402
+from gantrytau_optimica import Free, Optimization, final, initial, optimize
 
-from gantrytau import between  # noqa: E402  # isort: skip
+from gantrytau import between  # isort: skip
 
 
 class FreePath(Optimization):

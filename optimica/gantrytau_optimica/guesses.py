@@ -1,6 +1,7 @@
 """First guesses: what the caller gives, else a straight line between given ends, else the start values."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -78,12 +79,18 @@ def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> 
     return found
 
 
-def _one(name, value, k: int, size: int, factor: float, offset: float, start: float, span: float) -> Guess:
+def _one(
+    name: str, value: Any, k: int, size: int, factor: float, offset: float, start: float, span: float
+) -> Guess:
+    function: Any = value
+
     def guess(fraction: np.ndarray) -> np.ndarray:
         try:
-            if callable(value):
+            if isinstance(value, _Stretched):
+                raw = value.at(fraction)[:, None]
+            elif callable(value):
                 raw = np.array(
-                    [np.ravel(value(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float
+                    [np.ravel(function(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float
                 )
             else:
                 raw = np.tile(np.ravel(np.asarray(value, dtype=float)), (np.size(fraction), 1))
@@ -100,7 +107,18 @@ def _one(name, value, k: int, size: int, factor: float, offset: float, start: fl
     return guess
 
 
-def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Callable[[float], Any]]:
+@dataclass(frozen=True, eq=False)
+class _Stretched:
+    """A signal of another solution, given over shares of its own horizon."""
+
+    share: np.ndarray
+    values: np.ndarray
+
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        return np.interp(np.atleast_1d(fraction), self.share, self.values)
+
+
+def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Any]:
     """Guesses from another solution: its signals by name, its time stretched onto the new horizon."""
     times = np.asarray(source.time)
     names = [n for n in dae.variables if n in source]
@@ -108,12 +126,8 @@ def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Callable[[float]
     if missing:
         raise ModelError(f"guess: the given solution has no {missing[0]}; give a solution of the same model")
 
-    def signal(name: str) -> Guess:
-        values = np.asarray(source[name])
-        share = (times - times[0]) / (times[-1] - times[0])
-        return lambda fraction: np.interp(fraction, share, values)
-
-    return {name: signal(name) for name in names}
+    share = (times - times[0]) / (times[-1] - times[0])
+    return {name: _Stretched(share, np.asarray(source[name])) for name in names}
 
 
 def _ends(

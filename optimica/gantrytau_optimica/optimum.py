@@ -151,7 +151,7 @@ class Optimum:
         of the solution; between the collocation points they need not keep to limits.
         """
         elements = self.dae.expand(name)
-        whole = len(elements) > 1 or elements[0] != name
+        whole = elements != (name,)
 
         def value(times: Any) -> np.ndarray:
             times = np.asarray(times, dtype=float)

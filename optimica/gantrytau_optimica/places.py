@@ -60,10 +60,14 @@ class Places:
     def at_points(self) -> Sparse:
         """Matrix from the scaled unknowns to signals and free numbers at all points, one point after another."""
         count = self.fractions.size
-        columns = [table.reshape(count, table.shape[2]) for table in (self.states, self.algebraics, self.inputs)]
+        columns = [
+            table.reshape(count, table.shape[2]) for table in (self.states, self.algebraics, self.inputs)
+        ]
         columns.append(np.tile(self.free, (count, 1)))
         place = np.hstack(columns).ravel()
-        return sparse.csr_matrix((self.scale[place], (np.arange(place.size), place)), shape=(place.size, self.size))
+        return sparse.csr_matrix(
+            (self.scale[place], (np.arange(place.size), place)), shape=(place.size, self.size)
+        )
 
     def at_fraction(self, fraction: float) -> Sparse:
         """Matrix from the scaled unknowns to the signals at one place of [0, 1], by the element's polynomials."""
@@ -71,7 +75,10 @@ class Places:
         local = np.array([(fraction - self.mesh[e]) / (self.mesh[e + 1] - self.mesh[e])])
         nodes = np.vstack([self.starts[e], self.states[e]])
         parts = [(nodes, interpolation(self.scheme.nodes, local)[0])]
-        parts += [(table[e], interpolation(self.scheme.points, local)[0]) for table in (self.algebraics, self.inputs)]
+        parts += [
+            (table[e], interpolation(self.scheme.points, local)[0])
+            for table in (self.algebraics, self.inputs)
+        ]
         rows, places, values = [], [], []
         row = 0
         for table, weights in parts:
@@ -86,11 +93,16 @@ class Places:
     def numbers(self) -> Sparse:
         """Matrix from the scaled unknowns to the free numbers."""
         count = self.free.size
-        return sparse.csr_matrix((self.scale[self.free], (np.arange(count), self.free)), shape=(count, self.size))
+        return sparse.csr_matrix(
+            (self.scale[self.free], (np.arange(count), self.free)), shape=(count, self.size)
+        )
 
     def slopes(self) -> Sparse:
         """Matrix to the derivatives, with respect to the share of its element, of all states at all points."""
-        differentiation, sizes = self.scheme.differentiation, np.array([s.nominal for s in self.problem.states])
+        differentiation, sizes = (
+            self.scheme.differentiation,
+            np.array([s.nominal for s in self.problem.states]),
+        )
         n, k, nx = self.states.shape
         nodes = np.concatenate([self.starts[:-1, None, :], self.states], axis=1)  # (n, k + 1, nx)
         place = np.broadcast_to(nodes[:, None], (n, k, k + 1, nx))
@@ -101,7 +113,7 @@ class Places:
     def jumps(self) -> Sparse:
         """Matrix to the end of each element less the start of the next; no rows where the two are one unknown."""
         sizes = np.array([s.nominal for s in self.problem.states])
-        n, k, nx = self.states.shape
+        n, _, nx = self.states.shape
         if self.scheme.points[-1] == 1.0:
             return sparse.csr_matrix((0, self.size))
         nodes = np.concatenate([self.starts[:-1, None, :], self.states, self.starts[1:, None, :]], axis=1)
@@ -123,7 +135,9 @@ def lay_out(problem: ControlProblem, mesh: np.ndarray, scheme: Collocation) -> P
     states, algebraics, inputs = (
         point[..., None] + offset + np.arange(size) for offset, size in ((0, nx), (nx, nz), (nx + nz, nu))
     )
-    ends = states[:, -1] if shared else (first + per_element * np.arange(1, n + 1) - nx)[:, None] + np.arange(nx)
+    ends = (
+        states[:, -1] if shared else (first + per_element * np.arange(1, n + 1) - nx)[:, None] + np.arange(nx)
+    )
     starts = np.vstack([nf + np.arange(nx), ends])
     size = first + per_element * n
     return Places(problem, mesh, scheme, np.arange(nf), starts, states, algebraics, inputs, size)

@@ -79,7 +79,8 @@ def transcribe(problem: ControlProblem, mesh: np.ndarray, scheme: Collocation) -
     count = len(problem.boundary)
     if count:
         scatter = sparse.csr_matrix(
-            (np.ones(count), (np.arange(len(rows) - count, len(rows)), np.arange(count))), shape=(len(rows), count)
+            (np.ones(count), (np.arange(len(rows) - count, len(rows)), np.arange(count))),
+            shape=(len(rows), count),
         )
         constraints.append(_single_block(places, [m.expression for m in problem.boundary], scatter))
     lbw, ubw = _bounds(places)
@@ -129,7 +130,9 @@ def _local(problem: ControlProblem) -> ca.SX:
 def _timed(problem: ControlProblem, expression: ca.SX, fraction: ca.SX) -> ca.SX:
     """The expression with time written as a share of the horizon."""
     t = problem.start_time + fraction * (problem.final_time - problem.start_time)
-    return ca.substitute(expression, problem.time, t) if ca.depends_on(expression, problem.time) else expression
+    return (
+        ca.substitute(expression, problem.time, t) if ca.depends_on(expression, problem.time) else expression
+    )
 
 
 def _point_block(places: Places, path: list[Limit], count: int) -> Block:
@@ -168,7 +171,12 @@ def _single_block(places: Places, expressions: list[ca.SX], scatter) -> Block:
     """Expressions of values at single times and of free numbers, once."""
     problem = places.problem
     wanted = {leaf.element_hash() for e in expressions for leaf in ca.symvar(e)}
-    local, gather, old, new = [ca.vertcat(ca.SX(0, 1), *(n.symbol for n in problem.free))], [places.numbers()], [], []
+    local, gather, old, new = (
+        [ca.vertcat(ca.SX(0, 1), *(n.symbol for n in problem.free))],
+        [places.numbers()],
+        [],
+        [],
+    )
     signals = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in problem.signals))
     for point in problem.points:
         if not any(element.element_hash() in wanted for element in point.symbol.elements()):
@@ -183,7 +191,9 @@ def _single_block(places: Places, expressions: list[ca.SX], scatter) -> Block:
     if old:
         column = ca.substitute(column, ca.vertcat(*old), ca.vertcat(*new))
     matrix = sparse.vstack(gather).tocsr()
-    return Block(ca.vertcat(*local), ca.SX(0, 1), ca.SX(0, 1), ca.densify(column), np.zeros((0, 1)), matrix, scatter)
+    return Block(
+        ca.vertcat(*local), ca.SX(0, 1), ca.SX(0, 1), ca.densify(column), np.zeros((0, 1)), matrix, scatter
+    )
 
 
 def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:

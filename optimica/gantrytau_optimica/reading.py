@@ -71,9 +71,7 @@ def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
     mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
-    check_problem_units(
-        replace(flat, derivatives=derivatives), name, constraints, points, times
-    )
+    check_problem_units(replace(flat, derivatives=derivatives), name, constraints, points, times)
     dae = translate_flat(flat, given=names(root.given), find=mentioned)
     read = ReadProblem(name, dae, objective, integrand, (*constraints, *starts), tuple(points), *times)
     _check_objective(read)

@@ -56,7 +56,7 @@ def _why(error: Exception) -> str:
         return "Python's chained comparison and `and` cannot work on symbols; write between(lower, x, upper)"
     if isinstance(error, AttributeError) and isinstance(error.obj, Declared):
         names = [n for n in vars(error.obj) if not n.startswith("_")]
-        return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(error.name, names)}"
+        return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(str(error.name), names)}"
     if "Wrong number or type of arguments" in str(error):
         return "found something that is no number or expression among symbols; join lists with casadi.vertcat(*list)"
     text = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)

@@ -20,7 +20,9 @@ FORCES = [f"carts[{k}].f" for k in range(3)]
 def by_hand() -> ca.Function:
     """(T, T', f) -> T'' from the closed form of the thesis, parameters folded in as in the model's function."""
     T, v, f = ca.SX.sym("T", 3), ca.SX.sym("v", 3), ca.SX.sym("f", 3)
-    return ca.Function("hand", [T, v, f], [closed_form.forward_dynamics(closed_form.GT_A, T, v, f)], {"cse": True})
+    return ca.Function(
+        "hand", [T, v, f], [closed_form.forward_dynamics(closed_form.GT_A, T, v, f)], {"cse": True}
+    )
 
 
 def from_components() -> ca.Function:
@@ -52,7 +54,8 @@ def _accuracy(hand: ca.Function, model: ca.Function) -> Iterator[Row]:
         T = np.array([0.5, 3.0, -0.6]) + random.uniform(-0.4, 0.4, 3)
         v, f = random.uniform(-1, 1, 3), random.uniform(-1000, 1000, 3)
         a, b = np.array(hand(T, v, f)), np.array(model(T, v, f))
-        assert np.all(np.isfinite(a)) and np.all(np.isfinite(b))
+        assert np.all(np.isfinite(a))
+        assert np.all(np.isfinite(b))
         worst = max(worst, float(np.linalg.norm(a - b) / np.linalg.norm(a)))
     yield at_most("forward dynamics against closed form, 200 states, relative", worst, 1e-10)
 
@@ -64,7 +67,9 @@ def _compiled(hand: ca.Function, model: ca.Function) -> Row:
         points = np.random.default_rng(2).uniform(-0.3, 0.3, (3, 20000))
         T, f = points + np.array([[0.5], [3.0], [-0.6]]), 1000 * points
         times = in_turn({name: lambda g=g: g(T, points, f) for name, g in fast.items()}, 15)
-    return at_most("right-hand side, compiled time against closed form", times["model"] / times["hand"], 1.35, "x")
+    return at_most(
+        "right-hand side, compiled time against closed form", times["model"] / times["hand"], 1.35, "x"
+    )
 
 
 def _compile(function: ca.Function, folder: Path) -> ca.Function:

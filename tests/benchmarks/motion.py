@@ -55,7 +55,9 @@ def _against_peers(problem: Any) -> Iterator[Row]:
     medians = {name: statistics.median(found) for name, found in times.items()}
     yield shown("GT-A free row, seconds: model / by hand", f"{medians['model']:.3f} / {medians['hand']:.3f}")
     yield shown("GT-A free row, iterations: model / by hand", details)
-    yield at_most("GT-A free row, build and solve against by hand", medians["model"] / medians["hand"], 1.5, "x")
+    yield at_most(
+        "GT-A free row, build and solve against by hand", medians["model"] / medians["hand"], 1.5, "x"
+    )
     try:
         from tests.benchmarks import rockit_reference
     except ImportError:
