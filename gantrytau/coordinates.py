@@ -18,6 +18,9 @@ from gantrytau.symbols import derivative_name, split_derivative, time
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
+LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
+
+Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, time, sampled inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,9 @@ class Coordinates:
         old = ca.vertcat(time, self.t0, self.w)
         new = ca.vertcat(t, begin, w)
         ode, algebraic = ca.substitute([h * self.ode, self.algebraic], [old], [new])
-        problem = {"t": tau, "x": self.x, "p": p, "u": u, "ode": ode}
+        # an integrator needs a state: a model without one gets a constant
+        x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
+        problem = {"t": tau, "x": x, "p": p, "u": u, "ode": ode}
         options = {
             "abstol": tolerance,
             "reltol": tolerance,
@@ -110,7 +115,7 @@ class Coordinates:
 
     def project(self, x: np.ndarray, t: float, w: np.ndarray) -> np.ndarray:
         """The nearest point that satisfies all constraints; SolveError if there is none near."""
-        x = x.copy()
+        x, worst = x.copy(), 0.0
         for columns, level in self._levels:
             for _ in range(STEPS):
                 residual, jacobian = (np.array(m) for m in level(x, t, t, w))
@@ -123,21 +128,22 @@ class Coordinates:
                 raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {t:.6g} s", time=t)
         return x
 
-    def weakest(self, x: np.ndarray, z: np.ndarray, t: float, w: np.ndarray) -> list[str]:
-        """Names of the equations that come nearest to depending on each other at a point."""
+    def weakest(self, point: Point, start: Point) -> list[str]:
+        """Names of the equations that nearly depend on each other at a point, if they did not at the start."""
         if self.pivots.numel() == 0:
             return []
         function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
-        matrix = np.array(function(x, z, t, t, w))
-        if not np.all(np.isfinite(matrix)):
+        here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
+        if not (np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
             return []
-        matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
-        left, values, _ = np.linalg.svd(matrix)
-        if values[-1] > 1e-3 * values[0]:
+        rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
+        columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
+        left, values, _ = np.linalg.svd(here / rows / columns)
+        if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
             return []
-        strongest = np.argsort(-np.abs(left[:, -1]))[:4]
+        shares = np.abs(left[:, -1])
         equations = self.dae.reduced.equations
-        return [equations[i].name for i in strongest if abs(left[i, -1]) > 0.1]
+        return [equations[i].name for i in np.argsort(-shares)[:4] if shares[i] > 0.3 * np.max(shares)]
 
 
 def _level_columns(names: Sequence[str]) -> list[str]:
@@ -147,7 +153,7 @@ def _level_columns(names: Sequence[str]) -> list[str]:
     return [n for n in names if orders[n] == highest] if highest else list(names)
 
 
-def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
+def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[str] = ()) -> Coordinates:
     """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
     without value, or a sampled one that has to be differentiated.
     """
@@ -167,7 +173,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal]) -> Coordinates:
         if not highest.keys() & set(block.unknowns):
             block.enter(guide)
     blocks = solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
-    known = _known_symbols(dae, signals, sampled, w, t0)
+    known = _known_symbols(dae, signals, sampled, w, t0, outputs)
     numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions = [*numbers, *((chains.named(n), e) for n, e in known.items())]
     implicit = [b for b in blocks if b.solution is None]
@@ -214,10 +220,20 @@ def _invariants(dae: Dae) -> list[ca.SX]:
 
 
 def _known_symbols(
-    dae: Dae, signals: Mapping[str, Signal], sampled: Sequence[str], w: ca.SX, t0: ca.SX
+    dae: Dae,
+    signals: Mapping[str, Signal],
+    sampled: Sequence[str],
+    w: ca.SX,
+    t0: ca.SX,
+    outputs: Sequence[str],
 ) -> dict[str, ca.SX]:
     """Inputs and those of their derivatives that occur, as expressions of time and samples."""
     occurring = {leaf.name() for r in dae.indexed.residuals.values() for leaf in ca.symvar(r)}
+    for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
+        base, order = split_derivative(asked)
+        alias = dae.reduced.aliases.get(base)
+        if alias is not None and alias.root in dae.known:
+            occurring.add(derivative_name(alias.root, alias.order + order))
     starts = {n for v in dae.flat.variables if v.start is not None for n in v.elements}
     known: dict[str, ca.SX] = {}
     for name in dae.known:
@@ -226,8 +242,8 @@ def _known_symbols(
         if isinstance(signal, Samples):
             if top > 0:
                 raise ModelError(
-                    f"input {name} is differentiated {top} times by the model, which samples do not allow; give a "
-                    "function of time that accepts symbols, or pass the samples through a filter component"
+                    f"input {name} is differentiated {top} times by the model, which samples do not allow; give "
+                    "a function of time that accepts symbols, or pass the samples through a filter component"
                 )
             k = sampled.index(name)
             known[name] = w[k] + w[len(sampled) + k] * (time - t0)
@@ -240,5 +256,5 @@ def _known_symbols(
             signal = ca.SX(dae.start[name])
         for order in range(top + 1):
             known[derivative_name(name, order)] = signal
-            signal = ca.jacobian(signal, time)
+            signal = ca.densify(ca.jacobian(signal, time))
     return known

@@ -29,6 +29,8 @@ def read_signals(given: Mapping[str, Any], expand: Callable[[str], Sequence[str]
     Raises ModelError for what is none of these, has the wrong length, gaps, NaN or unsorted times.
     """
     found: dict[str, Signal] = {}
+    if not isinstance(given, Mapping):
+        raise ModelError(f"inputs: found {given!r}, expected {{name: number, function of time or samples}}")
     for name, value in given.items():
         elements = expand(name)
         if callable(value):
@@ -53,6 +55,11 @@ def _function(name: str, function: Callable[[Any], Any], size: int) -> list[Sign
             f"input {name}: the function of time does not work on a symbol ({reason}); write it with "
             "gantrytau.sin, exp, if_else, ..., or give samples (times, values)"
         ) from error
+    if any(e.is_constant() and not np.isfinite(float(e)) for e in expression.elements()):
+        raise ModelError(
+            f"input {name}: the function of time does not work on a symbol (it gave {expression}); write it with "
+            "gantrytau.sin, exp, if_else, ..., or give samples (times, values)"
+        )
     return list(_sized(name, expression, size))
 
 

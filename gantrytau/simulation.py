@@ -6,6 +6,7 @@ that only the choice makes. Constraints and their derivatives are kept by projec
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -14,14 +15,26 @@ import numpy as np
 from gantrytau.coordinates import Coordinates, all_coordinates
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
+from gantrytau.flat_model import FlatModel
 from gantrytau.model import Model
 from gantrytau.parameters import with_values
 from gantrytau.result import Result
 from gantrytau.signals import Samples, Signal, read_signals
+from gantrytau.symbols import split_derivative
 from gantrytau.trajectories import result_of
-from gantrytau.translation import retranslate, translate
+from gantrytau.translation import names, retranslate, translate
 
 CHUNK = 10  # output intervals between two projections onto the constraints
+HALVINGS = 8  # of the last step, to come near to where the integration stops
+REASONS = {
+    "TOO_MUCH_WORK": "the steps became too small",
+    "ERR_FAIL": "the steps became too small",
+    "CONV_FAIL": "the equations of a step found no solution",
+    "RHSFUNC": "the equations are not finite",
+    "RES_FAIL": "the equations are not finite",
+    "LSETUP_FAIL": "the equations of a step are singular",
+    "LSOLVE_FAIL": "the equations of a step are singular",
+}
 LONG = 2.0  # s of waiting after which progress is shown
 
 
@@ -47,12 +60,16 @@ def simulate(
     _check(start, stop, tolerance, points)
     dae = model if isinstance(model, Dae) else translate(model)
     if parameters:
-        dae = retranslate(dae, with_values(dae.flat, parameters))
-    for name in outputs or ():
+        dae = retranslate(dae, _with_parameters(dae, parameters))
+    wanted = names(outputs or ())
+    for name in wanted:
         dae.expand(name)
+    if any(split_derivative(name)[1] for name in wanted):
+        chosen = {**dae.settings, "find": (*dae.settings["find"], *wanted)}
+        dae = retranslate(replace(dae, settings=chosen), dae.flat)
     signals = read_signals(inputs or {}, dae.expand)
     _check_inputs(dae, signals, start, stop)
-    coordinates = all_coordinates(dae, signals)
+    coordinates = all_coordinates(dae, signals, wanted)
     grid = np.linspace(start, stop, points)
     run = _Run(coordinates, signals, grid, tolerance)
     try:
@@ -71,12 +88,26 @@ def simulate(
 
 
 def _check(start: float, stop: float, tolerance: float, points: int) -> None:
-    if not (np.isfinite(start) and np.isfinite(stop) and stop > start):
-        raise ModelError(f"simulate: found start={start} and stop={stop}, expected start < stop, both finite")
-    if not 0 < tolerance < 1:
-        raise ModelError(f"simulate: found tolerance={tolerance}, expected a number between 0 and 1, as 1e-8")
-    if points < 2:
-        raise ModelError(f"simulate: found points={points}, expected at least 2")
+    numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
+    if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
+        raise ModelError(
+            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s"
+        )
+    if not isinstance(tolerance, (float, np.floating)) or not 0 < tolerance < 1:
+        raise ModelError(
+            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8"
+        )
+    if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
+        raise ModelError(f"simulate: found points={points!r}, expected a whole number of at least 2")
+
+
+def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> FlatModel:
+    for name, value in parameters.items():
+        try:
+            np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise ModelError(f"parameters: {name}: found {value!r}, expected a number or an array") from None
+    return with_values(dae.flat, parameters)
 
 
 def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:
@@ -152,12 +183,13 @@ class _Run:
         if self.samples:
             rows += list(np.array([self._inputs(here + k) for k in range(count)]).T)
         found = self.integrators[count](
-            x0=self.x[here],
+            x0=self.x[here] if self.coordinates.states else 0.0,
             z0=self.z[here],
             p=[self.mesh[here], h[0]] if uniform else [],
             u=[] if uniform else np.vstack(rows),
         )
         x, z = np.array(found["xf"]).T, np.array(found["zf"]).T.reshape(count, -1)
+        x = x if self.coordinates.states else np.zeros((count, 0))
         if not np.all(np.isfinite(x)):
             raise RuntimeError("the solution is not finite")
         for k in range(count):
@@ -167,17 +199,45 @@ class _Run:
         self.done = here + count
 
     def _stopped(self, error: Exception) -> SolveError:
-        t = float(self.mesh[self.done])
-        dae = self.coordinates.dae
-        names = self.coordinates.weakest(self.x[self.done], self.z[self.done], t, self._inputs(self.done))
-        reason = "; ".join(line for line in str(error).splitlines() if "CV_" in line or "IDA_" in line)[:200]
-        where = f" The equations that degenerate there: {'; '.join(names)}." if names else ""
-        return SolveError(
-            f"{dae.name}: the integration stopped at t = {t:.6g} s ({reason or str(error).splitlines()[-1]}).{where} "
-            "The model may run into a singular position there; .result holds what was computed",
-            time=t,
-            equations=names,
+        t, x, z, inputs = self._approach()
+        weakest = self.coordinates.weakest(
+            (x, z, t, inputs), (self.x[0], self.z[0], self.mesh[0], self._inputs(0))
         )
+        reason = next(
+            (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
+        )
+        where = f" The equations that degenerate there: {'; '.join(weakest)}." if weakest else ""
+        return SolveError(
+            f"{self.coordinates.dae.name}: the integration stopped at t = {t:.6g} s: {reason}.{where} The model may "
+            "run into a singular position there, or its solution may grow beyond all limits; .result holds what was "
+            "computed: look at it, and shorten the time or change the inputs",
+            time=t,
+            equations=weakest,
+        )
+
+    def _approach(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """The last point that can be reached behind the last output point, by halved steps."""
+        t, x, z = float(self.mesh[self.done]), self.x[self.done], self.z[self.done]
+        inputs = self._inputs(self.done)
+        half = len(self.samples)
+        step = self.mesh[min(self.done + 1, self.mesh.size - 1)] - t
+        for _ in range(HALVINGS if 1 in self.integrators else 0):
+            step /= 2
+            try:
+                found = self.integrators[1](
+                    x0=x if self.coordinates.states else 0.0,
+                    z0=z,
+                    p=[] if half else [t, step],
+                    u=[t, step, 0, *inputs] if half else [],
+                )
+                there = np.concatenate([inputs[:half] + step * inputs[half:], inputs[half:]])
+                near = np.array(found["xf"]).ravel()[: x.size]
+                if np.all(np.isfinite(near)):
+                    near = self.coordinates.project(near, t + step, there)
+                    t, x, z, inputs = t + step, near, np.array(found["zf"]).ravel(), there
+            except (RuntimeError, SolveError):
+                continue
+        return t, x, z, inputs
 
 
 class _Progress:
