@@ -53,7 +53,10 @@ def told(place: str, evaluate: Callable[[], Any]) -> Any:
 
 def _why(error: Exception) -> str:
     if "truth value" in str(error):
-        return "Python's chained comparison and `and` cannot work on symbols; write between(lower, x, upper)"
+        return (
+            "Python's chained comparison, `and` and the comparison of lists cannot work on symbols; write "
+            "between(lower, x, upper), and join lists with casadi.vertcat(*list)"
+        )
     if isinstance(error, AttributeError) and isinstance(error.obj, Declared):
         names = [n for n in vars(error.obj) if not n.startswith("_")]
         return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(str(error.name), names)}"
