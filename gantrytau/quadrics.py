@@ -1,8 +1,8 @@
 """Two or three quadratics whose quadratic parts are the same: intersecting circles and spheres, in closed form.
 
-    f_i(y) = y'Hy/2 + b_i'y + c_i = 0.  Differences of equations are linear and leave a line y = y_0 + t n;
-    on the line the first equation is a quadratic in t. Nothing is divided but by n'n and n'Hn: that fails only
-    where the centres lie on a line.
+f_i(y) = y'Hy/2 + b_i'y + c_i = 0.  Differences of equations are linear and leave a line y = y_0 + t n;
+on the line the first equation is a quadratic in t. Nothing is divided but by n'n and n'Hn: that fails only
+where the centres lie on a line.
 """
 
 import casadi as ca

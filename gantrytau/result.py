@@ -131,7 +131,9 @@ class Result:
         values: dict[str, Values] = {}
         for name in names:
             elements = self._arrays[name].flat if name in self._arrays else [name]
-            values.update((str(element), self[str(element)]) for element in elements)  # an unknown name raises
+            values.update(
+                (str(element), self[str(element)]) for element in elements
+            )  # an unknown name raises
         units = {name: self.unit(name) for name in values}
         words = {name: self.description(name) for name in values}
         return Result(self._time, values, units=units, descriptions=words, title=self._title)

@@ -92,7 +92,9 @@ def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
     definitions: list[tuple[ca.SX, ca.SX]] = []
     algebraics: list[Algebraic] = []
     for block in dae.blocks:
-        keep = form == "lifted" and block.kind in ("quadratic", "linear", "spheres") and len(block.unknowns) > 0
+        keep = (
+            form == "lifted" and block.kind in ("quadratic", "linear", "spheres") and len(block.unknowns) > 0
+        )
         if block.solution is None:
             algebraics += [
                 Algebraic(y.name(), y, r, None) for y, r in zip(block.tears, block.residuals, strict=True)
