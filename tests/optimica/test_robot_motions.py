@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import simulate
+from gantrytau import Fixed, simulate
 from gantrytau.cli import _motion
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import optimize
@@ -62,10 +62,8 @@ def test_played_back_the_motion_ends_where_it_should():
     found = optimize(FREE(weight=0.01), elements=60)
     times = np.linspace(0, found.final_time, 2001)
     forces = {f"carts[{k}].f": (times, found.signal(f"robot.carts[{k}].f")(times)) for k in range(3)}
-    starts = {
-        "tool": {"r": {"start": found["robot.tool.r"][0], "fixed": True}, "v": {"start": 0.0, "fixed": True}}
-    }
-    played = simulate(GantryTau(prototypes.GT_A, **starts), stop=found.final_time, inputs=forces)
+    tool = dict(r=Fixed(found["robot.tool.r"][0]), v=Fixed(0.0))
+    played = simulate(GantryTau(prototypes.GT_A, tool=tool), stop=found.final_time, inputs=forces)
     # the torques of this weight are smooth but at both ends, where their polynomials wiggle
     assert played["tool.r"][-1] == pytest.approx([1.711, 3.46, -0.24], abs=2e-3)
 
