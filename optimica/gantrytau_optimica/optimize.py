@@ -15,7 +15,7 @@ from gantrytau_optimica.ipopt import Progress, Solver
 from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import Program, transcribe
-from gantrytau_optimica.reach import out_of_reach
+from gantrytau_optimica.reach import out_of_reach, reach_text
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import FreeNumber
 from gantrytau_optimica.scheme import collocation
@@ -121,7 +121,7 @@ class Prepared:
         if lost:
             unsolved = self.solver.unsolved(program, _first(program, built))
             raise SolveError(
-                f"{read.name}: no solution: {'; '.join(str(x) for x in lost)}. Correct these conditions, or the "
+                f"{read.name}: no solution: {reach_text(lost)}. Correct these conditions, or the "
                 "parameters of the model.",
                 equations=[x.equation for x in lost],
                 optimum=Optimum(read.name, built, program, unsolved, self.build_time),

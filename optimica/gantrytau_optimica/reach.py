@@ -1,5 +1,6 @@
 """Ends that the model cannot reach, found before solving: a square root of what is negative there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -20,11 +21,17 @@ class OutOfReach:
     conditions: tuple[str, ...]
     missing: float  # how much its square falls short
 
-    def __str__(self) -> str:
-        return (
-            f"the {WORDS[self.when]} is out of reach: {', '.join(f'`{c}`' for c in self.conditions)} leave no "
-            f"solution of {self.equation} (the square in it would have to be {self.missing:.4g} larger)"
-        )
+
+def reach_text(lost: Sequence[OutOfReach]) -> str:
+    """What cannot be reached, by end and conditions, the worst equation first."""
+    groups: dict[tuple[str, tuple[str, ...]], list[OutOfReach]] = {}
+    for one in sorted(lost, key=lambda x: -x.missing):
+        groups.setdefault((one.when, one.conditions), []).append(one)
+    return "; ".join(
+        f"the {WORDS[when]} is out of reach: {', '.join(f'`{c}`' for c in conditions)} leave no solution of "
+        + ", nor of ".join(f"{x.equation} (the square there would be {-x.missing:.4g})" for x in found)
+        for (when, conditions), found in groups.items()
+    )
 
 
 def out_of_reach(built: Built) -> list[OutOfReach]:

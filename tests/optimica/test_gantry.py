@@ -80,10 +80,21 @@ def test_an_end_out_of_reach_names_the_links_and_the_conditions():
     words = str(caught.value)
     assert words.startswith("Far: no solution: the end is out of reach: `final(robot.tool.r[0]) == 1.711`")
     assert "leave no solution of robot.arms[1].link (SphericalSpherical), equation 1" in words
+    assert words.count("final(robot.tool.r[0])") == 1
     assert "from which robot.carts[1].s follows" in words
     assert "sqrt" not in words
     assert caught.value.optimum["robot.tool.r"].shape == (151, 3)
     assert not caught.value.optimum.success
+
+
+def test_a_start_out_of_reach_is_named_too():
+    class Far(FREE):
+        def constraints(self):
+            yield initial(self.robot.tool.r) == (0.0, 4.9, -1.03)
+            yield final(self.robot.tool.r) == END
+
+    with pytest.raises(SolveError, match=r"the start is out of reach: `initial\(robot\.tool\.r\[0\]\) == 0`"):
+        optimize(Far)
 
 
 def test_a_motion_that_is_too_fast_says_which_limits_are_in_the_way():
