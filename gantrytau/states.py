@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.aliases import Chains
+from gantrytau.aliases import Reduced
 from gantrytau.declarations import StateSelect
 from gantrytau.errors import StructureError
 from gantrytau.guide import sample_values
 from gantrytau.index_reduction import Indexed
-from gantrytau.symbols import derivative_name
+from gantrytau.symbols import derivative_name, split_derivative
 
 GOOD_PIVOT = 0.05  # of the column before elimination: smaller ones wait for a better preferred variable
 LEAST_PIVOT = 1e-9
@@ -33,7 +33,7 @@ class StateChoice:
 
 def choose_states(
     indexed: Indexed,
-    chains: Chains,
+    reduced: Reduced,
     sample: Mapping[str, float],
     preference: Mapping[str, int],
     wanted: Sequence[str],
@@ -50,7 +50,7 @@ def choose_states(
     for level in range(1, max(indexed.counts, default=0) + 1):
         rows = [i for i, count in enumerate(indexed.counts) if count >= level]
         columns = [n for n in allowed if indexed.orders[n] >= level]
-        chosen, conditioned = _basis(indexed, chains, sample, preference, wanted, rows, columns, title)
+        chosen, conditioned = _basis(indexed, reduced, sample, preference, wanted, rows, columns, title)
         condition = max(condition, conditioned)
         dummies |= {derivative_name(n, indexed.orders[n] - level) for n in chosen}
         allowed = chosen
@@ -70,13 +70,13 @@ def choose_states(
     return StateChoice(states, tuple(sorted(dummies)), condition)
 
 
-def _basis(indexed, chains, sample, preference, wanted, rows, columns, title) -> tuple[list[str], float]:
+def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -> tuple[list[str], float]:
     """Which variables become dependent: as many as there are rows, the least preferred first."""
-    x = ca.vertcat(*(chains.sx(n, indexed.orders[n]) for n in columns))
+    x = ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in columns))
     f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
     matrix = sample_values(ca.jacobian(f, x), sample)
     matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
-    asked = {n.removeprefix("der(").rstrip(")") if n.startswith("der(") else n for n in wanted}
+    asked = {split_derivative(n)[0] for n in wanted}
     groups: dict[int, list[int]] = {}
     for place, name in enumerate(columns):
         weight = StateSelect.ALWAYS + 1 if name in asked else preference.get(name, StateSelect.DEFAULT)
@@ -97,18 +97,18 @@ def _basis(indexed, chains, sample, preference, wanted, rows, columns, title) ->
                 rest -= np.outer(direction, direction @ rest)
                 chosen.append(column)
     if len(chosen) < len(rows):
-        raise StructureError(_singular(indexed, rows, matrix, title))
+        raise StructureError(_singular(reduced, rows, matrix, title))
     singular_values = np.linalg.svd(matrix[:, chosen], compute_uv=False)
     return [columns[j] for j in sorted(chosen)], float(singular_values[0] / singular_values[-1])
 
 
-def _singular(indexed, rows, matrix, title) -> str:
-    u, values, _ = np.linalg.svd(matrix)
-    weak = np.argsort(-np.abs(u[:, -1]))[:4]
+def _singular(reduced: Reduced, rows: Sequence[int], matrix: np.ndarray, title: str) -> str:
+    left, values, _ = np.linalg.svd(matrix)
+    weak = [i for i in np.argsort(-np.abs(left[:, -1]))[:4] if abs(left[i, -1]) > 0.1]
+    names = "; ".join(
+        f"{reduced.equations[rows[i]].name} `{reduced.equations[rows[i]].text[:80]}`" for i in sorted(weak)
+    )
     return (
-        f"{title}: constraints depend on each other at the start (smallest singular value "
-        f"{values[-1]:.2g}): they "
-        f"include constraint{'s' if len(weak) > 1 else ''} number "
-        f"{', '.join(str(rows[i]) for i in sorted(weak))}. "
-        "Start from another pose, or remove the redundant constraint"
+        f"{title}: constraints depend on each other at the start (smallest singular value {values[-1]:.2g}, expected "
+        f"above {LEAST_PIVOT:g}): {names}. Start from another pose, or remove the constraint that repeats another"
     )

@@ -80,7 +80,7 @@ def translate_flat(
         if alias.root is not None and alias.root != name:
             preference[alias.root] = max(preference[alias.root], preference[name])
     wanted = [_state_name(reduced.aliases, n) for name in states for n in expand(flat, name)]
-    choice = choose_states(indexed, reduced.chains, sample, preference, wanted, flat.name)
+    choice = choose_states(indexed, reduced, sample, preference, wanted, flat.name)
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.residuals, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}

@@ -258,3 +258,28 @@ def test_a_mass_on_an_inclined_rail():
     at = translate(Incline()).evaluate({"rail.s": 1.0, "motor.f": 4.0})
     assert at["der(rail.v)"] == pytest.approx(9.81 / np.sqrt(2) + 2.0, rel=1e-14)
     assert at["body.frame_a.r"] == pytest.approx(np.array([1.0, 0.0, -1.0]) / np.sqrt(2), rel=1e-14)
+
+
+class TwiceHeld(Model):
+    """A point mass on two rods of one length between the same two points: one of them repeats the other."""
+
+    world = World()
+    mass = PointMass()
+    rods = Array(SphericalSpherical, 2)
+
+    def equations(self):
+        for rod in self.rods:
+            yield connect(self.world.frame_b, rod.frame_a)
+            yield connect(rod.frame_b, self.mass.frame_a)
+
+
+def test_constraints_that_repeat_each_other_are_named():
+    start = dict(frame_a=dict(r=dict(start=[0.6, 0.0, -0.8])))
+    with pytest.raises(StructureError, match=r"TwiceHeld: constraints depend on each other") as raised:
+        translate(TwiceHeld(mass=start))
+    for words in (
+        "rods[0] (SphericalSpherical), equation 1",
+        "rods[1] (SphericalSpherical)",
+        "remove the constraint",
+    ):
+        assert words in str(raised.value)

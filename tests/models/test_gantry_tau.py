@@ -61,7 +61,10 @@ def relative(found, expected):
 def mapped(function, *columns):
     """A CasADi function called for each row; the results stacked, (n, k)."""
     return np.array(
-        [np.concatenate([np.ravel(r) for r in _tuple(function(*row))]) for row in zip(*columns, strict=True)]
+        [
+            np.concatenate([np.array(r).ravel() for r in _tuple(function(*row))])
+            for row in zip(*columns, strict=True)
+        ]
     )
 
 
