@@ -77,7 +77,7 @@ def demo(
     files = [output / "paths.png", output / "torques.png"]
     with screen.status("drawing"):
         demonstration.draw_paths(optima, files[0])
-        demonstration.draw_torques(optima, _motion()[2], files[1])
+        demonstration.draw_torques(optima, motion_problems()[2], files[1])
         for key, optimum in optima.items():
             files.append(output / f"{key}.csv")
             demonstration.save_trajectory(optimum, files[-1])
@@ -93,7 +93,7 @@ def _solve_rows(screen: Any) -> dict[str, Any]:
     from gantrytau import demonstration
     from gantrytau_optimica import optimize
 
-    free, line, _ = _motion()
+    free, line, _ = motion_problems()
     optima: dict[str, Any] = {}
     with screen.status("translating the robot") as status:
 
@@ -110,7 +110,7 @@ def _solve_rows(screen: Any) -> dict[str, Any]:
     return optima
 
 
-def _motion() -> tuple[Any, Any, float]:
+def motion_problems() -> tuple[Any, Any, float]:
     """The motion from A to B as problems, on a free path and along the straight line, and the torque limit in N.m."""
     from gantrytau import Input, Parameter, Real
     from gantrytau_models import GantryTau, prototypes

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Parameter, SolveError
-from gantrytau.cli import _motion
+from gantrytau.cli import motion_problems
 from gantrytau_models import prototypes
 from gantrytau_optimica import final, initial, prepare
 
@@ -33,7 +33,7 @@ class Verdict:
 
 def sweep(count: int, seed: int, **policy: Any) -> Iterator[Verdict]:
     """Minimum-time motions on free paths between `count` random pairs of poses; the program is built once."""
-    free, _, _ = _motion()
+    free, _, _ = motion_problems()
 
     class BetweenPoses(free):
         """The free motion between poses that are parameters."""
