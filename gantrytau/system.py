@@ -1,7 +1,7 @@
 """The sorted blocks put together as one semi-explicit system, with what has no closed form left implicit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -88,69 +88,60 @@ def _cumulative(sizes) -> list[int]:
 
 def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
     """Put the blocks of a Dae together; see Dae.system."""
-    chains = dae.reduced.chains
-    definitions: list[tuple[ca.SX, ca.SX]] = []
-    algebraics: list[Algebraic] = []
-    for block in dae.blocks:
-        keep = (
-            form == "lifted" and block.kind in ("quadratic", "linear", "spheres") and len(block.unknowns) > 0
-        )
-        if block.solution is None:
-            algebraics += [
-                Algebraic(y.name(), y, r, None) for y, r in zip(block.tears, block.residuals, strict=True)
-            ]
-        elif keep and block.root is not None:
-            # s = middle + side * w with w^2 = radicand, w >= 0: no square root to differentiate at zero
-            name = f"sqrt({block.tears[0].name()})"
-            w = ca.SX.sym(name)
-            algebraics.append(
-                Algebraic(name, w, w**2 - block.root.radicand, ca.sqrt(ca.fmax(block.root.radicand, 0)), 0.0)
-            )
-            definitions.append((block.tears[0], block.root.middle + block.root.side * w))
-        elif keep and len(block.tears) > 1:
-            algebraics += [
-                Algebraic(y.name(), y, r, s)
-                for y, r, s in zip(block.tears, block.residuals, block.solution, strict=True)
-            ]
-        else:
-            definitions += zip(block.tears, block.solution, strict=True)
-        definitions += block.inner
-    states = dae.choice.states
-    derivatives = []
-    for name in states:
-        base, order = split_derivative(name)
-        derivatives.append(chains.sx(base, order + 1))
-    ode = ca.vertcat(*derivatives) if derivatives else ca.SX(0, 1)
-    residuals = ca.vertcat(*(a.residual for a in algebraics)) if algebraics else ca.SX(0, 1)
+    chains, table = dae.reduced.chains, dae.table
+    definitions, algebraics = _left_implicit(dae, form)
+    rates = [chains.sx(base, order + 1) for base, order in map(split_derivative, dae.choice.states)]
     draft = System(
         dae=dae,
         time=dae.flat.time,
         states=dae.states,
-        x=ca.vertcat(*(chains.named(n) for n in states)) if states else ca.SX(0, 1),
+        x=_column([chains.named(n) for n in dae.choice.states]),
         algebraics=tuple(algebraics),
-        z=ca.vertcat(*(a.symbol for a in algebraics)) if algebraics else ca.SX(0, 1),
+        z=_column([a.symbol for a in algebraics]),
         inputs=dae.known,
-        u=ca.vertcat(*(chains.sx(n) for n in dae.known)) if dae.known else ca.SX(0, 1),
-        parameters=dae.table.independent,
-        p=ca.vertcat(*(dae.table.symbols[n] for n in dae.table.independent))
-        if dae.table.independent
-        else ca.SX(0, 1),
+        u=_column([chains.sx(n) for n in dae.known]),
+        parameters=table.independent,
+        p=_column([table.symbols[n] for n in table.independent]),
         definitions=tuple(definitions),
-        ode=ode,
-        residuals=residuals,
+        ode=_column(rates),
+        residuals=_column([a.residual for a in algebraics]),
     )
     closed = [a.closed for a in algebraics if a.closed is not None]
-    ode, residuals, *closed = draft.resolve([ode, residuals, *closed])
+    ode, residuals, *closed = draft.resolve([draft.ode, draft.residuals, *closed])
     given = iter(closed)
     resolved = tuple(
-        Algebraic(a.name, a.symbol, residuals[i], None if a.closed is None else next(given), a.min)
+        replace(a, residual=residuals[i], closed=None if a.closed is None else next(given))
         for i, a in enumerate(algebraics)
     )
-    return System(
-        **{
-            **{k: getattr(draft, k) for k in draft.__dataclass_fields__},
-            "ode": ode,
-            "residuals": residuals,
-            "algebraics": resolved,
-        }
-    )
+    return replace(draft, ode=ode, residuals=residuals, algebraics=resolved)
+
+
+def _left_implicit(
+    dae: "Dae", form: Literal["explicit", "lifted"]
+) -> tuple[list[tuple[ca.SX, ca.SX]], list[Algebraic]]:
+    """What the blocks define outright, in order, and what stays as an equation."""
+    definitions: list[tuple[ca.SX, ca.SX]] = []
+    algebraics: list[Algebraic] = []
+    for block in dae.blocks:
+        count = len(block.tears)
+        solution: Sequence[ca.SX | None] = block.solution or [None] * count
+        several = count > 1 and block.kind in ("linear", "spheres")
+        if form == "lifted" and block.root is not None:
+            # s = middle + side * w with w^2 = radicand, w >= 0: no square root to differentiate at zero
+            name, root = f"sqrt({block.tears[0].name()})", block.root
+            w = ca.SX.sym(name)
+            algebraics.append(
+                Algebraic(name, w, w**2 - root.radicand, ca.sqrt(ca.fmax(root.radicand, 0)), 0.0)
+            )
+            definitions.append((block.tears[0], root.middle + root.side * w))
+        elif block.solution is None or (form == "lifted" and several):
+            rows = zip(block.tears, block.residuals, solution, strict=True)
+            algebraics += [Algebraic(y.name(), y, residual, closed) for y, residual, closed in rows]
+        else:
+            definitions += zip(block.tears, block.solution, strict=True)
+        definitions += block.inner
+    return definitions, algebraics
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
