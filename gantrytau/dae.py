@@ -68,6 +68,9 @@ class Dae:
     start: Mapping[str, float]
     settings: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return f"<Dae {self.name}: {len(self.states)} states, {len(self.known)} inputs, {len(self.blocks)} blocks>"
+
     @property
     def name(self) -> str:
         """Class of the model."""

@@ -120,8 +120,23 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
             )
         else:
             independent.append(name)
+    _check_limits(flat, values)
     declared = [n for p in flat.parameters for n in p.elements]
     return ParameterTable(tuple(n for n in declared if n in set(independent)), values, expressions, symbols)
+
+
+def _check_limits(flat: FlatModel, values: Mapping[str, float]) -> None:
+    """ModelError for a parameter outside of its min and max; one that is free is the optimiser's concern."""
+    for parameter in flat.parameters:
+        for place, name in enumerate(parameter.elements):
+            for limit, word in ((parameter.min, "at least"), (parameter.max, "at most")):
+                if limit is None or parameter.free or not limit[place].is_constant():
+                    continue
+                bound = float(limit[place])
+                if values[name] < bound if word == "at least" else values[name] > bound:
+                    raise ModelError(
+                        f"{name}: value is {values[name]:g}, expected {word} {bound:g} ({parameter.description}); correct it"
+                    )
 
 
 def _sorted(needs: Mapping[str, list[str]]) -> list[str]:

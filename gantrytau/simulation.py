@@ -16,6 +16,7 @@ from gantrytau.coordinates import Coordinates, all_coordinates
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.flat_model import FlatModel
+from gantrytau.interruption import on_interrupt
 from gantrytau.model import Model
 from gantrytau.parameters import with_values
 from gantrytau.result import Result
@@ -150,7 +151,8 @@ class _Run:
     def go(self) -> None:
         self.x[0], self.z[0] = self.coordinates.start(self.mesh[0], self._inputs(0))
         last = self.mesh.size - 1
-        with _Progress(self.mesh[0], self.mesh[-1]) as progress:
+        pressed: list[bool] = []
+        with _Progress(self.mesh[0], self.mesh[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
             size = CHUNK if self.coordinates.constrained or self.samples else last
             size = min(size, max(CHUNK, last // 50))
             while self.done < last:
@@ -163,6 +165,8 @@ class _Run:
                     size = 1
                     continue
                 progress.at(self.mesh[self.done])
+                if pressed:
+                    raise KeyboardInterrupt
 
     def _inputs(self, k: int) -> np.ndarray:
         """Values and slopes of the sampled inputs on the k-th interval of the mesh."""

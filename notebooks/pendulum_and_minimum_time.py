@@ -64,7 +64,7 @@ print(dae.equations())
 # matter that neither x nor y alone is a good coordinate all the way round.
 
 # %%
-swing = simulate(dae, stop=100.0, tolerance=1e-8)
+swing = simulate(dae, stop=100.0, tolerance=1e-8, points=5001)
 length = np.hypot(swing["x"], swing["y"])
 energy = 0.5 * (swing["der(x)"] ** 2 + swing["der(y)"] ** 2) + 9.81 * swing["y"]
 print(f"rod length off by {np.ptp(length):.1e} m, energy by {np.ptp(energy):.1e} J")

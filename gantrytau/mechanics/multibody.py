@@ -101,7 +101,7 @@ class Prismatic(TwoFrames):
 class PointMass(Model):
     """A mass without extension."""
 
-    m = Parameter(1.0, unit="kg", description="mass")
+    m = Parameter(1.0, unit="kg", min=0.0, description="mass")
     v = Real(3, unit="m/s", description="velocity, resolved in the world")
     world = outer(World)
     frame_a = Frame()
@@ -116,8 +116,8 @@ class PointMass(Model):
 class SphericalSpherical(TwoFrames):
     """A rod of constant length with a ball joint at each end and a point mass in its middle."""
 
-    L = Parameter(1.0, unit="m", description="length between the centres of the ball joints")
-    m = Parameter(0.0, unit="kg", description="mass, in the middle of the rod")
+    L = Parameter(1.0, unit="m", min=0.0, description="length between the centres of the ball joints")
+    m = Parameter(0.0, unit="kg", min=0.0, description="mass, in the middle of the rod")
     tension = Real(unit="N/m", description="force along the rod, divided by its length; positive when pulled")
     world = outer(World)
 

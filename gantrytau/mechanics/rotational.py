@@ -26,7 +26,7 @@ class Fixed(Model):
 class Inertia(Model):
     """A turning mass."""
 
-    J = Parameter(1.0, unit="kg.m2", description="moment of inertia")
+    J = Parameter(1.0, unit="kg.m2", min=0.0, description="moment of inertia")
     phi = Real(unit="rad", description="angle")
     w = Real(unit="rad/s", description="angular velocity")
     flange_a = Flange()

@@ -26,7 +26,7 @@ class Fixed(Model):
 class Mass(Model):
     """A sliding point mass."""
 
-    m = Parameter(1.0, unit="kg", description="mass")
+    m = Parameter(1.0, unit="kg", min=0.0, description="mass")
     s = Real(unit="m", description="position along the axis")
     v = Real(unit="m/s", description="speed")
     flange = Flange()
@@ -95,9 +95,9 @@ class Frictionless(Friction):
 class TanhFriction(Friction):
     """Coulomb and viscous friction, the sign smoothed by tanh: f = f_c tanh(v / v_s) + f_v v."""
 
-    f_c = Parameter(0.0, unit="N", description="Coulomb friction")
-    f_v = Parameter(0.0, unit="kg/s", description="viscous friction")
-    v_s = Parameter(0.05, unit="m/s", description="smoothing speed")
+    f_c = Parameter(0.0, unit="N", min=0.0, description="Coulomb friction")
+    f_v = Parameter(0.0, unit="kg/s", min=0.0, description="viscous friction")
+    v_s = Parameter(0.05, unit="m/s", min=0.0, description="smoothing speed")
 
     def equations(self):
         yield from super().equations()

@@ -23,14 +23,14 @@ from gantrytau_models.prototypes import Prototype
 class Arm(Model):
     """Guideway and link of one arm: frame_a at the base, frame_cart on the guideway, frame_b at the tool."""
 
-    length = Parameter(unit="m", description="length of the link")
+    length = Parameter(unit="m", min=0.0, description="length of the link")
     offset = Parameter(
         shape=3, unit="m", description="cart at s = 0, less the place of the joint on the plate (4.7)"
     )
     direction = Parameter(
         shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
     )
-    link_mass = Parameter(0.0, unit="kg", description="mass of the link")
+    link_mass = Parameter(0.0, unit="kg", min=0.0, description="mass of the link")
     frame_a = Frame()
     frame_cart = Frame()
     frame_b = Frame()
@@ -53,7 +53,7 @@ class Arm(Model):
 class Cart(Model):
     """Cart and motor of one guideway: the actuator pushes, friction holds back."""
 
-    m = Parameter(unit="kg", description="mass of cart and motor")
+    m = Parameter(unit="kg", min=0.0, description="mass of cart and motor")
     s = Real(unit="m", description="position along the guideway")
     v = Real(unit="m/s", description="speed along the guideway")
     f = Input(unit="N", description="actuator force along the guideway, before friction", start=0.0)
@@ -77,7 +77,7 @@ class Cart(Model):
 class Tool(Model):
     """The plate with its tool, a point mass that cannot turn."""
 
-    m = Parameter(unit="kg", description="mass of plate and tool")
+    m = Parameter(unit="kg", min=0.0, description="mass of plate and tool")
     r = Real(3, unit="m", description="position, resolved in the world", prefer=StateSelect.PREFER)
     v = Real(3, unit="m/s", description="velocity, resolved in the world", prefer=StateSelect.PREFER)
     world = outer(World)
@@ -106,7 +106,7 @@ class GantryTau(Model):
     they are, not normalised: the position of a cart is offset + s * direction.
     """
 
-    plate_mass = Parameter(unit="kg", description="mass of plate and tool")
+    plate_mass = Parameter(unit="kg", min=0.0, description="mass of plate and tool")
     world = World()
     arms = Array(Arm, 3)
     carts = Array(Cart, 3)
@@ -119,6 +119,10 @@ class GantryTau(Model):
             raise TypeError(
                 f"GantryTau: found {prototype!r}, expected a prototype record such as prototypes.L1"
             )
+        if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
+            raise TypeError(
+                f"GantryTau: found friction={friction!r}, expected a class such as LinearFriction, or None"
+            )
         defaults = dict(
             plate_mass=prototype.plate_mass,
             arms=[
@@ -128,7 +132,7 @@ class GantryTau(Model):
                 for arm, mass in zip(prototype.arms, prototype.link_masses, strict=True)
             ],
             carts=[
-                dict(m=mass, s=dict(start=1.0), law=_law(friction, coulomb, viscous))
+                dict(m=mass, law=_law(friction, coulomb, viscous))
                 for mass, coulomb, viscous in zip(
                     prototype.cart_masses, prototype.coulomb, prototype.viscous, strict=True
                 )

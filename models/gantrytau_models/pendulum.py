@@ -6,8 +6,8 @@ from gantrytau import Model, Parameter, Real, der
 class Pendulum(Model):
     """A point mass on a massless rod, swinging in the x-y plane, y upwards, the pivot in the origin."""
 
-    L = Parameter(1.0, unit="m", description="length of the rod")
-    m = Parameter(1.0, unit="kg", description="mass")
+    L = Parameter(1.0, unit="m", min=0.0, description="length of the rod")
+    m = Parameter(1.0, unit="kg", min=0.0, description="mass")
     g = Parameter(9.81, unit="m/s2", description="acceleration of gravity")
     damping = Parameter(0.0, unit="kg/s", description="drag of the air per speed")
     x = Real(unit="m", description="horizontal position", start=0.8)

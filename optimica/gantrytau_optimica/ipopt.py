@@ -1,7 +1,5 @@
 """Ipopt on a transcribed problem: progress, interruption, and statuses in words."""
 
-import signal
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.interruption import on_interrupt
 from gantrytau_optimica.program import Program
 
 WORDS = {
@@ -96,7 +95,8 @@ class Solver:
     def solve(self, program: Program, guess: np.ndarray) -> Solution:
         """Solve the program, with its limits as they are now, from unknowns `guess` (unscaled)."""
         begin = time.perf_counter()
-        with self.watch.interruptible():
+        self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
+        with on_interrupt(self.watch.ask_to_stop):
             found = self.nlpsol(
                 x0=guess / program.scale, lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg
             )
@@ -155,24 +155,6 @@ class _Watch(ca.Callback):
             self.stop, self.error = True, error
         return [1 if self.stop else 0]
 
-    def interruptible(self):
-        """While it lasts, Ctrl-C lets Ipopt finish its iteration and keep what it has."""
-        return _Interruptible(self)
-
-
-class _Interruptible:
-    def __init__(self, watch: _Watch):
-        self.watch = watch
-
-    def __enter__(self) -> None:
-        self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
-        self.main = threading.current_thread() is threading.main_thread()
-        if self.main:
-            self.before = signal.signal(signal.SIGINT, self._pressed)
-
-    def _pressed(self, number: int, frame: Any) -> None:
-        self.watch.stop = True
-
-    def __exit__(self, *exception: Any) -> None:
-        if self.main:
-            signal.signal(signal.SIGINT, self.before or signal.SIG_DFL)
+    def ask_to_stop(self) -> None:
+        """Let Ipopt finish its iteration and keep what it has."""
+        self.stop = True

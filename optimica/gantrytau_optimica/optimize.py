@@ -107,6 +107,9 @@ class Prepared:
     guess: Mapping[str, Any]
     build_time: float
 
+    def __repr__(self) -> str:
+        return f"<Prepared {self.built.read.name}: {self.program.places.size} unknowns, {len(self.program.rows)} conditions>"
+
     def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
         read = self.built.read
