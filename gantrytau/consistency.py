@@ -46,7 +46,11 @@ def solve_levels(
     for level in levels:
         moving = [n for n in level.unknowns if n not in held]
         if level.residuals:
-            _solve(level, moving, symbols, values, started, title)
+            free = [n for n in moving if n not in started]
+            try:  # starts that fit together are held
+                _solve(level, free, symbols, values, started, title)
+            except InitializationError:
+                _solve(level, moving, symbols, values, started, title)
     return values
 
 
