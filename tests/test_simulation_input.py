@@ -1,11 +1,14 @@
 """What wrong inputs, parameters and policies of a simulation get."""
 
 import math
+import signal
+import threading
 
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Real, der, simulate
+from gantrytau import Input, Model, ModelError, Real, SolveError, der, simulate, sin
+from gantrytau_models import GantryTau, prototypes
 from tests.test_simulation import Circuit, Oscillator
 
 
@@ -76,3 +79,17 @@ def test_wrong_policy(keywords, words):
     with pytest.raises(ModelError) as caught:
         simulate(Oscillator(), **keywords)
     assert words in str(caught.value)
+
+
+def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed():
+    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    with pytest.raises(SolveError, match=r"simulation interrupted at t = ") as raised:
+        simulate(
+            GantryTau(prototypes.L1),
+            stop=3000.0,
+            inputs={"carts[0].f": lambda t: 300 * sin(20 * t)},
+            points=20001,
+        )
+    assert 0 < raised.value.time < 3000.0
+    assert np.isfinite(raised.value.result["tool.r"]).all()
