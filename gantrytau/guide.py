@@ -26,7 +26,7 @@ class Guide:
 
     def __init__(self, start: Mapping[str, float], parameters: Collection[str], states: Sequence[str]):
         self.start = start
-        self._parameters = parameters
+        self.parameters = parameters
         self.rates = frozenset(f"der({name})" for name in states)
         self.partners: dict[int, str] = {}
         self._symbols: list[ca.SX] = []
@@ -50,7 +50,7 @@ class Guide:
         leaves = ca.symvar(resolved)
         function = ca.Function("sample", [ca.vertcat(*leaves)], [ca.densify(ca.vec(resolved))])
         centre = np.array([self.start[leaf.name()] for leaf in leaves])
-        moves = np.array([leaf.name() not in self._parameters for leaf in leaves], dtype=bool)
+        moves = np.array([leaf.name() not in self.parameters for leaf in leaves], dtype=bool)
         steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (len(leaves), COUNT))
         points = centre[:, None] + steps * (moves * np.maximum(np.abs(centre), 1.0))[:, None]
         found = np.array(function.map(COUNT)(points)).T.reshape(COUNT, *expression.shape[::-1])

@@ -94,6 +94,10 @@ def solve_block(
     partner = {i: places.get(name, -1) for i, name in partners.items()}
     first = {j for j, name in enumerate(unknowns) if name in guide.rates}
     torn = tear(jacobian, numbers, x, relaxed=linear, partner=partner, first=first)
+    # pivots of parameters alone can vanish nowhere: where they serve as well, they are taken
+    steady = tear(jacobian, numbers, x, relaxed=linear, partner=partner, first=set(), steady=guide.parameters)
+    if len(steady.tears) <= len(torn.tears):
+        torn = steady
     inner: list[tuple[ca.SX, ca.SX]] = []
     rows, columns = ca.vertsplit(f), ca.vertsplit(x)
     for i, j in torn.assignments:

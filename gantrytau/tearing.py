@@ -3,7 +3,7 @@
 Elmqvist and Otter, ESM 1994. The unknown to tear is the one after which most others follow at once.
 """
 
-from collections.abc import Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass
 
 import casadi as ca
@@ -31,12 +31,13 @@ def tear(
     relaxed: bool,
     partner: Mapping[int, int],
     first: Set[int],
+    steady: Collection[str] | None = None,
 ) -> Torn:
     """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
 
     relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
     partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
-    first: columns that are torn before others.
+    first: columns that are torn before others; steady: if given, only pivots of these symbols are accepted.
     """
     largest = np.abs(numbers).max(axis=2, keepdims=True)
     sizes = reliable(numbers, largest)
@@ -45,7 +46,9 @@ def tear(
     solvable: set[tuple[int, int]] = set()
     for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
         incidence[i].add(j)
-        if i in partner:
+        if steady is not None and not all(leaf.name() in steady for leaf in ca.symvar(entry)):
+            large = False
+        elif i in partner:
             large = partner[i] == j and sizes[i, j] > 0
         elif entry.is_constant():
             large = sizes[i, j] >= 1e-6

@@ -107,7 +107,9 @@ def test_inverse_dynamics_equal_the_closed_form(prototype, friction):
 def test_kinematics_equal_the_closed_form(gt_a):
     positions, velocities, _ = random_motions(prototypes.GT_A, seed=2)
     robot = peer(prototypes.GT_A)
-    carts = np.array([np.array(closed_form.inverse_kinematics(robot, t)).ravel() for t in positions]).astype(float)
+    carts = np.array([np.array(closed_form.inverse_kinematics(robot, t)).ravel() for t in positions]).astype(
+        float
+    )
     found = mapped(gt_a.function(["tool.r"], CARTS), positions)
     assert np.abs(found - carts).max() < 1e-12  # m; a thousand roundings
     found = mapped(gt_a.function(CARTS, ["tool.r"]), *carts.T)
