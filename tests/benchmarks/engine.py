@@ -58,6 +58,26 @@ def _accuracy(hand: ca.Function, model: ca.Function) -> Iterator[Row]:
         assert np.all(np.isfinite(b))
         worst = max(worst, float(np.linalg.norm(a - b) / np.linalg.norm(a)))
     yield at_most("forward dynamics against closed form, 200 states, relative", worst, 1e-10)
+    yield from _other_causalities(random)
+
+
+def _other_causalities(random: np.random.Generator) -> Iterator[Row]:
+    dae = translate(GantryTau(prototypes.GT_A))
+    carts = [f"carts[{k}].s" for k in range(3)]
+    inverse = dae.function(["tool.r", "tool.v", "der(tool.v)"], FORCES)
+    ik, fk = dae.function(["tool.r"], carts), dae.function(carts, ["tool.r"])
+    T, v, a = (ca.SX.sym(name, 3) for name in "Tva")
+    by_hand = ca.Function("hand", [T, v, a], [closed_form.inverse_dynamics(closed_form.GT_A, T, v, a)])
+    forces, tools = 0.0, 0.0
+    for _ in range(200):
+        pose = np.array([0.5, 3.0, -0.6]) + random.uniform(-0.4, 0.4, 3)
+        motion = (pose, random.uniform(-1, 1, 3), random.uniform(-5, 5, 3))
+        expected = np.array(by_hand(*motion)).ravel()
+        found = np.array(inverse(*motion)).ravel()
+        forces = max(forces, float(np.linalg.norm(found - expected) / np.linalg.norm(expected)))
+        tools = max(tools, float(np.max(np.abs(np.array(fk(*ik(pose))).ravel() - pose))))
+    yield at_most("inverse dynamics against closed form, 200 states, relative", forces, 1e-12)
+    yield at_most("forward after inverse kinematics, 200 poses", tools, 1e-11, "m")
 
 
 def _compiled(hand: ca.Function, model: ca.Function) -> Row:

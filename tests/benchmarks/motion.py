@@ -12,6 +12,7 @@ from tests.benchmarks import reference_collocation
 from tests.benchmarks.gta import Task
 from tests.benchmarks.pose_sweep import sweep
 from tests.benchmarks.table import Row, at_most, shown
+from tests.optimica import problems
 
 KNOWN = {  # T + w * energy at 50 elements of 3 Radau points
     ("free path", 0.0): 0.913510,
@@ -33,12 +34,24 @@ def rows() -> Iterator[Row]:
         # the free row may also end on the faster branch
         error = max(found - expected, 0.0) if allowed > 1e-4 else abs(found - expected)
         yield at_most(f"GT-A {title}, w = {weight:g}: |T - {expected:g} s|", error, allowed, "s")
+    yield from _small_problems()
     yield from _against_peers(free)
     verdicts = list(sweep(200, seed=0))
     missed = sum(not verdict.success for verdict in verdicts)
     yield at_most("pose pairs that do not converge, of 200", missed, 0)
     median = statistics.median(verdict.seconds for verdict in verdicts)
     yield shown("pose pairs, median time of one solve", f"{median:.3f} s")
+
+
+def _small_problems() -> Iterator[Row]:
+    found = {
+        "1, Van der Pol with a bound": optimize(problems.BoundedOscillator).objective - 3.17619576,
+        "2, Van der Pol in minimum time": optimize(problems.FastestOscillator).final_time - 2.28115871,
+        "3, double integrator": optimize(problems.FastestMass).final_time - 2.0,
+        "5, linear-quadratic": optimize(problems.LinearQuadratic).objective - 50.9836626,
+    }
+    for name, error in found.items():
+        yield at_most(f"small problem {name}, error", abs(error), 1e-6)
 
 
 def _against_peers(problem: Any) -> Iterator[Row]:
