@@ -54,7 +54,7 @@ def table(summaries: list[dict[str, Any]]) -> "Table":
 
     found = Table(title="Minimum-time motion of the robot L1, beside Table 3.1 of the thesis", box=SIMPLE)
     found.add_column("motion", no_wrap=True)
-    for heading in ("T [s]", "energy", "thesis T", "energy", "iter.", "took [s]"):
+    for heading in ("T (s)", "energy", "thesis T", "energy", "iter.", "took (s)"):
         found.add_column(heading, justify="right")
     for row in summaries:
         found.add_row(
