@@ -189,12 +189,11 @@ class Dae:
         new = [self.expression(leaf.name()) for leaf in leaves]
         return ca.substitute(expression, ca.vertcat(*leaves), ca.vertcat(*new)) if leaves else expression
 
-    def system(self, form: Literal["explicit", "lifted"] = "explicit", also: Sequence[ca.SX] = ()) -> System:
+    def system(self, form: Literal["explicit", "lifted"] = "explicit") -> System:
         """The equations as x' = ode(t, x, z, u, p), 0 = residuals(t, x, z, u, p).
 
         explicit: everything that has a closed form is inserted, z is what has none. lifted: square roots
-        and torn unknowns stay in z with equations of their own, which optimisers prefer. `also`: expressions
-        of the model that must be available (their derivatives beyond the states are checked).
+        and torn unknowns stay in z with equations of their own, which optimisers prefer.
         """
         return assemble(self, form)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import casadi as ca
@@ -65,17 +64,6 @@ class System:
         return (
             ca.substitute_inplace(symbols, values, list(expressions), False) if symbols else ((), expressions)
         )
-
-    @cached_property
-    def closed_algebraics(self) -> ca.SX | None:
-        """All algebraics in closed form of (time, x, u, p), or None if some have none."""
-        closed = [a.closed for a in self.algebraics if a.closed is not None]
-        if len(closed) < len(self.algebraics):
-            return None
-        if not closed:
-            return ca.SX(0, 1)
-        found, _ = ca.substitute_inplace([a.symbol for a in self.algebraics], closed, [ca.SX(0)], False)
-        return ca.vertcat(*found)
 
 
 def _cumulative(sizes) -> list[int]:

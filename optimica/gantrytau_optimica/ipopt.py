@@ -78,7 +78,7 @@ class Solver:
 
     def unsolved(self, program: Program, guess: np.ndarray) -> Solution:
         """The guess as a solution that was not looked for, because there is none."""
-        objective, found = program.assembled.nlp(guess / program.scale, [])
+        objective, found = program.assembled.nlp(guess / program.places.scale, [])
         status = WORDS["Infeasible_Problem_Detected"]
         return Solution(
             w=guess,
@@ -98,16 +98,20 @@ class Solver:
         self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
         with on_interrupt(self.watch.ask_to_stop):
             found = self.nlpsol(
-                x0=guess / program.scale, lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg
+                x0=guess / program.places.scale,
+                lbx=program.lbw,
+                ubx=program.ubw,
+                lbg=program.lbg,
+                ubg=program.ubg,
             )
         if self.watch.error is not None:
             raise self.watch.error
         stats: dict[str, Any] = self.nlpsol.stats()
         word = str(stats["return_status"])
         return Solution(
-            w=np.array(found["x"]).ravel() * program.scale,
+            w=np.array(found["x"]).ravel() * program.places.scale,
             multipliers=np.array(found["lam_g"]).ravel(),
-            bound_multipliers=np.array(found["lam_x"]).ravel() / program.scale,
+            bound_multipliers=np.array(found["lam_x"]).ravel() / program.places.scale,
             constraints=np.array(found["g"]).ravel(),
             objective=float(found["f"]),
             success=bool(stats["success"]),

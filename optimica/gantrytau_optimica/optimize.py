@@ -195,25 +195,27 @@ def _parameter(read: ReadProblem, name: str) -> tuple[str, ...]:
 def _first(program: Program, built: Built) -> np.ndarray:
     """The guess as unknowns of the program, inside of their bounds."""
     problem = built.problem
-    w = np.zeros(program.scale.size)
-    inside = program.mesh[:-1, None] + np.diff(program.mesh)[:, None] * program.scheme.points
+    w = np.zeros(program.places.scale.size)
+    inside = (
+        program.places.mesh[:-1, None] + np.diff(program.places.mesh)[:, None] * program.places.scheme.points
+    )
     for signals, table in (
-        (problem.states, program.states),
-        (problem.algebraics, program.algebraics),
-        (problem.inputs, program.inputs),
+        (problem.states, program.places.states),
+        (problem.algebraics, program.places.algebraics),
+        (problem.inputs, program.places.inputs),
     ):
         for column, signal in enumerate(signals):
             w[table[..., column]] = signal.guess(inside.ravel()).reshape(inside.shape)
     for column, signal in enumerate(problem.states):
-        w[program.starts[:, column]] = signal.guess(program.mesh)
-    w[program.free] = [number.guess for number in problem.free]
-    return np.clip(w, program.lbw * program.scale, program.ubw * program.scale)
+        w[program.places.starts[:, column]] = signal.guess(program.places.mesh)
+    w[program.places.free] = [number.guess for number in problem.free]
+    return np.clip(w, program.lbw * program.places.scale, program.ubw * program.places.scale)
 
 
 def _check_freedom(name: str, program: Program) -> None:
     equalities = int(np.sum(program.lbg == program.ubg))
     fixed = int(np.sum(program.lbw == program.ubw))
-    unknowns = program.scale.size - fixed
+    unknowns = program.places.scale.size - fixed
     if unknowns == 0:
         raise ModelError(f"{name}: nothing is free; declare a Free number or an Input")
     if equalities > unknowns:

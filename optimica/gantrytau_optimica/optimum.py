@@ -69,7 +69,9 @@ class Optimum:
     def _numbers(self) -> dict[str, float]:
         """Free and held numbers."""
         numbers = self.program.problem.free
-        return dict(zip((n.name for n in numbers), self.solution.w[self.program.free].tolist(), strict=True))
+        return dict(
+            zip((n.name for n in numbers), self.solution.w[self.program.places.free].tolist(), strict=True)
+        )
 
     @cached_property
     def _horizon(self) -> tuple[float, float]:
@@ -92,7 +94,7 @@ class Optimum:
     @cached_property
     def time(self) -> np.ndarray:
         """The start and all collocation points in s."""
-        mesh, points = self.program.mesh, self.program.scheme.points
+        mesh, points = self.program.places.mesh, self.program.places.scheme.points
         inside = (mesh[:-1, None] + np.diff(mesh)[:, None] * points).ravel()
         fractions = np.concatenate([[0.0], inside] if points[-1] == 1.0 else [[0.0], inside, [1.0]])
         return self.start_time + (self.final_time - self.start_time) * fractions
@@ -100,7 +102,7 @@ class Optimum:
     @cached_property
     def breaks(self) -> np.ndarray:
         """Times in s at which inputs may jump: the borders between elements."""
-        return self.start_time + (self.final_time - self.start_time) * self.program.mesh[1:-1]
+        return self.start_time + (self.final_time - self.start_time) * self.program.places.mesh[1:-1]
 
     @cached_property
     def result(self) -> Result:
@@ -140,7 +142,7 @@ class Optimum:
 
     def integral(self, name: str) -> float:
         """The integral of a variable over the horizon, by the quadrature of the collocation."""
-        mesh, scheme = self.program.mesh, self.program.scheme
+        mesh, scheme = self.program.places.mesh, self.program.places.scheme
         span = self.final_time - self.start_time
         fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.points
         values = self.signal(name)(self.start_time + span * fractions.ravel()).reshape(fractions.shape)
@@ -196,14 +198,16 @@ class Optimum:
         fraction = np.clip((times - self.start_time) / span, 0.0, 1.0)
         # a time on a border belongs to the element before it, where the limits hold at the last point
         element = np.clip(
-            np.searchsorted(program.mesh, fraction - 1e-13, side="right") - 1, 0, program.mesh.size - 2
+            np.searchsorted(program.places.mesh, fraction - 1e-13, side="right") - 1,
+            0,
+            program.places.mesh.size - 2,
         )
-        local = (fraction - program.mesh[element]) / np.diff(program.mesh)[element]
-        nodes = np.concatenate([program.starts[:-1, None, :], program.states], axis=1)
-        x = np.einsum("tj,tjs->st", interpolation(program.scheme.nodes, local), w[nodes][element])
-        weights = interpolation(program.scheme.points, local)
+        local = (fraction - program.places.mesh[element]) / np.diff(program.places.mesh)[element]
+        nodes = np.concatenate([program.places.starts[:-1, None, :], program.places.states], axis=1)
+        x = np.einsum("tj,tjs->st", interpolation(program.places.scheme.nodes, local), w[nodes][element])
+        weights = interpolation(program.places.scheme.points, local)
         others = [
             np.einsum("tj,tjs->st", weights, w[table][element])
-            for table in (program.algebraics, program.inputs)
+            for table in (program.places.algebraics, program.places.inputs)
         ]
         return np.vstack([x, *others])

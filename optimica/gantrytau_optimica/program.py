@@ -49,15 +49,6 @@ class Program:
     lbg: np.ndarray
     ubg: np.ndarray
 
-    mesh = property(lambda self: self.places.mesh)
-    scheme = property(lambda self: self.places.scheme)
-    scale = property(lambda self: self.places.scale)
-    starts = property(lambda self: self.places.starts)
-    states = property(lambda self: self.places.states)
-    algebraics = property(lambda self: self.places.algebraics)
-    inputs = property(lambda self: self.places.inputs)
-    free = property(lambda self: self.places.free)
-
     def with_numbers(self, problem: ControlProblem) -> "Program":
         """The same program with other free numbers and first guesses."""
         lower, upper, places = self.lbw.copy(), self.ubw.copy(), self.places

@@ -60,14 +60,16 @@ def _at(fraction: float, horizon: tuple[float, float]) -> float:
 def _binding(program: Program, solution: Solution, horizon: tuple[float, float]) -> list[str]:
     """Limits that are reached, with the intervals of time."""
     found: list[str] = []
-    points = program.mesh[:-1, None] + np.diff(program.mesh)[:, None] * program.scheme.points
+    points = (
+        program.places.mesh[:-1, None] + np.diff(program.places.mesh)[:, None] * program.places.scheme.points
+    )
     times = np.array([_at(f, horizon) for f in points.ravel()])
-    lower, upper = program.lbw * program.scale, program.ubw * program.scale
+    lower, upper = program.lbw * program.places.scale, program.ubw * program.places.scale
     problem = program.problem
     for signals, table in (
-        (problem.states, program.states),
-        (problem.algebraics, program.algebraics),
-        (problem.inputs, program.inputs),
+        (problem.states, program.places.states),
+        (problem.algebraics, program.places.algebraics),
+        (problem.inputs, program.places.inputs),
     ):
         for column, signal in enumerate(signals):
             places = table[..., column].ravel()
@@ -90,7 +92,7 @@ def _binding(program: Program, solution: Solution, horizon: tuple[float, float])
             reached = _reached(g, bound)
             if np.any(reached):
                 found.append(f"`{name}` at its {word} limit {_intervals(reached, times)}")
-    for number, place in zip(problem.free, program.free, strict=True):
+    for number, place in zip(problem.free, program.places.free, strict=True):
         if number.held:
             continue
         for word, bound in (("lower", lower[place]), ("upper", upper[place])):
