@@ -45,7 +45,7 @@ from gantrytau.functions import (
 from gantrytau.model import Connector, Model, outer
 from gantrytau.result import Result
 from gantrytau.simulation import simulate
-from gantrytau.statements import branch, connect, root
+from gantrytau.statements import branch, connect, constraint, root
 from gantrytau.symbols import der, time
 from gantrytau.translation import translate
 
@@ -78,6 +78,7 @@ __all__ = [
     "between",
     "branch",
     "connect",
+    "constraint",
     "cos",
     "cross",
     "der",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from gantrytau.definitions import Definitions
 from gantrytau.flat_model import FlatModel
 from gantrytau.parameters import ParameterTable
 from gantrytau.statements import Equation
@@ -31,11 +32,14 @@ class Alias:
 class Reduced:
     """Equations that are left, and for every variable what it is an alias of.
 
-    residuals: one scalar SX per remaining equation, in symbols of `chains`; equations: where they come from;
-    redundant: equations that turned out to say 0 == 0.
+    residuals: one scalar SX per remaining equation, in symbols of `chains`; compact: the same in the symbols
+    of the definitions as well; equations: where they come from; redundant: equations that turned out to
+    say 0 == 0.
     """
 
     residuals: tuple[ca.SX, ...]
+    compact: tuple[ca.SX, ...]
+    definitions: Definitions
     equations: tuple[Equation, ...]
     aliases: Mapping[str, Alias]
     unknowns: tuple[str, ...]
@@ -88,7 +92,16 @@ class _Elimination:
             for name in variable.elements:
                 self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
         sides = table.reduce(ca.vertcat(*(e.residual for e in flat.equations)))
-        self.residuals = ca.SX(sides).elements() if flat.equations else []
+        names = list(flat.definitions)
+        defined = table.reduce(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
+        self.defined = dict(zip(names, defined.elements(), strict=True))
+        self.rates = dict(
+            zip(flat.rates, table.reduce(ca.vertcat(*flat.rates.values())).elements(), strict=True)
+        ) if flat.rates else {}
+        self.definition_symbols = {
+            n: s for v in flat.propagated for n, s in zip(v.elements, v.symbol.elements(), strict=True)
+        }
+        self.residuals = self._without_constants(ca.SX(sides).elements() if flat.equations else [])
 
     def run(self) -> Reduced:
         remaining = list(range(len(self.residuals)))
@@ -116,8 +129,12 @@ class _Elimination:
         aliases = {n: self.resolve(n, 0) for n in names}
         used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
         unknowns = tuple(n for n in names if n in used_names and n not in self.known)
+        compact = [self.residuals[i] for i in remaining]
+        definitions = self._definitions(aliases)
         return Reduced(
-            tuple(self.residuals[i] for i in remaining),
+            tuple(definitions.resolve(ca.vertcat(*compact)).elements()) if compact else (),
+            tuple(compact),
+            definitions,
             tuple(self.flat.equations[i] for i in remaining),
             aliases,
             unknowns,
@@ -125,6 +142,49 @@ class _Elimination:
             self.chains,
             tuple(self.flat.equations[i] for i in redundant),
         )
+
+    def _definitions(self, aliases: Mapping[str, Alias]) -> Definitions:
+        symbols = {
+            n: self.flat.derivatives[n]
+            for n in self.flat.derivatives
+            if split_derivative(n)[0] in self.definition_symbols
+        }
+
+        def variable(name: str, order: int) -> ca.SX | None:
+            return self.chains.sx(name, order) if name in aliases else None
+
+        return Definitions(
+            {**self.definition_symbols, **symbols},
+            dict(zip(self.defined, self._substitute(list(self.defined.values())), strict=True)),
+            dict(zip(self.rates, self._substitute(list(self.rates.values())), strict=True)),
+            variable,
+        )
+
+    def _without_constants(self, residuals: list[ca.SX]) -> list[ca.SX]:
+        """Residuals with those definitions inserted that, with parameters folded in, are numbers after all."""
+        done: set[str] = set()
+        while True:
+            steady = {n: e for n, e in self.defined.items() if n not in done and self._steady(e)}
+            if not steady:
+                return residuals
+            done |= steady.keys()
+            count, names = len(residuals), list(self.defined)
+            rates = list(self.rates)
+            everything = ca.vertcat(*residuals, *self.defined.values(), *self.rates.values())
+            old = [self.definition_symbols[n] for n in steady]
+            new = list(steady.values())
+            for leaf in ca.symvar(everything):
+                base, order = split_derivative(leaf.name())
+                if order and base in steady:
+                    old.append(leaf)
+                    new.append(ca.SX(0))
+            found = ca.substitute(everything, ca.vertcat(*old), ca.vertcat(*new)).elements()
+            residuals = found[:count]
+            self.defined = dict(zip(names, found[count:], strict=False))
+            self.rates = dict(zip(rates, found[count + len(names) :], strict=True))
+
+    def _steady(self, expression: ca.SX) -> bool:
+        return expression.is_constant() or all(leaf.name() in self.parameters for leaf in ca.symvar(expression))
 
     def resolve(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""
@@ -148,6 +208,8 @@ class _Elimination:
             node, factor = stack.pop()
             if node.is_symbolic():
                 name = node.name()
+                if split_derivative(name)[0] in self.defined:
+                    return None
                 if name in self.parameters:
                     terms.offset = terms.offset + factor * node
                 elif name == self.flat.time.name():

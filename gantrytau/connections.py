@@ -1,10 +1,11 @@
 """Connections become equations: potentials are equal, flows sum to zero (Modelica specification 3.6, 9.2)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import casadi as ca
 
+from gantrytau.closures import Closure
 from gantrytau.declarations import Quantity
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.instantiation import Instance
@@ -16,10 +17,13 @@ from gantrytau.symbols import scalars
 Face = tuple[str, int]
 
 
-def connection_equations(instance: Instance, connections: Iterable[tuple[str, Connection]]) -> list[Equation]:
+def connection_equations(
+    instance: Instance, connections: Iterable[tuple[str, Connection]], closures: Sequence[Closure] = ()
+) -> list[Equation]:
     """Equations of all connections, and zero flow for the connectors that stay unconnected.
 
-    connections: pairs of the path of the component that states it, and the statement.
+    connections: pairs of the path of the component that states it, and the statement; closures: those
+    of them that close loops: what they carry enters the sums of the flows at their two ends.
     """
     members = {path: connector for path, connector, _ in instance.connectors}
     owners = {path: owner for path, _, owner in instance.connectors}
@@ -33,6 +37,8 @@ def connection_equations(instance: Instance, connections: Iterable[tuple[str, Co
             face = parent[face]
         return face
 
+    closing = {id(closure.connection): closure for closure in closures}
+    carried: list[tuple[Face, int, Closure]] = []
     for number, (where, connection) in enumerate(connections, start=1):
         if not isinstance(connection.a, Connector):
             equations += equality(connection.a == connection.b, where, "connection", number)
@@ -43,12 +49,18 @@ def connection_equations(instance: Instance, connections: Iterable[tuple[str, Co
                 path = _path(instance, end, where)
                 faces.append((path, -1 if owners[path] == where else 1))
             _check_same(pair, faces, where)
-            parent[find(faces[0])] = find(faces[1])
+            if id(pair) in closing:
+                carried += [(face, sign, closing[id(pair)]) for face, sign in zip(faces, (1, -1), strict=True)]
+            else:
+                parent[find(faces[0])] = find(faces[1])
+    into: dict[Face, list[tuple[int, Closure]]] = {}
+    for face, sign, closure in carried:
+        into.setdefault(find(face), []).append((sign, closure))
     sets: dict[Face, list[Face]] = {}
-    for face in parent:
+    for face in list(parent):
         sets.setdefault(find(face), []).append(face)
-    for faces in sets.values():
-        equations += _set_equations([(members[path], path, sign) for path, sign in faces])
+    for key, faces in sets.items():
+        equations += _set_equations([(members[path], path, sign) for path, sign in faces], into.get(key, []))
     return equations
 
 
@@ -89,7 +101,9 @@ def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
         )
 
 
-def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
+def _set_equations(
+    members: list[tuple[Connector, str, int]], closures: list[tuple[int, Closure]]
+) -> list[Equation]:
     first = members[0][0]
     where = " - ".join(path for _, path, _ in members)
     equations: list[Equation] = []
@@ -103,6 +117,7 @@ def _set_equations(members: list[tuple[Connector, str, int]]) -> list[Equation]:
                 total = sum(
                     (sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0)
                 )
+                total += sum((sign * closure.flow(name, row) for sign, closure in closures), ca.SX(0))
                 equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
             elif declaration.kind != "propagated":
                 equations += [

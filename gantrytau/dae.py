@@ -126,7 +126,7 @@ class Dae:
     @cached_property
     def vectors(self) -> Mapping[str, FlatVariable]:
         """Declared quantities by their whole names."""
-        return {v.name: v for v in (*self.flat.variables, *self.flat.parameters)}
+        return {v.name: v for v in (*self.flat.variables, *self.flat.parameters, *self.flat.propagated)}
 
     def expand(self, name: str) -> tuple[str, ...]:
         """The scalar names of `name` (a scalar, a vector, or a derivative of one); ModelError if unknown."""
@@ -135,17 +135,10 @@ class Dae:
             return tuple(derivative_name(n, order) for n in self.vectors[base].elements)
         if base in self._scalars:
             return (name,)
-        if base in self._definition_vectors:
-            return self._definition_vectors[base]
+        if base in self.flat.absent:
+            raise ModelError(f"{self.name}: {base} does not exist: {self.flat.absent[base]}")
         known = [*self._scalars, *self.vectors]
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
-
-    @cached_property
-    def _definition_vectors(self) -> dict[str, tuple[str, ...]]:
-        found: dict[str, list[str]] = {}
-        for name in self.flat.definitions:
-            found.setdefault(name.partition("[")[0], []).append(name)
-        return {name: tuple(elements) for name, elements in found.items()}
 
     @cached_property
     def _scalars(self) -> frozenset[str]:
@@ -174,7 +167,7 @@ class Dae:
         if base in self.table.symbols:
             return self.table.expressions.get(base, self.table.symbols[base])
         if base in self.flat.definitions:
-            return self.reduce(self.flat.definitions[base])
+            return self.reduced.definitions.resolved(name)
         alias = self.reduced.aliases[base]
         if alias.root is not None:
             shifted = type(alias)(

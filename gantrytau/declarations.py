@@ -207,9 +207,14 @@ class Propagated(Quantity):
     """A connector quantity that is not a variable: it is passed on along a spanning tree of the frames.
 
     Orientation is one: R of a frame is an expression of the joint angles between it and the root.
+    rate: its time derivative as a function of the connector, where that is shorter than the chain rule.
     """
 
     kind = "propagated"
+
+    def __init__(self, shape: Any = (), *, rate: Callable[[Any], Any] | None = None, **attributes: Any):
+        super().__init__(shape, **attributes)
+        self.rate = rate
 
 
 class Parameter(Quantity):

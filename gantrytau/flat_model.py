@@ -47,11 +47,25 @@ class FlatParameter(FlatVariable):
 
 
 @dataclass(frozen=True, eq=False)
+class Loop:
+    """A loop of rigid parts and joints.
+
+    a, b: connectors that coincide where it closes; members: components along it, from a round to b.
+    """
+
+    a: str
+    b: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class FlatModel:
     """A model written out: variables, parameters and scalar equations between their symbols.
 
-    derivatives: symbols of derivatives by name, `der(x)`; definitions: propagated quantities (such as
-    orientations) as expressions of variables; inputs: names of the scalars known from outside.
+    derivatives: symbols of derivatives by name, `der(x)`; propagated: quantities, such as orientations, that
+    are no unknowns but `definitions`: expressions, by scalar name, of variables and of definitions before
+    them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
+    scalars known from outside; absent: declared names that this model has no use for, and why.
     """
 
     name: str
@@ -61,10 +75,15 @@ class FlatModel:
     equations: tuple[Equation, ...]
     initial_equations: tuple[Equation, ...]
     derivatives: Mapping[str, ca.SX]
+    propagated: tuple[FlatVariable, ...]
     definitions: Mapping[str, ca.SX]
+    rates: Mapping[str, ca.SX]
+    loops: tuple[Loop, ...]
     inputs: tuple[str, ...]
     hints: Mapping[str, str]
+    absent: Mapping[str, str]
 
     def find(self, name: str) -> FlatVariable | None:
-        """The variable or parameter of that name."""
-        return next((v for v in (*self.variables, *self.parameters) if v.name == name), None)
+        """The variable, parameter or propagated quantity of that name."""
+        everything = (*self.variables, *self.parameters, *self.propagated)
+        return next((v for v in everything if v.name == name), None)

@@ -7,15 +7,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.closures import Closure
 from gantrytau.connections import connection_equations
 from gantrytau.declarations import Parameter, evaluate
 from gantrytau.errors import GantryTauError, ModelError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
 from gantrytau.model import Declared, Model
-from gantrytau.propagation import propagate
+from gantrytau.propagation import Spread, Tree, spanning_tree
 from gantrytau.statements import Branch, Connection, Equation, Root, equality
-from gantrytau.symbols import scalars, time, writing
+from gantrytau.symbols import scalars, split_derivative, time, writing
 
 HINTS = {
     "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; "
@@ -35,52 +36,96 @@ def write_out(instance: Instance) -> FlatModel:
     equations: list[Equation] = []
     initial: list[Equation] = []
     connections: list[tuple[str, Connection]] = []
-    branches: list[Branch] = []
-    roots: list[Root] = []
+    ways: list[tuple[str, str, int, Branch | Root]] = []
     with writing(instance.symbols):
         for path, component in instance.components:
             name = type(component).__name__
             for number, statement in _statements(component.equations, path, name):
                 if isinstance(statement, Connection):
                     connections.append((path, statement))
-                elif isinstance(statement, Branch):
-                    branches.append(statement)
-                elif isinstance(statement, Root):
-                    roots.append(statement)
+                elif isinstance(statement, (Branch, Root)):
+                    ways.append((path, name, number, statement))
                 else:
                     equations += equality(statement, path, name, number)
             for number, statement in _statements(component.initial_equations, path, name):
                 initial += equality(statement, path, name, number)
-        equations += _bindings(instance)
-        equations += connection_equations(instance, connections)
-        definitions = propagate(instance, connections, branches, roots)
-        written = substituted(equations, definitions, instance)
-        written_initial = substituted(initial, definitions, instance)
-        _refuse_nan((*written, *written_initial))
-        flat_variables = tuple(
-            _variable(placed) for placed in instance.quantities if not _is_parameter(placed)
+        statements = [way for *_, way in ways]
+        tree = spanning_tree(
+            instance,
+            connections,
+            [way for way in statements if isinstance(way, Branch)],
+            [way for way in statements if isinstance(way, Root)],
         )
-        parameters = tuple(_parameter(placed) for placed in instance.quantities if _is_parameter(placed))
-    propagated = {
-        n
-        for placed in instance.quantities
-        if placed.declaration.kind == "propagated"
-        for n in placed.elements
-    }
+        equations += _of_the_ways(ways, tree)
+        equations += _bindings(instance)
+        joined = [c for c in connections if id(c[1]) not in tree.repeated]
+        closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
+        equations += connection_equations(instance, joined, closures)
+        equations += [e for closure in closures for e in closure.equations]
+        spread = Spread(instance, tree)
+        written = spread.substituted(equations)
+        written_initial = spread.substituted(initial)
+        _refuse_nan((*written, *written_initial))
+        spread.refuse_undefined((*written, *written_initial))
+        absent = _absent(statements, tree)
+        _refuse_absent((*written, *written_initial), absent)
+        placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
+        kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
+        parameters = tuple(_parameter(p) for p in placed if kinds[p.name] == "parameter")
+        variables = tuple(_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated"))
+        passed = tuple(_variable(p) for p in placed if kinds[p.name] == "propagated")
     return FlatModel(
         name=type(instance.root).__name__,
         time=time,
-        variables=tuple(v for v in flat_variables if v.kind != "propagated"),
+        variables=(*variables, *(v for closure in closures for v in closure.variables)),
         parameters=parameters,
         equations=written,
         initial_equations=written_initial,
-        derivatives={
-            n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0 and s.base not in propagated
-        },
-        definitions=definitions,
+        derivatives={n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0},
+        propagated=tuple(v for v in passed if v.elements[0] in spread.definitions),
+        definitions=spread.definitions,
+        rates=spread.rates,
+        loops=tuple(loop for _, loop in tree.closing),
         inputs=_free_inputs(instance, equations),
         hints=_hints(instance),
+        absent=absent,
     )
+
+
+def _of_the_ways(ways: list[tuple[str, str, int, Branch | Root]], tree: Tree) -> list[Equation]:
+    """Equations of the branches and roots that describe themselves by coordinates, or are cut."""
+    found: list[Equation] = []
+    for path, name, number, way in ways:
+        used = id(way) in tree.used
+        statements = way.equations if used else way.otherwise if isinstance(way, Branch) else ()
+        for statement in statements:
+            found += equality(statement, path, name, number)
+    return found
+
+
+def _absent(statements: list[Branch | Root], tree: Tree) -> dict[str, str]:
+    """Names of coordinates that are not needed, and why."""
+    found: dict[str, str] = {}
+    for way in statements:
+        if way.coordinates is not None and id(way) not in tree.used:
+            why = (
+                "loops are opened here, so the joint has no coordinates of its own"
+                if isinstance(way, Branch)
+                else "the orientation follows from the joints between the body and the world"
+            )
+            found.update((s.name(), why) for s in scalars(way.coordinates))
+    return found
+
+
+def _refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> None:
+    for equation in equations if absent else ():
+        for leaf in ca.symvar(equation.residual):
+            if split_derivative(leaf.name())[0] in absent:
+                name = split_derivative(leaf.name())[0]
+                raise ModelError(
+                    f"{equation.name}: found {name}, which does not exist: {absent[name]}; use the orientation R "
+                    "or angular velocity w of a frame instead"
+                )
 
 
 def _is_parameter(placed: Placed) -> bool:
@@ -238,22 +283,6 @@ def _parameter(placed: Placed) -> FlatParameter:
     declaration = placed.declaration
     assert isinstance(declaration, Parameter)
     return FlatParameter(**_common(placed), value=expression(placed, "value"), fold=declaration.fold)
-
-
-def substituted(
-    equations: Iterable[Equation], definitions: Mapping[str, ca.SX], instance: Instance
-) -> tuple[Equation, ...]:
-    """The equations with propagated quantities replaced by their expressions."""
-    equations = tuple(equations)
-    if not definitions or not equations:
-        return equations
-    symbols = ca.vertcat(*(instance.symbols.by_name[name].sx for name in definitions))
-    sides = ca.vertcat(*(side for e in equations for side in (e.left, e.right)))
-    new = ca.substitute(sides, symbols, ca.vertcat(*definitions.values())).elements()
-    return tuple(
-        Equation(new[2 * i], new[2 * i + 1], e.path, e.model, e.number, e.element)
-        for i, e in enumerate(equations)
-    )
 
 
 def _hints(instance: Instance) -> dict[str, str]:

@@ -92,29 +92,27 @@ def _mentioned(reduced: Reduced, flat: FlatModel) -> np.ndarray:
     found = np.zeros(len(place), dtype=int)
     for name in (*reduced.aliases, *flat.derivatives):
         base, order = split_derivative(name)
-        alias = reduced.aliases[base]
-        if alias.root in place:
+        alias = reduced.aliases.get(base)
+        if alias is not None and alias.root in place:
             found[place[alias.root]] = max(found[place[alias.root]], alias.order + order)
     return found
 
 
 def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
+    """Differentiated in the symbols of the definitions, where derivatives are short, and then resolved."""
+    below = dict(enumerate(reduced.compact))
     residuals: dict[Key, ca.SX] = {(i, 0): r for i, r in enumerate(reduced.residuals)}
-    chains = reduced.chains
+    keys: list[Key] = []
+    compact: list[ca.SX] = []
     for level in range(1, max(counts, default=0) + 1):
         rows = [i for i, count in enumerate(counts) if count >= level]
-        vector = ca.vertcat(*(residuals[i, level - 1] for i in rows))
-        inside, rates = [], []
-        for leaf in ca.symvar(vector):
-            name, order = split_derivative(leaf.name())
-            if leaf.name() == "time":
-                inside.append(leaf)
-                rates.append(ca.SX(1))
-            elif name in reduced.aliases:
-                inside.append(leaf)
-                rates.append(chains.sx(name, order + 1))
-        new = ca.jtimes(vector, ca.vertcat(*inside), ca.vertcat(*rates))
-        residuals.update({(i, level): r for i, r in zip(rows, ca.densify(new).elements(), strict=True)})
+        new = reduced.definitions.differentiated(ca.vertcat(*(below[i] for i in rows))).elements()
+        below = dict(zip(rows, new, strict=True))
+        keys += [(i, level) for i in rows]
+        compact += new
+    if keys:
+        resolved = reduced.definitions.resolve(ca.vertcat(*compact))
+        residuals.update(zip(keys, ca.densify(resolved).elements(), strict=True))
     return residuals
 
 

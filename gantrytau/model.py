@@ -67,6 +67,13 @@ class Declared(_Part):
 class Connector(Declared):
     """A set of potentials (`Real`) and flows (`Flow`) through which components are connected."""
 
+    def closing(self, other: Any) -> Iterator[tuple[str, Any, str]]:
+        """What makes this connector coincide with another one where a loop of propagated quantities closes.
+
+        Triples: words for it, the residual, and the name of the flow that enforces it, of the same shape.
+        """
+        yield from ()
+
 
 class Model(Declared):
     """A component, a robot, a whole plant: declarations, then equations.

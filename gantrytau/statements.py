@@ -1,6 +1,7 @@
 """What `equations(self)` yields: equations, connections, and the branches of orientation trees."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +16,11 @@ from gantrytau.symbols import scalars
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """A scalar equation `left == right` and where it stands."""
+    """A scalar equation `left == right` and where it stands.
+
+    dual: name of the force that enforces it, if it is a constraint that may turn out to repeat others;
+    label: its name, where component and number do not say what it is.
+    """
 
     left: ca.SX
     right: ca.SX
@@ -23,6 +28,8 @@ class Equation:
     model: str
     number: int
     element: int | None = None
+    dual: str = ""
+    label: str = ""
 
     @cached_property
     def residual(self) -> ca.SX:
@@ -32,6 +39,8 @@ class Equation:
     @property
     def name(self) -> str:
         """Where the equation stands: 'carts[0] (Cart), equation 2, row 1'."""
+        if self.label:
+            return self.label
         row = "" if self.element is None else f", row {self.element}"
         return f"{self.path or 'the model'} ({self.model}), equation {self.number}{row}"
 
@@ -50,6 +59,14 @@ class Connection:
 
 
 @dataclass(frozen=True, eq=False)
+class Constraint:
+    """An equation, and the force or torque that enforces it."""
+
+    equation: Any
+    dual: Any
+
+
+@dataclass(frozen=True, eq=False)
 class Branch:
     """A rigid or jointed way along which propagated quantities go from connector a to b and back."""
 
@@ -57,6 +74,9 @@ class Branch:
     b: Any
     forward: dict[str, Any]
     backward: dict[str, Any]
+    coordinates: Any = None
+    equations: tuple[Any, ...] = ()
+    otherwise: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +85,8 @@ class Root:
 
     connector: Any
     values: dict[str, Any]
+    coordinates: Any = None
+    equations: tuple[Any, ...] = ()
 
 
 def connect(a: Any, b: Any) -> Connection:
@@ -81,14 +103,42 @@ def connect(a: Any, b: Any) -> Connection:
     return Connection(a, b)
 
 
-def branch(a: Connector, b: Connector, *, forward: dict[str, Any], backward: dict[str, Any]) -> Branch:
-    """State how propagated quantities of `b` follow from those of `a` (forward), and the reverse."""
-    return Branch(a, b, forward, backward)
+def constraint(equation: Any, *, dual: Any) -> Constraint:
+    """State an equation between positions that a force or torque enforces.
+
+    dual: that force, a variable of the same shape, whose power is dual * d/dt(left - right) up to a factor.
+    Where the equation repeats others, as in planar loops, it is dropped and its dual is zero.
+    """
+    return Constraint(equation, dual)
 
 
-def root(connector: Connector, **values: Any) -> Root:
-    """State the propagated quantities of a connector outright, as the world frame does."""
-    return Root(connector, values)
+def branch(
+    a: Connector,
+    b: Connector,
+    *,
+    forward: dict[str, Any],
+    backward: dict[str, Any],
+    coordinates: Any = None,
+    equations: Iterable[Any] = (),
+    otherwise: Iterable[Any] = (),
+) -> Branch:
+    """State how propagated quantities of `b` follow from those of `a` (forward), and the reverse.
+
+    coordinates: a variable that describes the way, if loops should rather be opened here: it exists only
+    while the way is needed to reach b or a, with `equations`; else `otherwise` holds.
+    """
+    return Branch(a, b, forward, backward, coordinates, tuple(equations), tuple(otherwise))
+
+
+def root(
+    connector: Connector, *, coordinates: Any = None, equations: Iterable[Any] = (), **values: Any
+) -> Root:
+    """State the propagated quantities of a connector outright, as the world frame does.
+
+    coordinates: a variable that describes them, if this should only be a root where no other way leads to
+    the connector, as for a free body: it exists only then, with `equations`.
+    """
+    return Root(connector, values, coordinates, tuple(equations))
 
 
 def _kind(value: Any) -> str:
@@ -97,6 +147,10 @@ def _kind(value: Any) -> str:
 
 def equality(statement: Any, path: str, model: str, number: int) -> list[Equation]:
     """The scalar equations of one yielded `a == b`; ModelError if it is no equation or the shapes differ."""
+    if isinstance(statement, Constraint):
+        found = equality(statement.equation, path, model, number)
+        duals = [dual.name() for dual in scalars(statement.dual)]
+        return [replace(e, dual=duals[e.element or 0]) for e in found]
     place = f"{path or 'the model'} ({model}), equation {number}"
     if isinstance(statement, (bool, np.bool_)):
         raise ModelError(

@@ -60,7 +60,12 @@ def check_units(flat: FlatModel) -> None:
     units = symbol_units(flat)
     symbols = [
         flat.time,
-        *(s for v in (*flat.variables, *flat.parameters) for s in v.symbol.elements() if s.is_symbolic()),
+        *(
+            s
+            for v in (*flat.variables, *flat.parameters, *flat.propagated)
+            for s in v.symbol.elements()
+            if s.is_symbolic()
+        ),
     ]
     symbols += list(flat.derivatives.values())
     given = [units[s.name()] for s in symbols]
@@ -78,12 +83,12 @@ def check_units(flat: FlatModel) -> None:
 def symbol_units(flat: FlatModel) -> Mapping[str, Unit]:
     """Dimension of every scalar symbol, derivatives included, by name."""
     units: dict[str, Unit] = {flat.time.name(): dimension("s")}
-    for variable in (*flat.variables, *flat.parameters):
+    for variable in (*flat.variables, *flat.parameters, *flat.propagated):
         unit: Unit = ANY if variable.unit is None else _read(variable.unit, variable.name)
         units.update(dict.fromkeys(variable.elements, unit))
     for name in flat.derivatives:
         base, order = split_derivative(name)
-        unit = units[base]
+        unit = units.get(base, ANY)
         units[name] = unit if isinstance(unit, str) else _times(unit, dimension("s"), Fraction(-order))
     return units
 

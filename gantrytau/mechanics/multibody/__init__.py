@@ -1,0 +1,67 @@
+"""Bodies and joints in space.
+
+| quantity | meaning | resolved in |
+|---|---|---|
+| frame.r | position of the frame's origin, m | world |
+| frame.R | orientation: columns are the frame's axes, world = R @ local | - |
+| frame.w | angular velocity, rad/s | world |
+| frame.f | cut force, positive into the component, N | world |
+| frame.t | cut torque about the frame's origin, positive into the component, N.m | world |
+| s, v, f | coordinate, speed and driving force of a prismatic joint | its axis |
+| phi, w, tau | angle, angular velocity and driving torque of a revolute joint, right-handed about n | its axis |
+| q | unit quaternion (scalar first) of a free body or a spherical joint, R = R(q) | - |
+| n, r, r_cm, J | axes, offsets and inertia that belong to a component | its frame_a |
+
+frame_a is the side towards the base, frame_b the other. A joint moves frame_b against frame_a by its
+coordinate and does not mind which of the two is nearer to the world. Its flange `axis` is driven against
+`support`, which is fixed to frame_a; both may stay unconnected, which means no force.
+"""
+
+from gantrytau.mechanics.multibody.bodies import Body, PointMass
+from gantrytau.mechanics.multibody.forces import (
+    FrameForce,
+    FrameTorque,
+    LineForce,
+    WorldForce,
+    WorldTorque,
+)
+from gantrytau.mechanics.multibody.frames import (
+    Fixed,
+    FixedRotation,
+    FixedTranslation,
+    Frame,
+    TwoFrames,
+    World,
+)
+from gantrytau.mechanics.multibody.joints import (
+    Prismatic,
+    Revolute,
+    Spherical,
+    SphericalSpherical,
+    Universal,
+)
+from gantrytau.mechanics.multibody.sensors import CutSensor, PoseSensor, RelativeSensor
+
+__all__ = [
+    "Body",
+    "CutSensor",
+    "Fixed",
+    "FixedRotation",
+    "FixedTranslation",
+    "Frame",
+    "FrameForce",
+    "FrameTorque",
+    "LineForce",
+    "PointMass",
+    "PoseSensor",
+    "Prismatic",
+    "RelativeSensor",
+    "Revolute",
+    "Spherical",
+    "SphericalSpherical",
+    "TwoFrames",
+    "Universal",
+    "World",
+    "WorldForce",
+    "WorldTorque",
+]

@@ -1,0 +1,68 @@
+"""Masses: a point, and a rigid body that may move freely."""
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Model, Parameter, Real, der, dot, outer, root
+from gantrytau.mechanics.multibody.frames import Frame, World
+from gantrytau.mechanics.multibody.rotations import of_quaternion, spin_of_quaternion
+
+
+class PointMass(Model):
+    """A mass without extension."""
+
+    m = Parameter(1.0, unit="kg", min=0.0, description="mass")
+    v = Real(3, unit="m/s", description="velocity, resolved in the world")
+    world = outer(World)
+    frame_a = Frame()
+
+    def equations(self):
+        a = self.frame_a
+        yield self.v == der(a.r)
+        yield self.m * (der(self.v) - self.world.gravity) == a.f
+        yield a.t == 0
+
+
+class Body(Model):
+    """A rigid body. Where no joint leads from the world to it, or with free=True, it moves freely.
+
+    A free body has its own coordinates: the position r of its frame and the unit quaternion q of its
+    orientation. Start values of those, of v and of w say how it starts.
+    """
+
+    free = False
+    m = Parameter(1.0, unit="kg", min=0.0, description="mass")
+    r_cm = Parameter([0.0, 0.0, 0.0], unit="m", description="centre of mass, resolved in frame_a")
+    J = Parameter(
+        np.diag([0.1, 0.1, 0.1]), unit="kg.m2", description="inertia about the centre of mass, in frame_a"
+    )
+    r = Real(3, unit="m", description="position of frame_a, resolved in the world")
+    v = Real(3, unit="m/s", description="velocity of frame_a, resolved in the world")
+    w = Real(3, unit="rad/s", description="angular velocity, resolved in the world")
+    q = Real(
+        4, unit="1", description="orientation of a free body as a unit quaternion", start=[1.0, 0.0, 0.0, 0.0]
+    )
+    z = Real(3, unit="rad/s2", description="angular acceleration of a free body, resolved in the world")
+    world = outer(World)
+    frame_a = Frame()
+
+    def equations(self):
+        a = self.frame_a
+        yield root(
+            a,
+            R=of_quaternion(self.q),
+            w=spin_of_quaternion(self.q, der(self.q)),
+            coordinates=None if self.free else ca.vertcat(self.q, self.z),
+            equations=[dot(self.q, self.q) == 1, self.z == der(self.w)],
+        )
+        yield self.r == a.r
+        yield self.v == der(self.r)
+        yield self.w == a.w
+        arm, spin, gain = a.R @ self.r_cm, a.R.T @ a.w, a.R.T @ der(a.w)
+        centre = der(self.v) + ca.cross(der(a.w), arm) + ca.cross(a.w, ca.cross(a.w, arm))
+        # Newton's law for the centre of mass, Euler's in axes fixed to the body
+        yield a.f == self.m * (centre - self.world.gravity)
+        yield a.t == a.R @ (self.J @ gain + ca.cross(spin, self.J @ spin)) + ca.cross(arm, a.f)
+
+    def failure_hint(self, variable: str) -> str:
+        return "the body has no mass or inertia against this motion" if variable in ("r", "q", "v") else ""

@@ -1,0 +1,77 @@
+"""Forces and torques that act on frames."""
+
+import casadi as ca
+
+from gantrytau import Input, Model, Real, norm_2
+from gantrytau.mechanics import translational
+from gantrytau.mechanics.multibody.frames import Frame, TwoFrames
+
+
+class WorldForce(Model):
+    """A given force on the origin of a frame, resolved in the world."""
+
+    f = Input(3, unit="N", description="force on the frame, resolved in the world", start=0.0)
+    frame_b = Frame()
+
+    def equations(self):
+        yield self.frame_b.f == -self.f
+        yield self.frame_b.t == 0
+
+
+class WorldTorque(Model):
+    """A given torque on a frame, resolved in the world."""
+
+    t = Input(3, unit="N.m", description="torque on the frame, resolved in the world", start=0.0)
+    frame_b = Frame()
+
+    def equations(self):
+        yield self.frame_b.f == 0
+        yield self.frame_b.t == -self.t
+
+
+class FrameForce(Model):
+    """A given force on the origin of a frame, resolved in the frame, as of a thruster."""
+
+    f = Input(3, unit="N", description="force on the frame, resolved in the frame", start=0.0)
+    frame_b = Frame()
+
+    def equations(self):
+        yield self.frame_b.f == -(self.frame_b.R @ self.f)
+        yield self.frame_b.t == 0
+
+
+class FrameTorque(Model):
+    """A given torque on a frame, resolved in the frame."""
+
+    t = Input(3, unit="N.m", description="torque on the frame, resolved in the frame", start=0.0)
+    frame_b = Frame()
+
+    def equations(self):
+        yield self.frame_b.f == 0
+        yield self.frame_b.t == -(self.frame_b.R @ self.t)
+
+
+class LineForce(TwoFrames):
+    """A one-dimensional element, such as a spring, acts along the line between the origins of two frames.
+
+    Connect it between flange_a and flange_b, whose distance is that of the frames.
+    """
+
+    s = Real(unit="m", description="distance between the origins", start=1.0)
+    flange_a = translational.Flange()
+    flange_b = translational.Flange()
+
+    def equations(self):
+        a, b = self.frame_a, self.frame_b
+        line = b.r - a.r
+        along = line / self.s
+        yield self.s == norm_2(line)
+        yield self.flange_a.s == 0
+        yield self.flange_b.s == self.s
+        yield a.f == along * self.flange_b.f
+        yield b.f == -along * self.flange_b.f
+        yield a.t == 0
+        yield b.t == 0
+
+    def failure_hint(self, variable: str) -> str:
+        return "the two frames coincide, so the line has no direction" if variable == "s" else ""
