@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -46,6 +46,20 @@ class Reduced:
     known: frozenset[str]
     chains: "Chains"
     redundant: tuple[Equation, ...] = ()
+    rates: Mapping[int, ca.SX] = field(default_factory=dict)
+
+    def written(self, expression: ca.SX) -> ca.SX:
+        """An expression of the model's variables in the symbols of the reduced equations; others stay."""
+        expression = self.definitions.resolve(expression)
+        old, new = [], []
+        for leaf in ca.symvar(expression):
+            base, order = split_derivative(leaf.name())
+            alias = self.aliases.get(base)
+            if alias is not None:
+                offset = alias.offset if order == 0 else ZERO
+                old.append(leaf)
+                new.append(alias_expression(Alias(alias.root, alias.order + order, alias.factor, offset), self.chains))
+        return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
 
 
 class Chains:
@@ -91,7 +105,13 @@ class _Elimination:
         for place, variable in enumerate(flat.variables):
             for name in variable.elements:
                 self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
-        sides = table.reduce(ca.vertcat(*(e.residual for e in flat.equations)))
+        self.rated = [i for i, e in enumerate(flat.equations) if e.rate is not None]
+        sides = table.reduce(
+            ca.vertcat(
+                *(e.residual for e in flat.equations),
+                *(e.rate for e in flat.equations if e.rate is not None),
+            )
+        )
         names = list(flat.definitions)
         defined = table.reduce(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
         self.defined = dict(zip(names, defined.elements(), strict=True))
@@ -104,7 +124,7 @@ class _Elimination:
         self.residuals = self._without_constants(ca.SX(sides).elements() if flat.equations else [])
 
     def run(self) -> Reduced:
-        remaining = list(range(len(self.residuals)))
+        remaining = list(range(len(self.flat.equations)))  # behind them stand the given rates
         while True:
             sums = {i: terms for i in remaining if (terms := self._sum(self.residuals[i])) is not None}
             changed = False
@@ -131,6 +151,8 @@ class _Elimination:
         unknowns = tuple(n for n in names if n in used_names and n not in self.known)
         compact = [self.residuals[i] for i in remaining]
         definitions = self._definitions(aliases)
+        rates = self._substitute(self.residuals[len(self.flat.equations) :])
+        rate_of = dict(zip(self.rated, rates, strict=True))
         return Reduced(
             tuple(definitions.resolve(ca.vertcat(*compact)).elements()) if compact else (),
             tuple(compact),
@@ -141,6 +163,7 @@ class _Elimination:
             self.known,
             self.chains,
             tuple(self.flat.equations[i] for i in redundant),
+            {k: rate_of[i] for k, i in enumerate(remaining) if i in rate_of},
         )
 
     def _definitions(self, aliases: Mapping[str, Alias]) -> Definitions:

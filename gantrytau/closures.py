@@ -1,5 +1,7 @@
 """A connection that closes a loop: residuals that must vanish, each with the force or torque that enforces it."""
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from gantrytau.errors import ModelError
@@ -25,8 +27,9 @@ class Closure:
         self.equations: list[Equation] = []
         self.variables: list[FlatVariable] = []
         self._flows: dict[str, list[ca.SX]] = {}
-        for words, residual, flow in a.closing(b):
-            self._add(instance, f"loops[{number}].{flow}", (loop.a, loop.b, words), residual, flow)
+        for words, flow, residual, rate in a.closing(b):
+            rates = [None] * residual.numel() if rate is None else scalars(rate)
+            self._add(instance, f"loops[{number}].{flow}", (loop.a, loop.b, words), scalars(residual), rates)
         if not self.equations:
             raise ModelError(
                 f"connect({loop.a}, {loop.b}) closes a loop of {', '.join(propagated(a))}, and "
@@ -34,11 +37,16 @@ class Closure:
             )
 
     def _add(
-        self, instance: Instance, name: str, where: tuple[str, str, str], residual: ca.SX, flow: str
+        self,
+        instance: Instance,
+        name: str,
+        where: tuple[str, str, str],
+        elements: list[ca.SX],
+        rates: Sequence[ca.SX | None],
     ) -> None:
         a, b, words = where
+        flow = name.rpartition(".")[2]
         declaration = type(self.connection.a).members()[flow]
-        elements = scalars(residual)
         names = element_names(name, (len(elements),))
         symbols = [instance.symbols.add(n, "real").sx for n in names]
         self._flows[flow] = symbols
@@ -54,9 +62,11 @@ class Closure:
                 owner=name.partition(".")[0],
             )
         )
-        for k, (element, dual) in enumerate(zip(elements, names, strict=True)):
+        for k, (element, rate, dual) in enumerate(zip(elements, rates, names, strict=True)):
             label = f"{a} - {b}, {words} {AXES[k]}" if len(elements) == 3 else f"{a} - {b}, {words} {k}"
-            self.equations.append(Equation(element, ca.SX(0), a, "loop", 1, k, dual=dual, label=label))
+            self.equations.append(
+                Equation(element, ca.SX(0), a, "loop", 1, k, dual=dual, label=label, rate=rate)
+            )
 
     def flow(self, name: str, row: int) -> ca.SX:
         """What passes from the first connector to the second."""

@@ -11,7 +11,8 @@ from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.guide import Guide
-from gantrytau.initialization import Guess, consistent_start
+from gantrytau.guess import Guess
+from gantrytau.initialization import consistent_start
 from gantrytau.signals import Samples, Signal
 from gantrytau.solution import solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative, time
@@ -102,10 +103,11 @@ class Coordinates:
         """Each level as a function to its residual, Jacobian and the size of its terms."""
         found = []
         positions = {n: k for k, n in enumerate(self.states)}
-        for residual in self.invariants:
-            own = [n for n in (leaf.name() for leaf in ca.symvar(residual)) if n in positions]
-            top = _level_columns(own)
-            columns = [positions[n] for n in top]
+        for stage, residual in enumerate(self.invariants, start=-len(self.invariants)):
+            own = {leaf.name() for leaf in ca.symvar(residual)}
+            tops = self.dae.indexed.orders.items()
+            level = [derivative_name(n, stage + top) for n, top in tops if stage + top >= 0]
+            columns = [positions[n] for n in level if n in own]
             x = self.x[columns]
             jacobian = ca.densify(ca.jacobian(residual, x))
             found.append(
@@ -144,13 +146,6 @@ class Coordinates:
         shares = np.abs(left[:, -1])
         equations = self.dae.reduced.equations
         return [equations[i].name for i in np.argsort(-shares)[:4] if shares[i] > 0.3 * np.max(shares)]
-
-
-def _level_columns(names: Sequence[str]) -> list[str]:
-    """Of the names in a level, those of the order that it determines: speeds once speeds occur."""
-    orders = {n: split_derivative(n)[1] for n in names}
-    highest = max(orders.values(), default=0)
-    return [n for n in names if orders[n] == highest] if highest else list(names)
 
 
 def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[str] = ()) -> Coordinates:

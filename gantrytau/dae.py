@@ -14,6 +14,7 @@ from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.index_reduction import Indexed, Key
 from gantrytau.parameters import ParameterTable
 from gantrytau.solution import Block
+from gantrytau.statements import Equation
 from gantrytau.states import StateChoice
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.system import System, assemble
@@ -66,6 +67,7 @@ class Dae:
     blocks: tuple[Block, ...]
     known: tuple[str, ...]
     start: Mapping[str, float]
+    redundant: tuple[Equation, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -117,7 +119,7 @@ class Dae:
             aliases=len(self.flat.equations) - len(self.reduced.residuals),
             differentiated=sum(1 for c in self.indexed.counts if c),
             mobility=positions,
-            redundant=tuple(e.name for e in self.reduced.redundant),
+            redundant=tuple(e.name for e in (*self.redundant, *self.reduced.redundant)),
             states=self.states,
             condition=self.choice.condition,
             blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in self.blocks),

@@ -107,6 +107,8 @@ def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
     for level in range(1, max(counts, default=0) + 1):
         rows = [i for i, count in enumerate(counts) if count >= level]
         new = reduced.definitions.differentiated(ca.vertcat(*(below[i] for i in rows))).elements()
+        given = reduced.rates if level == 1 else {}
+        new = [given.get(i, rate) for i, rate in zip(rows, new, strict=True)]
         below = dict(zip(rows, new, strict=True))
         keys += [(i, level) for i in rows]
         compact += new

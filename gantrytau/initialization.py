@@ -1,7 +1,6 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -11,55 +10,11 @@ from gantrytau.aliases import Reduced
 from gantrytau.consistency import Level, solve_levels
 from gantrytau.dae import Dae
 from gantrytau.errors import InitializationError, ModelError
-from gantrytau.flat_model import FlatModel, FlatVariable
+from gantrytau.flat_model import FlatModel
+from gantrytau.guess import Guess
 from gantrytau.index_reduction import Indexed
 from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
-
-
-@dataclass(frozen=True, eq=False)
-class Guess:
-    """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold."""
-
-    values: Mapping[str, float]
-    started: frozenset[str]
-    fixed: frozenset[str]
-
-
-def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> Guess:
-    """Start attributes carried over to the symbols of the reduced equations."""
-    values: dict[str, float] = dict.fromkeys(symbols, 0.0)
-    owners: dict[str, tuple[bool, int]] = {}
-    fixed: dict[str, str] = {}
-    for variable in flat.variables:
-        if variable.start is None:
-            continue
-        numbers = table.number(ca.vertcat(*variable.start))
-        for name, number in zip(variable.elements, numbers, strict=True):
-            _place(variable, name, float(number), table, reduced, values, owners, fixed)
-    values.update(table.values)
-    values[flat.time.name()] = 0.0
-    return Guess(values, frozenset(owners), frozenset(fixed))
-
-
-def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:
-    alias = reduced.aliases[name]
-    if alias.root is None:
-        return
-    symbol = derivative_name(alias.root, alias.order)
-    value = (number - float(table.number(alias.offset)[0])) / alias.factor
-    if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
-        raise InitializationError(
-            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
-            "it is an alias; "
-            "release one with Start(...) instead of Fixed(...)"
-        )
-    rank = (not variable.fixed, name.count("."))
-    if symbol not in owners or rank < owners[symbol]:
-        owners[symbol] = rank
-        values[symbol] = value
-    if variable.fixed:
-        fixed[symbol] = name
 
 
 def levels(indexed: Indexed, reduced: Reduced) -> list[Level]:
@@ -107,24 +62,13 @@ def consistent_start(
 
 def _initial_level(flat: FlatModel, table: ParameterTable, reduced: Reduced, stages: list[Level]) -> Level:
     residual = table.reduce(ca.vertcat(*(e.residual for e in flat.initial_equations)))
-    leaves = [leaf for leaf in ca.symvar(residual) if split_derivative(leaf.name())[0] in reduced.aliases]
-    new = [_alias_of(leaf.name(), reduced) for leaf in leaves]
-    rows = ca.substitute(residual, ca.vertcat(*leaves), ca.vertcat(*new)).elements()
+    rows = reduced.written(residual).elements()
     return Level(
         tuple(r for s in stages for r in s.residuals) + tuple(rows),
         tuple(n for s in stages for n in s.names)
         + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
         tuple(n for s in stages for n in s.unknowns),
     )
-
-
-def _alias_of(name: str, reduced: Reduced) -> ca.SX:
-    base, order = split_derivative(name)
-    alias = reduced.aliases[base]
-    if alias.root is None:
-        return alias.offset if order == 0 else ca.SX(0)
-    offset = alias.offset if order == 0 else ca.SX(0)
-    return alias.factor * reduced.chains.sx(alias.root, alias.order + order) + offset
 
 
 def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:

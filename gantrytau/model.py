@@ -67,10 +67,11 @@ class Declared(_Part):
 class Connector(Declared):
     """A set of potentials (`Real`) and flows (`Flow`) through which components are connected."""
 
-    def closing(self, other: Any) -> Iterator[tuple[str, Any, str]]:
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any]]:
         """What makes this connector coincide with another one where a loop of propagated quantities closes.
 
-        Triples: words for it, the residual, and the name of the flow that enforces it, of the same shape.
+        Words for it, the name of the flow that enforces it, the residual, of the same shape, and the time
+        derivative of the residual where it is zero (None: by the chain rule).
         """
         yield from ()
 

@@ -231,9 +231,15 @@ class Spread:
         equations = tuple(equations)
         if not equations:
             return ()
-        sides = self._inserted(ca.vertcat(*(side for e in equations for side in (e.left, e.right)))).elements()
+        rated = [e.rate for e in equations if e.rate is not None]
+        sides = [side for e in equations for side in (e.left, e.right)]
+        found = self._inserted(ca.vertcat(*sides, *rated)).elements()
+        rates = iter(found[len(sides) :])
         return tuple(
-            replace(e, left=sides[2 * i], right=sides[2 * i + 1]) for i, e in enumerate(equations)
+            replace(
+                e, left=found[2 * i], right=found[2 * i + 1], rate=None if e.rate is None else next(rates)
+            )
+            for i, e in enumerate(equations)
         )
 
     def refuse_undefined(self, equations: Iterable[Equation]) -> None:

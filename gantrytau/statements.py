@@ -19,7 +19,8 @@ class Equation:
     """A scalar equation `left == right` and where it stands.
 
     dual: name of the force that enforces it, if it is a constraint that may turn out to repeat others;
-    label: its name, where component and number do not say what it is.
+    label: its name, where component and number do not say what it is; rate: time derivative of its
+    residual where it holds, if that is shorter than the derivative of the residual.
     """
 
     left: ca.SX
@@ -30,6 +31,7 @@ class Equation:
     element: int | None = None
     dual: str = ""
     label: str = ""
+    rate: ca.SX | None = None
 
     @cached_property
     def residual(self) -> ca.SX:

@@ -14,9 +14,11 @@ from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
 from gantrytau.guide import Guide
 from gantrytau.index_reduction import Indexed, reduce_index
-from gantrytau.initialization import consistent_start, starting_guess
+from gantrytau.guess import starting_guess
+from gantrytau.initialization import consistent_start
 from gantrytau.model import Model
 from gantrytau.parameters import parameter_table
+from gantrytau.redundancy import Settled, without_redundant
 from gantrytau.solution import solve_blocks
 from gantrytau.statements import Equation
 from gantrytau.states import choose_states
@@ -66,13 +68,15 @@ def translate_flat(
     for name in known:
         if name.startswith("der("):
             raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
-    reduced = eliminate_aliases(flat, table, frozenset(known))
+    settled = without_redundant(flat, table, frozenset(known)) if flat.loops else Settled(flat)
+    reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     indexed = reduce_index(reduced, flat)
     symbols = all_symbols(indexed, reduced.known)
     guess = starting_guess(flat, table, reduced, symbols)
-    if start:
+    better = {**settled.guess, **(start or {})}
+    if better:
         guess = replace(
-            guess, values={**guess.values, **{n: v for n, v in start.items() if n in guess.values}}
+            guess, values={**guess.values, **{n: v for n, v in better.items() if n in guess.values}}
         )
     sample = consistent_start(flat, table, reduced, indexed, guess)
     preference = {n: int(v.prefer) for v in flat.variables for n in v.elements}
@@ -88,7 +92,18 @@ def translate_flat(
         pattern.blocks, indexed.residuals, by_name, Guide(sample, table.values, choice.states)
     )
     settings |= dict(started=guess.started, fixed=guess.fixed)
-    return Dae(flat, table, reduced, indexed, choice, tuple(blocks), tuple(known), sample, settings)
+    return Dae(
+        flat,
+        table,
+        reduced,
+        indexed,
+        choice,
+        tuple(blocks),
+        tuple(known),
+        sample,
+        settled.redundant,
+        settings,
+    )
 
 
 def names(found: Sequence[str]) -> tuple[str, ...]:

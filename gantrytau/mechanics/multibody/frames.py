@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, root
-from gantrytau.mechanics.multibody.rotations import about, axial, unit
+from gantrytau.mechanics.multibody.rotations import about, turning, unit
 
 
 class Frame(Connector):
@@ -24,8 +24,8 @@ class Frame(Connector):
 
     def closing(self, other):
         """Two frames that coincide: the cut force holds the origins together, the cut torque the axes."""
-        yield "position", self.r - other.r, "f"
-        yield "orientation", axial(self.R @ other.R.T), "t"
+        yield "position", "f", self.r - other.r, None
+        yield "orientation", "t", turning(self.R @ other.R.T), self.w - other.w
 
 
 class World(Model):

@@ -29,6 +29,7 @@ def spin_of_quaternion(q: Any, rate: Any) -> ca.SX:
     return 2 * (a * rate[1:4] - u * rate[0] + ca.cross(u, rate[1:4]))
 
 
-def axial(R: Any) -> ca.SX:
-    """Half the vector of the skew part of R: the axis times the sine of the angle, (3,)."""
-    return ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / 2
+def turning(R: Any) -> ca.SX:
+    """Axis of the rotation R times 2 tan(angle / 2), (3,): the rotation itself if small, large at half a turn."""
+    axial = ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / 2
+    return 4 * axial / (1 + ca.trace(R))

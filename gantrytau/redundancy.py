@@ -1,0 +1,192 @@
+"""Constraints that repeat others: found by numerical rank at poses where the loops are closed.
+
+A planar loop in space closes with three of its six residuals; which three depends on the plane. The rows
+of all equations between positions are orthogonalised, those that cannot be dropped first; of the others
+the most independent are taken one after another, and what is left over repeats them. A pose may be
+special, such as a parallelogram stretched flat, so poses around it are looked at too.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.aliases import Reduced, eliminate_aliases
+from gantrytau.consistency import Level, solve_levels
+from gantrytau.errors import InitializationError
+from gantrytau.flat_model import FlatModel
+from gantrytau.guess import Guess, starting_guess
+from gantrytau.parameters import ParameterTable
+from gantrytau.statements import Equation
+from gantrytau.symbols import split_derivative
+
+RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
+POSES = 3  # besides the start
+STEP = 0.1  # of a move to another pose, in rad, or relative to the size of the coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What constrains positions: rows, of which those with a dual may be dropped, and unknowns.
+
+    equations: of the droppable rows, which come last.
+    """
+
+    level: Level
+    symbols: Mapping[str, ca.SX]
+    equations: tuple[Equation, ...]
+
+    @property
+    def firm(self) -> int:
+        """Number of rows that cannot be dropped."""
+        return len(self.level.residuals) - len(self.equations)
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A model without redundant constraints, and start values where its loops are closed.
+
+    redundant: the constraints left out, whose forces are zero; guess: numbers of positions by symbol.
+    """
+
+    flat: FlatModel
+    redundant: tuple[Equation, ...] = ()
+    guess: Mapping[str, float] = field(default_factory=dict)
+
+
+def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Settled:
+    """Leave out the constraints that repeat others. InitializationError if the loops cannot be closed."""
+    duals = [e for e in flat.equations if e.dual]
+    if not duals:
+        return Settled(flat)
+    bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
+    reduced = eliminate_aliases(bare, table, known)
+    constraints = _constraints(flat, table, reduced, duals)
+    guess = starting_guess(flat, table, reduced, list(constraints.symbols))
+    closed = _close(constraints, guess, guess.values, flat.name)
+    matrices = [_matrix(constraints, closed)]
+    matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, matrices[0], flat.name)]
+    kept = _independent(matrices, constraints.firm)
+    redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
+    return Settled(_with_zero_forces(flat, redundant), redundant, closed)
+
+
+def _constraints(
+    flat: FlatModel, table: ParameterTable, reduced: Reduced, duals: Sequence[Equation]
+) -> Constraints:
+    """The equations between positions on which the droppable ones depend.
+
+    Positions and forces are told apart by the connectors: an equation with a flow in it is one of forces.
+    """
+    forces = {n for v in flat.variables if v.kind == "flow" for n in v.elements} | {e.dual for e in duals}
+    roots = {reduced.aliases[n].root for n in forces}
+    closing = reduced.written(table.reduce(ca.vertcat(*(e.residual for e in duals))))
+    positions = {}
+    for i, residual in enumerate(reduced.residuals):
+        names = [leaf.name() for leaf in ca.symvar(residual)]
+        if not any(n in roots or n.startswith("der(") for n in names):
+            positions[i] = [n for n in names if n in reduced.aliases and n not in reduced.known]
+    unknown = _unknowns(closing, reduced)
+    rows: list[int] = []
+    while new := [i for i, names in positions.items() if i not in rows and unknown & set(names)]:
+        rows += new
+        unknown |= {n for i in new for n in positions[i]}
+    level = Level(
+        (*(reduced.residuals[i] for i in rows), *closing.elements()),
+        (*(reduced.equations[i].name for i in rows), *(e.name for e in duals)),
+        tuple(n for n in reduced.unknowns if n in unknown),
+    )
+    leaves = ca.symvar(ca.vertcat(*level.residuals))
+    return Constraints(level, {leaf.name(): leaf for leaf in leaves}, tuple(duals))
+
+
+def _unknowns(expression: ca.SX, reduced: Reduced) -> set[str]:
+    names = {leaf.name() for leaf in ca.symvar(expression)}
+    return {n for n in names if n in reduced.aliases and n not in reduced.known}
+
+
+def _close(
+    constraints: Constraints, guess: Guess, values: Mapping[str, float], title: str
+) -> dict[str, float]:
+    return solve_levels(
+        [constraints.level],
+        constraints.symbols,
+        values,
+        held=guess.fixed,
+        started=guess.started,
+        title=title,
+    )
+
+
+def _matrix(constraints: Constraints, values: Mapping[str, float]) -> np.ndarray:
+    """Jacobian of the rows, each of length one; rows that are zero stay zero."""
+    rows = ca.vertcat(*constraints.level.residuals)
+    x = ca.vertcat(*(constraints.symbols[n] for n in constraints.level.unknowns))
+    leaves = list(constraints.symbols.values())
+    function = ca.Function("rows", [ca.vertcat(*leaves)], [ca.densify(ca.jacobian(rows, x))])
+    found = np.array(function(ca.DM([values[leaf.name()] for leaf in leaves])))
+    sizes = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
+
+
+def _poses(
+    constraints: Constraints, guess: Guess, closed: Mapping[str, float], matrix: np.ndarray, title: str
+) -> list[dict[str, float]]:
+    """Other poses near the first, each reached along directions that the constraints leave free."""
+    _, sizes, right = np.linalg.svd(matrix)
+    free = right[np.count_nonzero(sizes > RANK) :]
+    found: list[dict[str, float]] = []
+    random = np.random.default_rng(0)
+    names = constraints.level.unknowns
+    here = np.array([closed[n] for n in names])
+    loose = replace(guess, fixed=frozenset(), started=frozenset())
+    for _ in range(POSES if len(free) else 0):
+        move = random.standard_normal(len(free)) @ free
+        move *= STEP * max(1.0, float(np.abs(here).max())) / np.abs(move).max()
+        try:
+            moved = {**closed, **dict(zip(names, (here + move).tolist(), strict=True))}
+            found.append(_close(constraints, loose, moved, title))
+        except InitializationError:
+            continue
+    return found
+
+
+def _independent(matrices: Sequence[np.ndarray], firm: int) -> set[int]:
+    """Which of the rows after the firm ones to keep; poses of lower rank than others have no say."""
+    ranks = [np.linalg.matrix_rank(m, tol=RANK) for m in matrices]
+    rests = [_beyond(m[firm:], m[:firm]) for m, r in zip(matrices, ranks, strict=True) if r == max(ranks)]
+    kept: set[int] = set()
+    while True:
+        sizes = np.min([np.linalg.norm(rest, axis=1) for rest in rests], axis=0, initial=np.inf)
+        if sizes.size == 0 or sizes.max() <= RANK:
+            return kept
+        best = int(np.argmax(sizes))
+        kept.add(best)
+        for rest in rests:
+            direction = rest[best] / np.linalg.norm(rest[best])
+            rest -= np.outer(rest @ direction, direction)
+            rest[best] = 0.0
+
+
+def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """What of the rows lies beyond the span of the others."""
+    if not len(others):
+        return rows.copy()
+    _, sizes, right = np.linalg.svd(others, full_matrices=False)
+    span = right[sizes > RANK * sizes[0]]
+    rest = rows - (rows @ span.T) @ span
+    return rest - (rest @ span.T) @ span
+
+
+def _with_zero_forces(flat: FlatModel, redundant: Sequence[Equation]) -> FlatModel:
+    """The forces of redundant constraints are zero; the constraints are gone."""
+    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
+    left_out = {id(e) for e in redundant}
+    equations = tuple(
+        replace(e, left=symbols[e.dual], right=ca.SX(0), label=f"no force for {e.name}")
+        if id(e) in left_out
+        else e
+        for e in flat.equations
+    )
+    return replace(flat, equations=equations)
