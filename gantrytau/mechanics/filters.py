@@ -106,7 +106,8 @@ def _bessel(order: int) -> np.ndarray:
 def _butterworth(order: int) -> np.ndarray:
     """The poles stand evenly on the left half of the unit circle (Butterworth 1930)."""
     angles = pi * (0.5 + (np.arange(order) + 0.5) / order)
-    return np.real(np.poly(np.exp(1j * angles)))[::-1]
+    found = np.real(np.poly(np.exp(1j * angles)))[::-1]
+    return found / found[0]
 
 
 SHAPES = {"critical": _critical, "bessel": _bessel, "butterworth": _butterworth}
