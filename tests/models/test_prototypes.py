@@ -8,6 +8,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gantrytau.errors import ModelError
 from gantrytau_models import prototypes
@@ -271,3 +272,25 @@ def test_files_are_read_when_a_prototype_is_named():
         "p.L1; assert p._read.cache_info().currsize == 1"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("L1", 1e-9), ("GT_A", 1e-9), ("D1", 0.5)])
+def test_six_links_assemble_near_the_nominal_orientation(name, degrees):
+    # the orientation of D1 is known from offsets that fit within 0.9 mm, on a plate with joints 0.2 m apart
+    robot = getattr(prototypes, name)
+    links = [link for arm in robot.arms for link in arm.links]
+    cart, plate = (np.array([getattr(link, key) for link in links]) for key in ("offset", "plate_offset"))
+    length = np.array([link.length for link in links])
+    forward = np.mean([arm.direction for arm in robot.arms], axis=0)
+    tool = np.mean([arm.offset for arm in robot.arms], axis=0) + 0.85 * length.mean() * forward
+    turn = Rotation.from_matrix(robot.plate_rotation)
+    nominal = turn
+    for _ in range(20):
+        lever = turn.apply(plate)
+        rod = tool + lever - cart
+        jacobian = 2 * np.hstack([rod, np.cross(lever, rod)])
+        step = np.linalg.solve(jacobian, length**2 - (rod**2).sum(axis=1))
+        tool, turn = tool + step[:3], Rotation.from_rotvec(step[3:]) * turn
+    np.testing.assert_allclose(np.linalg.norm(tool + turn.apply(plate) - cart, axis=1), length, rtol=1e-13)
+    assert (forward @ (tool - cart).T > 0).all()  # the tool ahead of the carts
+    assert np.degrees((turn * nominal.inv()).magnitude()) < degrees
