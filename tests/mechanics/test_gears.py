@@ -106,6 +106,21 @@ def test_a_ball_screw_holds_a_load_with_little_torque():
     assert at["motor.tau"] == pytest.approx(2000.0 * 0.01 / (2 * np.pi), rel=1e-14)
 
 
+def test_an_axis_with_a_ball_screw_speeds_up_evenly():
+    class Axis(Model):  # as in the README of the folder
+        motor, rotor = rotational.Torque(), rotational.Inertia(J=2e-4)
+        screw, slide = gears.BallScrew(lead=0.01), translational.Mass(m=12.0)
+
+        def equations(self):
+            yield connect(self.motor.flange, self.rotor.flange_a)
+            yield connect(self.rotor.flange_b, self.screw.flange_a)
+            yield connect(self.screw.flange_b, self.slide.flange)
+
+    found = simulate(Axis(), stop=1.0, inputs={"motor.tau": 0.1}, tolerance=TOLERANCE)
+    turn = 2 * np.pi / 0.01
+    np.testing.assert_allclose(found["slide.v"], 0.1 * turn / (12.0 + 2e-4 * turn**2) * found.time, atol=NEAR)
+
+
 class Elastic(Model):
     """A motor led along a motion, an elastic gear, a load."""
 
