@@ -185,12 +185,7 @@ def _made(found: type[Model], wanted: str | None) -> Chosen:
     if wanted is None and "prototype" in needed:
         wanted = _first_prototype(found)
         note(f"{found.__name__} takes its measures from prototype {wanted}; choose another with --prototype")
-    try:
-        return Chosen(found(_prototype(wanted)) if wanted else found(), wanted)  # pyright: ignore[reportArgumentType]
-    except TypeError as error:
-        if str(error).startswith(f"{found.__name__}: "):  # the class itself says what it expects
-            raise CommandError(str(error)) from error
-        raise
+    return Chosen(found(_prototype(found, wanted)) if wanted else found(), wanted)  # pyright: ignore[reportArgumentType]
 
 
 def _arguments(found: type[Model]) -> tuple[list[str], bool]:
@@ -206,15 +201,19 @@ def _arguments(found: type[Model]) -> tuple[list[str], bool]:
 
 
 def _first_prototype(found: type[Model]) -> str:
-    """The first robot of the kind that a class takes, by the annotation of its argument."""
+    """The robot that a class gets if none is named: L1, or the first of the kind that it takes."""
+    fitting = _fitting(found)
+    return FIRST_PROTOTYPE if FIRST_PROTOTYPE in fitting or not fitting else fitting[0]
+
+
+def _fitting(found: type[Model]) -> tuple[str, ...]:
+    """The prototypes of the kind that a class takes, by the annotation of its argument; all if it says none."""
     try:
         kind = typing.get_type_hints(found.__init__).get("prototype")
-    except NameError:  # an annotation of the user's that is for readers only
+    except (NameError, SyntaxError, AttributeError, TypeError):  # an annotation for readers only
         kind = None
     names = prototype_names()
-    candidates = (FIRST_PROTOTYPE, *names) if FIRST_PROTOTYPE in names else names
-    fitting = (name for name in candidates if isinstance(kind, type) and isinstance(_record(name), kind))
-    return next(fitting, FIRST_PROTOTYPE)
+    return tuple(n for n in names if isinstance(_record(n), kind)) if isinstance(kind, type) else names
 
 
 def _record(name: str) -> Any:
@@ -231,12 +230,18 @@ def sources() -> dict[str, str]:
     return {name: _record(name).source for name in prototype_names()}
 
 
-def _prototype(name: str) -> Any:
+def _prototype(found: type[Model], name: str) -> Any:
+    """The prototype of that name for a class, with what it warns of."""
     from gantrytau_models import prototypes
 
-    names = prototype_names()
+    names, fitting = prototype_names(), _fitting(found)
     if name not in names:
         raise CommandError(f"--prototype {name}: there is no such robot{_similar(name, names)}")
+    if name not in fitting:
+        raise CommandError(
+            f"--prototype {name}: {found.__name__} cannot take the measures of this kind of robot, "
+            f"expected one of {', '.join(fitting)}"
+        )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         record = getattr(prototypes, name)

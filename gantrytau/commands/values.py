@@ -60,7 +60,9 @@ def samples(file: Path, column: str) -> tuple[list[float], list[float]]:
         raise CommandError(f"{file}: there is no such file; check the path of --input") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CommandError(f"{file}: cannot be read as CSV ({error})") from error
-    header = [head.strip() for head in rows[0]] if rows else []
+    if len(rows) < 2:
+        raise CommandError(f"{file}: found {len(rows)} rows, expected a header and a row for each time")
+    header = [head.strip() for head in rows[0]]
     places = {head.rpartition(" [")[0] or head: place for place, head in enumerate(header)}
     places |= {head: place for place, head in enumerate(header)}
     for wanted in ("time", column):

@@ -78,7 +78,38 @@ def test_two_prototypes_are_one_too_many(fails):
 
 
 def test_a_prototype_of_another_kind_is_refused(fails):
-    assert "GantryTau: found" in fails(MISUSE, "check", "GantryTau(F1_ideal)")
+    message = fails(MISUSE, "check", "GantryTau(F1_ideal)")
+    assert (
+        "F1_ideal: GantryTau cannot take the measures of this kind of robot, expected one of D1, " in message
+    )
+
+
+def test_a_class_gets_the_first_prototype_of_the_kind_it_takes(run, tmp_path):
+    file = tmp_path / "rotating.py"
+    file.write_text(
+        "from gantrytau_models import Pendulum, prototypes\n"
+        "class Rotating(Pendulum):\n"
+        "    def __init__(self, prototype: prototypes.RotatingPrototype):\n"
+        "        super().__init__(m=prototype.plate_mass)\n"
+        "class Vague(Pendulum):\n"
+        "    def __init__(self, prototype: 'no such class'):\n"
+        "        super().__init__(m=prototype.plate_mass)\n"
+    )
+    assert "from prototype F1;" in run("check", f"{file}:Rotating").stderr
+    assert "from prototype L1;" in run("check", f"{file}:Vague").stderr
+
+
+def test_a_prototype_in_doubt_says_so(run, tmp_path):
+    file = tmp_path / "rotating.py"
+    file.write_text(
+        "from gantrytau_models import Pendulum\n"
+        "class Any(Pendulum):\n"
+        "    def __init__(self, prototype):\n"
+        "        super().__init__()\n"
+    )
+    found = run("check", f"{file}(F1_printed)")
+    assert found.exit_code == 0
+    assert "Note: prototypes.F1_printed: " in found.stderr
 
 
 @pytest.mark.parametrize(
