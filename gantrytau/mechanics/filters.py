@@ -17,8 +17,8 @@ from gantrytau.errors import ModelError
 class LowPass(Model):
     """A low-pass filter of order n with unit gain at rest: `LowPass(order=3, bandwidth=50.0, unit="m")`.
 
-    order: 1 or more, how often y may be differentiated; two for the forces of a rigid robot, three to
-    have them without steps. kind: "critical" (n equal real poles, no overshoot), "bessel" (hardly any
+    order: 1 to 10, how often y may be differentiated; two for the forces of a rigid robot, three to have
+    them without kinks. kind: "critical" (n equal real poles, no overshoot), "bessel" (hardly any
     overshoot, equal delay of all frequencies) or "butterworth" (flattest gain, overshoots). size: 0 for a
     scalar, else the length of the vector whose elements are filtered alike. unit: of u and y, open if not
     given. It starts at rest at the first value of u, by initial equations; a model that cannot stand at
@@ -45,7 +45,7 @@ class LowPass(Model):
         left, derivative = self.y, self.y
         for power, coefficient in enumerate(powers[1:], start=1):
             derivative = der(derivative)
-            left += float(coefficient) * derivative / self.bandwidth**power
+            left = left + float(coefficient) * derivative / self.bandwidth**power
         yield left == self.u
 
     def initial_equations(self):
