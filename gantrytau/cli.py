@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
+from gantrytau.commands import check, equations, library, simulate
+
 app = typer.Typer(
     help="Acausal models of parallel robots: simulate, optimise, calibrate, export.",
     no_args_is_help=True,
@@ -86,6 +88,16 @@ def demo(
         return
     screen.print(demonstration.table(summaries))
     screen.print(f"Pictures and trajectories are in {output}/: {', '.join(file.name for file in files)}")
+
+
+app.command(epilog="Example: gantrytau check 'GantryTau(D1)'")(check.check)
+app.command(
+    epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"
+)(simulate.simulate)
+app.command(
+    epilog="Example: gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s"
+)(equations.equations)
+app.command(epilog="Example: gantrytau library --json")(library.library)
 
 
 def _solve_rows(screen: Any) -> dict[str, Any]:

@@ -192,13 +192,16 @@ class Dae:
         """
         return assemble(self, form)
 
-    def equations(self, format: Literal["text"] = "text") -> str:
-        """Every block on its line, with the component equation each comes from."""
-        from gantrytau.equation_text import block_text
+    def equations(self, format: Literal["text", "latex", "html", "modelica"] = "text") -> str:
+        """The equations, written out: every block with the component equations it comes from, or the flat model.
 
-        if format != "text":
-            raise ModelError(f"equations(format={format!r}): expected 'text'")
-        return block_text(self)
+        text: one line per solved unknown; latex: align environments to be included in a document (amsmath);
+        html: one page by component and by block, with tables of variables; modelica: the flat model as a class
+        that Modelica tools read. Raises ModelError for another format or a function that the format lacks.
+        """
+        from gantrytau.writing import write_equations
+
+        return write_equations(self, format)
 
     def function(self, given: Sequence[str], find: Sequence[str]) -> ca.Function:
         """A CasADi function from `given` to `find`, by name; the causality follows from the names.

@@ -1,9 +1,11 @@
-"""Rotation about one axis: flanges, inertias, springs, dampers, sources.
+"""Rotation about one axis: flanges, inertias, springs, dampers, friction, sources, sensors.
 
 Angle phi of a flange is absolute, its torque tau is positive into the component.
 """
 
-from gantrytau import Connector, Flow, Input, Model, Parameter, Real, der
+from gantrytau import Connector, Flow, Input, Model, Output, Parameter, Real, between, der, if_else, tanh
+
+TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 
 
 class Flange(Connector):
@@ -74,11 +76,172 @@ class Damper(Compliant):
         yield self.tau == self.d * der(self.phi_rel)
 
 
-class Torque(Model):
-    """A given torque on the flange."""
+class SpringDamper(Compliant):
+    """A linear torsion spring and a linear torsion damper side by side."""
 
-    tau = Input(unit="N.m", description="torque on the flange", start=0.0)
+    c = Parameter(1.0, unit="N.m/rad", description="stiffness")
+    d = Parameter(1.0, unit="N.m.s/rad", description="damping")
+    phi_rel0 = Parameter(0.0, unit="rad", description="angle without torque at rest")
+    w_rel = Real(unit="rad/s", description="rate of phi_rel")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.w_rel == der(self.phi_rel)
+        yield self.tau == self.c * (self.phi_rel - self.phi_rel0) + self.d * self.w_rel
+
+
+class BearingFriction(Compliant):
+    """Coulomb and viscous friction between two shafts, or a shaft and its housing, the sign smoothed by tanh."""
+
+    tau_c = Parameter(0.0, unit="N.m", min=0.0, description="Coulomb friction")
+    tau_v = Parameter(0.0, unit="N.m.s/rad", min=0.0, description="viscous friction")
+    w_s = Parameter(0.05, unit="rad/s", min=0.0, description="smoothing speed")
+    w_rel = Real(unit="rad/s", description="rate of phi_rel")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.w_rel == der(self.phi_rel)
+        yield self.tau == self.tau_c * tanh(self.w_rel / self.w_s) + self.tau_v * self.w_rel
+
+
+class Friction(Model):
+    """Base of friction against the ground; replace it to choose another law, or `Frictionless` to leave it out."""
+
+    w = Real(unit="rad/s", description="angular velocity against the ground")
+    tau = Real(unit="N.m", description="friction torque on the flange, positive against positive speed")
+    flange = Flange()
+
+    def equations(self):
+        yield self.w == der(self.flange.phi)
+        yield self.flange.tau == self.tau
+
+
+class Frictionless(Friction):
+    """No friction."""
+
+    def equations(self):
+        yield from super().equations()
+        yield self.tau == 0
+
+
+class TanhFriction(Friction):
+    """Coulomb and viscous friction, the sign smoothed by tanh: tau = tau_c tanh(w / w_s) + tau_v w."""
+
+    tau_c = Parameter(0.0, unit="N.m", min=0.0, description="Coulomb friction")
+    tau_v = Parameter(0.0, unit="N.m.s/rad", min=0.0, description="viscous friction")
+    w_s = Parameter(0.05, unit="rad/s", min=0.0, description="smoothing speed")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.tau == self.tau_c * tanh(self.w / self.w_s) + self.tau_v * self.w
+
+
+class LinearFriction(TanhFriction):
+    """Coulomb and viscous friction, the sign smoothed piecewise linearly (Dressler 2012, Figure 3.6)."""
+
+    def equations(self):
+        yield from Friction.equations(self)
+        slope = self.w / self.w_s
+        sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
+        yield self.tau == self.tau_c * sign + self.tau_v * self.w
+
+
+class Torque(Model):
+    """A given torque that turns the flange against the ground."""
+
+    tau = Input(unit="N.m", description="torque on the flange, positive with the angle", start=0.0)
     flange = Flange()
 
     def equations(self):
         yield self.flange.tau == -self.tau
+
+
+class Position(Model):
+    """Turns the flange as a given function of time, whatever torque that takes."""
+
+    phi = Input(unit="rad", description="angle", start=0.0)
+    tau = Real(unit="N.m", description="torque that it takes, positive with the angle")
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.phi == self.phi
+        yield self.flange.tau == -self.tau
+
+    def failure_hint(self, variable: str) -> str:
+        return TWICE_HELD if variable == "tau" else ""
+
+
+class Speed(Model):
+    """Turns the flange with a given speed, whatever torque that takes; its angle starts at `phi`, `phi=Fixed(0.5)`."""
+
+    w = Input(unit="rad/s", description="angular velocity", start=0.0)
+    phi = Real(unit="rad", description="angle", start=0.0)
+    tau = Real(unit="N.m", description="torque that it takes, positive with the angle")
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.phi == self.phi
+        yield der(self.phi) == self.w
+        yield self.flange.tau == -self.tau
+
+    def failure_hint(self, variable: str) -> str:
+        return TWICE_HELD if variable == "tau" else ""
+
+
+class AngleSensor(Model):
+    """Measures the angle of a flange."""
+
+    phi = Output(unit="rad", description="angle")
+    flange = Flange()
+
+    def equations(self):
+        yield self.phi == self.flange.phi
+        yield self.flange.tau == 0
+
+    def failure_hint(self, variable: str) -> str:
+        return "a sensor of angle carries no torque, so it holds nothing" if variable == "phi" else ""
+
+
+class SpeedSensor(Model):
+    """Measures the angular velocity of a flange."""
+
+    w = Output(unit="rad/s", description="angular velocity")
+    flange = Flange()
+
+    def equations(self):
+        yield self.w == der(self.flange.phi)
+        yield self.flange.tau == 0
+
+
+class RelativeSensor(Model):
+    """Measures angle and speed between two flanges; connect it beside what it measures, not in between."""
+
+    phi_rel = Output(unit="rad", description="angle from flange_a to flange_b")
+    w_rel = Output(unit="rad/s", description="rate of phi_rel")
+    flange_a = Flange()
+    flange_b = Flange()
+
+    def equations(self):
+        yield self.phi_rel == self.flange_b.phi - self.flange_a.phi
+        yield self.w_rel == der(self.phi_rel)
+        yield self.flange_a.tau == 0
+        yield self.flange_b.tau == 0
+
+    def failure_hint(self, variable: str) -> str:
+        return "a relative sensor carries no torque; connect it beside a component, not in its place"
+
+
+class TorqueSensor(Model):
+    """Measures the torque passed on from flange_a to flange_b; connect it between two shafts."""
+
+    tau = Output(unit="N.m", description="torque on the shaft at flange_b, positive with the angle")
+    flange_a = Flange()
+    flange_b = Flange()
+
+    def equations(self):
+        yield self.flange_a.phi == self.flange_b.phi
+        yield self.flange_a.tau == self.tau
+        yield self.flange_b.tau == -self.tau
+
+    def failure_hint(self, variable: str) -> str:
+        return "both ends of the sensor are held, or it closes a rigid loop; its torque could be anything"

@@ -1,9 +1,11 @@
-"""Motion along one axis: flanges, masses, springs, dampers, friction, sources.
+"""Motion along one axis: flanges, masses, springs, dampers, friction, sources, sensors.
 
 Position s of a flange is absolute, its force f is positive into the component.
 """
 
-from gantrytau import Connector, Flow, Input, Model, Parameter, Real, between, der, if_else, tanh
+from gantrytau import Connector, Flow, Input, Model, Output, Parameter, Real, between, der, if_else, tanh
+
+TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 
 
 class Flange(Connector):
@@ -72,6 +74,20 @@ class Damper(Compliant):
         yield self.f == self.d * der(self.s_rel)
 
 
+class SpringDamper(Compliant):
+    """A linear spring and a linear damper side by side."""
+
+    c = Parameter(1.0, unit="N/m", description="stiffness")
+    d = Parameter(1.0, unit="N.s/m", description="damping")
+    s_rel0 = Parameter(0.0, unit="m", description="length without force at rest")
+    v_rel = Real(unit="m/s", description="rate of s_rel")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.v_rel == der(self.s_rel)
+        yield self.f == self.c * (self.s_rel - self.s_rel0) + self.d * self.v_rel
+
+
 class Friction(Model):
     """Base of friction against the ground; replace it to choose another law, or `Frictionless` to leave it out."""
 
@@ -128,7 +144,88 @@ class Position(Model):
     """Moves the flange as a given function of time, whatever force that takes."""
 
     s = Input(unit="m", description="position along the axis", start=0.0)
+    f = Real(unit="N", description="force that it takes, positive along the axis")
     flange = Flange()
 
     def equations(self):
         yield self.flange.s == self.s
+        yield self.flange.f == -self.f
+
+    def failure_hint(self, variable: str) -> str:
+        return TWICE_HELD if variable == "f" else ""
+
+
+class Speed(Model):
+    """Moves the flange with a given speed, whatever force that takes; its position starts at `s`, `s=Fixed(0.5)`."""
+
+    v = Input(unit="m/s", description="speed along the axis", start=0.0)
+    s = Real(unit="m", description="position along the axis", start=0.0)
+    f = Real(unit="N", description="force that it takes, positive along the axis")
+    flange = Flange()
+
+    def equations(self):
+        yield self.flange.s == self.s
+        yield der(self.s) == self.v
+        yield self.flange.f == -self.f
+
+    def failure_hint(self, variable: str) -> str:
+        return TWICE_HELD if variable == "f" else ""
+
+
+class PositionSensor(Model):
+    """Measures the position of a flange."""
+
+    s = Output(unit="m", description="position along the axis")
+    flange = Flange()
+
+    def equations(self):
+        yield self.s == self.flange.s
+        yield self.flange.f == 0
+
+    def failure_hint(self, variable: str) -> str:
+        return "a sensor of position carries no force, so it holds nothing" if variable == "s" else ""
+
+
+class SpeedSensor(Model):
+    """Measures the speed of a flange."""
+
+    v = Output(unit="m/s", description="speed along the axis")
+    flange = Flange()
+
+    def equations(self):
+        yield self.v == der(self.flange.s)
+        yield self.flange.f == 0
+
+
+class RelativeSensor(Model):
+    """Measures distance and speed between two flanges; connect it beside what it measures, not in between."""
+
+    s_rel = Output(unit="m", description="distance from flange_a to flange_b")
+    v_rel = Output(unit="m/s", description="rate of s_rel")
+    flange_a = Flange()
+    flange_b = Flange()
+
+    def equations(self):
+        yield self.s_rel == self.flange_b.s - self.flange_a.s
+        yield self.v_rel == der(self.s_rel)
+        yield self.flange_a.f == 0
+        yield self.flange_b.f == 0
+
+    def failure_hint(self, variable: str) -> str:
+        return "a relative sensor carries no force; connect it beside a component, not in its place"
+
+
+class ForceSensor(Model):
+    """Measures the force passed on from flange_a to flange_b; connect it between two parts."""
+
+    f = Output(unit="N", description="force on the part at flange_b, positive along the axis")
+    flange_a = Flange()
+    flange_b = Flange()
+
+    def equations(self):
+        yield self.flange_a.s == self.flange_b.s
+        yield self.flange_a.f == self.f
+        yield self.flange_b.f == -self.f
+
+    def failure_hint(self, variable: str) -> str:
+        return "both ends of the sensor are held, or it closes a rigid loop; its force could be anything"

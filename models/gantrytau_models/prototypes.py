@@ -1,99 +1,268 @@
-"""Parameters of real Gantry-Tau robots as frozen records: `prototypes.L1`, `.D1`, `.GT_A`.
+"""Parameters of real Gantry-Tau robots as frozen records: `prototypes.L1`, `.GT_A`, `.D1`, `.F1`.
 
-The numbers stand in parameters/*.toml, each with its unit and its source; a record is read when it is first
-named. `dataclasses.replace(prototypes.L1, plate_mass=12.0)` gives a variant.
+`names()` lists all. The numbers stand in parameters/*.toml, each with its unit and its source; a record is
+read when it is first named. `dataclasses.replace(prototypes.L1, plate_mass=12.0)` gives a variant; sequences
+may be lists, so that one link of an arm is replaced like this:
+```python
+arms = list(prototypes.L1.arms)
+links = list(arms[1].links)
+links[0] = replace(links[0], length=links[0].length + 1e-4)
+arms[1] = replace(arms[1], links=links)
+longer = replace(prototypes.L1, arms=arms)
+```
+Two kinds of robot: `Prototype` has three carts; `RotatingPrototype`, the F1, has three rotations on them as well.
 """
 
 import dataclasses
 import functools
 import math
 import tomllib
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gantrytau.errors import ModelError, did_you_mean
 
 Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+Quaternion = tuple[float, float, float, float]
 
 _FOLDER = Path(__file__).parent / "parameters"
 _REMEDY = "correct the value in the TOML file or in dataclasses.replace"
+_COUNTS = {3: "three", 4: "four"}
+_NO_ROTATION: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_ROUNDING = 1e-5  # ten times what six decimals leave of a rotation matrix
 
 
 class UnknownPrototype(ModelError, AttributeError):
     """There is no prototype of this name."""
 
 
-def _quantity(
-    unit: str, description: str, *, positive: bool = False, least: float = -math.inf
-) -> dict[str, Any]:
-    """What a field says about its number, or about each of its three.
+class DoubtfulPrototype(UserWarning):
+    """A prototype as it is printed, although the print is known to be wrong."""
 
-    positive: each number must be above 0; least: the smallest number allowed.
+
+def _quantity(unit: str, description: str, **limits: Any) -> dict[str, Any]:
+    """What a field says about its number, or about each number of its array.
+
+    limits: shape of an array; positive: each number must be above 0; least: the smallest number allowed;
+    nonzero: not all may be 0; optional: None is allowed.
     """
-    return {"unit": unit, "description": description, "positive": positive, "least": least}
+    usual = dict(shape=(), positive=False, least=-math.inf, nonzero=False, optional=False)
+    return dict(unit=unit, description=description) | usual | limits
+
+
+def _vector(unit: str, description: str, **limits: Any) -> dict[str, Any]:
+    return _quantity(unit, description, shape=(3,), **limits)
+
+
+def _matrix(unit: str, description: str) -> dict[str, Any]:
+    return _quantity(unit, description, shape=(3, 3))
+
+
+_DIRECTION = _vector("1", "axis of the guideway; its length is the transmission factor", nonzero=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AnyLink:
+    """What all links between a cart and a plate that can turn have."""
+
+    plate_offset: Vector = field(metadata=_vector("m", "joint on the plate B_ij^0, plate frame"))
+    length: float = field(metadata=_quantity("m", "distance of its two ball joints", positive=True))
+    mass: float = field(metadata=_quantity("kg", "mass of this one link", least=0.0))
+
+    def __post_init__(self):
+        _hold_numbers(self, type(self).__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link(_AnyLink):
+    """One link of a robot whose plate can turn: from a joint on its cart to a joint on the plate (4.14).
+
+    direction: as identified for this joint alone, where a source prints it (D1, Table 5.9). Joints of one cart
+    then differ in direction because the cart turns a little on its way; a model whose carts are rigid and
+    only slide takes the direction of the arm, as it does for None.
+    """
+
+    offset: Vector = field(metadata=_vector("m", "joint on the cart A_ij at s = 0, world frame"))
+    direction: Vector | None = field(
+        default=None, metadata=_vector("1", "direction of its joint on the cart", nonzero=True, optional=True)
+    )
 
 
 @dataclass(frozen=True)
 class Arm:
-    """One guideway with its cart, and the links between that cart and the plate, taken as a single link.
+    """One guideway with its cart, and the links between that cart and the plate.
 
-    Position of the cart: offset + s * direction. Vectors are resolved in the world frame.
+    Position of the cart: offset + s * direction. Vectors are resolved in the world frame. Length and offset
+    take the links as a single one, for the robot whose plate keeps its orientation; `links` has them one by
+    one, for the robot whose plate can turn. Neither follows when the other is replaced.
     """
 
     length: float = field(metadata=_quantity("m", "length of the link between cart and tool", positive=True))
     offset: Vector = field(
-        metadata=_quantity("m", "cart at s = 0, less the place of the joint on the plate (4.7)")
+        metadata=_vector("m", "cart at s = 0, less the place of the joint on the plate (4.7)")
     )
-    direction: Vector = field(
-        metadata=_quantity("1", "axis of the guideway; its length is the transmission factor")
-    )
+    direction: Vector = field(metadata=_DIRECTION)
+    links: tuple[Link, ...] = ()
 
     def __post_init__(self):
-        _hold_numbers(self, "Arm", vectors=("offset", "direction"))
-        if not any(self.direction):
-            raise ModelError(f"Arm.direction: found (0, 0, 0), expected the axis of a guideway; {_REMEDY}")
+        _hold_numbers(self, "Arm")
+        _hold_records(self, "Arm", "links", Link)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Robot:
+    """What all Gantry-Tau robots have."""
+
+    name: str
+    plate_mass: float = field(metadata=_quantity("kg", "mass of the plate and tool", positive=True))
+    plate_inertia: Matrix = field(metadata=_matrix("kg.m2", "inertia about the centre of mass, plate axes"))
+    plate_centre: Vector = field(
+        default=(0.0, 0.0, 0.0), metadata=_vector("m", "centre of mass from the tool point, plate frame")
+    )
+    plate_rotation: Matrix = field(
+        default=_NO_ROTATION,
+        metadata=_matrix("1", "nominal orientation, plate to world; a search starts here"),
+    )
+    cart_masses: Vector = field(metadata=_vector("kg", "mass of each cart and its drive", positive=True))
+    coulomb: Vector = field(metadata=_vector("N", "Coulomb friction of each cart", least=0.0))
+    viscous: Vector = field(metadata=_vector("kg/s", "viscous friction of each cart", least=0.0))
+    source: str
+    assumed: tuple[str, ...] = ()  # what the source does not print for this robot
+
+    def __post_init__(self):
+        _hold_numbers(self, self.name)
+        _check_inertia(f"{self.name}.plate_inertia", self.plate_inertia)
+        _check_rotation(f"{self.name}.plate_rotation", self.plate_rotation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prototype(_Robot):
+    """Geometry, masses and friction of a Gantry-Tau robot with three arms.
+
+    The three-link robot takes `link_masses`, the six-link robot `arms[i].links[j].mass` and what is said of
+    the orientation of the plate.
+    """
+
+    arms: tuple[Arm, Arm, Arm]
+    link_masses: Vector = field(metadata=_vector("kg", "mass of the links of each arm together", least=0.0))
+
+    def __post_init__(self):
+        _hold_records(self, self.name, "arms", Arm, count=3)
+        super().__post_init__()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotatingLink(_AnyLink):
+    """One link of an F1: from a joint on the outermost turntable of its arm (or its cart) to one on the plate."""
+
+    cart_offset: Vector = field(metadata=_vector("m", "joint A_bj, frame of the turntable or cart (4.16)"))
 
 
 @dataclass(frozen=True)
-class Prototype:
-    """Geometry, masses and friction of a Gantry-Tau robot with three arms."""
+class Turntable:
+    """A joint support plate that a motor turns: frame H = [R(orientation) R(axis, angle), offset] (4.21), (4.23).
 
-    name: str
-    arms: tuple[Arm, Arm, Arm]
-    plate_mass: float = field(metadata=_quantity("kg", "mass of the plate and tool", positive=True))
-    cart_masses: Vector = field(metadata=_quantity("kg", "mass of each cart and its drive", positive=True))
-    link_masses: Vector = field(metadata=_quantity("kg", "mass of the links of each arm together", least=0.0))
-    coulomb: Vector = field(metadata=_quantity("N", "Coulomb friction of each cart", least=0.0))
-    viscous: Vector = field(metadata=_quantity("kg/s", "viscous friction of each cart", least=0.0))
-    source: str
-    assumed: tuple[str, ...] = ()  # fields that the source does not print for this robot
+    Offset and orientation are resolved in the frame of the cart (world axes) or of the turntable before. The
+    rotation of a scalar-first quaternion (w, r) is R = I + 2 w [r]x + 2 [r]x^2, as the thesis computes.
+    """
+
+    offset: Vector = field(metadata=_vector("m", "origin of its frame in the frame that carries it"))
+    orientation: Quaternion = field(
+        metadata=_quantity("1", "quaternion of its frame at angle 0, scalar first", shape=(4,))
+    )
+    axis: Vector = field(metadata=_vector("1", "unit vector of the axis of rotation, its own frame"))
+    mass: float = field(metadata=_quantity("kg", "mass, centred in the origin of its frame", positive=True))
+    inertia: Matrix = field(metadata=_matrix("kg.m2", "inertia about the origin of its frame, own axes"))
 
     def __post_init__(self):
-        arms = tuple(self.arms)
-        if len(arms) != 3 or not all(isinstance(arm, Arm) for arm in arms):
-            found = ", ".join(type(arm).__name__ for arm in arms) or "nothing"
-            raise ModelError(f"{self.name}.arms: found {found}; expected three Arm records; {_REMEDY}")
-        object.__setattr__(self, "arms", arms)
-        _hold_numbers(self, self.name, vectors=("cart_masses", "link_masses", "coulomb", "viscous"))
+        _hold_numbers(self, "Turntable")
+        _check_inertia("Turntable.inertia", self.inertia)
+        if abs(math.hypot(*self.axis) - 1.0) > _ROUNDING:
+            raise ModelError(f"Turntable.axis: found {self.axis}, expected a unit vector; {_REMEDY}")
 
 
-def _hold_numbers(record: Any, path: str, *, vectors: tuple[str, ...]) -> None:
-    """Check the quantities of a record, and hold them as floats and tuples of three floats."""
-    for item in dataclasses.fields(record):
-        if "unit" not in item.metadata:
-            continue
-        place, value = f"{path}.{item.name}", getattr(record, item.name)
-        if item.name not in vectors:
-            checked: Any = _number(place, value, item)
-        else:
-            if isinstance(value, str) or not isinstance(value, Iterable) or len(elements := list(value)) != 3:
-                raise ModelError(
-                    f"{place}: found {value!r}, expected three numbers in {_unit(item)}; {_REMEDY}"
-                )
-            checked = tuple(_number(f"{place}[{k}]", element, item) for k, element in enumerate(elements))
-        object.__setattr__(record, item.name, checked)
+@dataclass(frozen=True)
+class RotatingArm:
+    """One guideway with its cart at offset + s * direction (world frame), turntables on it, and links."""
+
+    offset: Vector = field(metadata=_vector("m", "origin of the cart frame at s = 0, A_i^0, world frame"))
+    direction: Vector = field(metadata=_DIRECTION)
+    turntables: tuple[Turntable, ...]
+    links: tuple[RotatingLink, ...]
+
+    def __post_init__(self):
+        _hold_numbers(self, "RotatingArm")
+        _hold_records(self, "RotatingArm", "turntables", Turntable)
+        _hold_records(self, "RotatingArm", "links", RotatingLink)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotatingPrototype(_Robot):
+    """A Gantry-Tau robot with six degrees of freedom: three carts and three turntables (4.16)-(4.26).
+
+    Actuator coordinates in the order of the thesis: the three carts, then the turntables in the order of the
+    arms (q4 on arm 2, q5 and q6 on arm 3). unit_norm=False allows a table of quaternions that are not unit.
+    """
+
+    arms: tuple[RotatingArm, RotatingArm, RotatingArm]
+    unit_norm: bool = True
+
+    def __post_init__(self):
+        _hold_records(self, self.name, "arms", RotatingArm, count=3)
+        super().__post_init__()
+        for i, arm in enumerate(self.arms):
+            for k, turntable in enumerate(arm.turntables):
+                norm = math.hypot(*turntable.orientation)
+                if self.unit_norm and abs(norm - 1.0) > 1e-9:  # a nanometre on a joint a metre away
+                    raise ModelError(
+                        f"{self.name}.arms[{i}].turntables[{k}].orientation: found a quaternion of length"
+                        f" {norm:.6g}, expected 1; normalise it, or say unit_norm=False"
+                    )
+
+
+def _hold_records(record: Any, path: str, name: str, kind: type, *, count: int | None = None) -> None:
+    """Check a sequence of records of one kind, and hold it as a tuple."""
+    value = getattr(record, name)
+    items = tuple(value) if isinstance(value, Iterable) else (value,)
+    if not all(isinstance(item, kind) for item in items) or len(items) != (count or len(items)):
+        found = ", ".join(type(item).__name__ for item in items) or "nothing"
+        number = f"{_COUNTS[count]} " if count else ""
+        raise ModelError(f"{path}.{name}: found {found}; expected {number}{kind.__name__} records; {_REMEDY}")
+    object.__setattr__(record, name, items)
+
+
+def _hold_numbers(record: Any, path: str) -> None:
+    """Check the quantities of a record, and hold them as floats and tuples of floats."""
+    for item in _quantities_of(type(record)):
+        value = getattr(record, item.name)
+        if not (value is None and item.metadata["optional"]):
+            held = _numbers(f"{path}.{item.name}", value, item, item.metadata["shape"])
+            object.__setattr__(record, item.name, held)
+
+
+def _quantities_of(record: type) -> list[dataclasses.Field]:
+    return [item for item in dataclasses.fields(record) if "unit" in item.metadata]
+
+
+def _numbers(place: str, value: Any, item: dataclasses.Field, shape: Sequence[int]) -> Any:
+    """A number, or nested tuples of numbers of this shape, within the bounds of the field."""
+    if not shape:
+        return _number(place, value, item)
+    if isinstance(value, str) or not isinstance(value, Iterable) or len(elements := list(value)) != shape[0]:
+        rows = "rows of three numbers" if len(shape) > 1 else "numbers"
+        raise ModelError(
+            f"{place}: found {value!r}, expected {_COUNTS[shape[0]]} {rows} in {_unit(item)}; {_REMEDY}"
+        )
+    held = tuple(_numbers(f"{place}[{k}]", element, item, shape[1:]) for k, element in enumerate(elements))
+    if item.metadata["nonzero"] and not any(held):
+        raise ModelError(f"{place}: found {value!r}, expected the axis of a guideway; {_REMEDY}")
+    return held
 
 
 def _number(place: str, value: Any, item: dataclasses.Field) -> float:
@@ -114,12 +283,33 @@ def _unit(item: dataclasses.Field) -> str:
     return "no unit" if unit == "1" else unit
 
 
+def _check_rotation(place: str, rotation: Matrix) -> None:
+    matrix = np.array(rotation)
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > _ROUNDING or np.linalg.det(matrix) < 0:
+        raise ModelError(f"{place}: found {rotation}, expected a rotation matrix; {_REMEDY}")
+
+
+def _check_inertia(place: str, inertia: Matrix) -> None:
+    """Refuse what no rigid body has: each principal moment is at most the sum of the other two."""
+    matrix = np.array(inertia)
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * np.abs(matrix).max()):
+        raise ModelError(f"{place}: found {inertia}, expected a symmetric matrix in kg.m2; {_REMEDY}")
+    moments = np.linalg.eigvalsh(matrix)
+    shown = ", ".join(f"{moment:.4g}" for moment in moments)
+    if moments[0] <= 0.0:
+        raise ModelError(f"{place}: found principal moments {shown} kg.m2, expected all above 0; {_REMEDY}")
+    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        raise ModelError(
+            f"{place}: found principal moments {shown} kg.m2, expected none above the sum of the others; {_REMEDY}"
+        )
+
+
 @functools.cache
 def _table(name: str) -> dict[str, Any]:
     return tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def _entry(name: str, keys: tuple[str | int, ...], unit: str) -> Any:
+def _entry(name: str, keys: Sequence[str | int], unit: str) -> Any:
     """The value of one entry of a file in the unit that the record expects."""
     entry: Any = _table(name)
     for key in keys:
@@ -130,39 +320,78 @@ def _entry(name: str, keys: tuple[str | int, ...], unit: str) -> Any:
     return _entry(entry["same_as"], keys, unit) if "same_as" in entry else entry["value"]
 
 
-def _quantities(name: str, record: type, *keys: str | int) -> dict[str, Any]:
-    """The values of the quantities of a record, from the file of a prototype."""
-    items = (item for item in dataclasses.fields(record) if "unit" in item.metadata)
-    return {item.name: _entry(name, (*keys, item.name), item.metadata["unit"]) for item in items}
+def _build(record: type, file: str, *keys: str | int, **others: Any) -> Any:
+    """A record from the entries at `keys` of the file of a prototype; others: what stands for missing entries."""
+    table: Any = _table(file)
+    for key in keys:
+        table = table[key]
+    for item in _quantities_of(record):
+        if item.name in table or (item.name not in others and item.default is dataclasses.MISSING):
+            others[item.name] = _entry(file, (*keys, item.name), item.metadata["unit"])
+    return record(**others)
+
+
+def _arm(name: str, i: int) -> Arm:
+    """An arm with its links; a link without length or offset continues the arm for a plate with R = I (4.7)."""
+    arm = _build(Arm, name, "arms", i)
+    links = _table(name)["arms"][i]["links"]
+    if isinstance(links, dict):
+        name = links["same_as"]
+        links = _table(name)["arms"][i]["links"]
+    built = []
+    for j in range(len(links)):
+        keys = ("arms", i, "links", j)
+        on_plate = _entry(name, (*keys, "plate_offset"), "m")
+        offset = tuple(a + b for a, b in zip(arm.offset, on_plate, strict=True))
+        built.append(_build(Link, name, *keys, length=arm.length, offset=offset))
+    return dataclasses.replace(arm, links=tuple(built))
+
+
+def _rotating_arm(name: str, i: int) -> RotatingArm:
+    table = _table(name)["arms"][i]
+    turntables = [
+        _build(Turntable, name, "arms", i, "turntables", k) for k in range(len(table.get("turntables", ())))
+    ]
+    links = [_build(RotatingLink, name, "arms", i, "links", j) for j in range(len(table["links"]))]
+    return _build(RotatingArm, name, "arms", i, turntables=turntables, links=links)
 
 
 @functools.cache
-def _read(name: str) -> Prototype:
+def _read(name: str) -> Prototype | RotatingPrototype:
     table = _table(name)
-    arms = [Arm(**_quantities(name, Arm, "arms", k)) for k in range(len(table["arms"]))]
-    return Prototype(
-        name=name,
-        arms=arms,  # pyright: ignore[reportArgumentType]  # the record checks that there are three
-        source=table["source"],
-        assumed=tuple(table.get("assumed", ())),
-        **_quantities(name, Prototype),
-    )
+    kind, read_arm, others = Prototype, _arm, {}
+    if "unit_norm" in table:
+        kind, read_arm, others = RotatingPrototype, _rotating_arm, {"unit_norm": table["unit_norm"]}
+    arms = [read_arm(name, i) for i in range(len(table["arms"]))]
+    assumed = tuple(table.get("assumed", ()))
+    return _build(kind, name, name=name, arms=arms, source=table["source"], assumed=assumed, **others)
 
 
-def _names() -> list[str]:
+def names() -> list[str]:
+    """The names of all prototypes, sorted; `getattr(prototypes, name)` reads one."""
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
-def __getattr__(name: str) -> Prototype:
+D1: Prototype
+GT_A: Prototype
+L1: Prototype
+F1: RotatingPrototype
+F1_ideal: RotatingPrototype
+F1_printed: RotatingPrototype
+
+
+def __getattr__(name: str) -> Prototype | RotatingPrototype:
     if name.startswith("_"):
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    if name not in _names():
+    if name not in names():
         raise UnknownPrototype(
-            f"prototypes: there is no '{name}', expected one of {', '.join(_names())}"
-            f"{did_you_mean(name, _names())}"
+            f"prototypes: there is no '{name}', expected one of {', '.join(names())}"
+            f"{did_you_mean(name, names())}"
         )
+    if "doubt" in _table(name):
+        warnings.warn(f"prototypes.{name}: {_table(name)['doubt']}", DoubtfulPrototype, stacklevel=2)
     return _read(name)
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_names()]
+    return [*globals(), *names()]

@@ -8,6 +8,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gantrytau.errors import ModelError
 from gantrytau_models import prototypes
@@ -26,7 +27,7 @@ def test_L1_is_table_5_1_modified_and_table_6_3_model_2():
     assert robot.coulomb == (128.62, 145.13, 194.57)
     assert robot.viscous == (102.43, 355.25, 388.77)
     assert "Table 5.1" in robot.source
-    assert robot.assumed == ()
+    assert robot.assumed == ("plate_inertia", "plate_centre", "plate_rotation", "arms.links")
 
 
 @pytest.mark.parametrize(
@@ -46,7 +47,59 @@ def test_D1_is_table_5_8_model_1_with_the_masses_assumed():
     assert robot.arms[2].direction == (0.99769, -0.06603, -0.00509)
     assert robot.cart_masses == prototypes.L1.cart_masses
     assert "assumed" in robot.source
-    assert robot.assumed == ("plate_mass", "cart_masses", "link_masses", "coulomb", "viscous")
+    assert {"plate_mass", "cart_masses", "link_masses", "coulomb", "viscous"} <= set(robot.assumed)
+
+
+def test_links_of_L1_continue_its_arms():
+    robot = prototypes.L1
+    on_plate = [[link.plate_offset for link in arm.links] for arm in robot.arms]
+    assert on_plate == [
+        [(0.0, 0.0, 0.0)],
+        [(0.0, 0.12, 0.05), (0.0, -0.12, 0.05)],
+        [(0.10, 0.05, -0.10), (-0.10, 0.10, -0.10), (0.0, -0.12, -0.15)],
+    ]
+    for arm in robot.arms:
+        for link in arm.links:
+            # (4.7) with R = I, up to the rounding of a sum of numbers of a few metres
+            np.testing.assert_allclose(
+                np.subtract(link.offset, link.plate_offset), arm.offset, atol=1e-15, rtol=0
+            )
+            assert (link.length, link.mass, link.direction) == (arm.length, 0.5, None)
+    assert np.array_equal(robot.plate_inertia, np.diag([0.20, 0.25, 0.30]))
+    assert np.array_equal(robot.plate_rotation, np.eye(3))
+    assert robot.plate_centre == (0.0, 0.0, 0.0)
+    assert "assumed" in robot.source
+
+
+def test_links_of_D1_are_table_5_9_model_3():
+    links = [link for arm in prototypes.D1.arms for link in arm.links]
+    assert [link.length for link in links] == [2.04422, 2.04291, 2.04294, 2.04351, 2.04352, 2.04352]
+    assert links[0].plate_offset == (-0.04871, -0.05363, -0.10361)
+    assert links[1].offset == (-3.13100, -3.52723, 0.79856)
+    assert links[3].direction == (0.99766, -0.06600, -0.00515)
+    assert links[5].plate_offset == (-0.05438, 0.11726, 0.07666)
+
+
+def test_the_lost_offset_of_D1_follows_from_the_other_models():
+    # a joint is displaced from that of its arm equally in models 3 and 1 as in models 4 and 2; the frame
+    # offsets of models 4 and 2 (Tables 5.9 and 5.8) are printed also for link 2b
+    arm, (link_2a, link_2b) = prototypes.D1.arms[1], prototypes.D1.arms[1].links
+    model_2 = np.array([1.41419, -3.86450, 0.08531])
+    model_4a, model_4b = np.array([1.36183, -3.91799, 0.21592]), np.array([1.36706, -3.72450, 0.05766])
+    np.testing.assert_allclose(arm.offset + model_4a - model_2, link_2a.offset, atol=5e-5, rtol=0)
+    np.testing.assert_allclose(arm.offset + model_4b - model_2, link_2b.offset, atol=1e-9, rtol=0)
+    assert {"arms[1].links[1].offset", "arms[1].links[1].direction"} <= set(prototypes.D1.assumed)
+    assert "2b are lost and reconstructed" in prototypes.D1.source
+
+
+def test_arms_and_links_of_D1_fit_each_other():
+    robot = prototypes.D1
+    for arm in robot.arms:
+        for link in arm.links:
+            single = np.subtract(link.offset, np.array(robot.plate_rotation) @ link.plate_offset)  # (4.7)
+            assert np.linalg.norm(single - arm.offset) < 0.9e-3  # m: the arms do not know the joints
+            assert link.direction is not None
+            assert np.linalg.norm(np.subtract(link.direction, arm.direction)) < 2e-4
 
 
 def test_GT_A_is_L1_with_parallel_guideways():
@@ -61,22 +114,36 @@ def test_GT_A_is_L1_with_parallel_guideways():
 
 
 def _entries(table):
-    """All entries of a TOML table that give a quantity."""
+    """All entries of a TOML table that give a quantity, those of its arms, turntables and links included."""
     for key, value in table.items():
-        if key == "arms":
-            for arm in value:
-                yield from _entries(arm)
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            for record in value:
+                yield from _entries(record)
         elif isinstance(value, dict):
             yield key, value
 
 
 @pytest.mark.parametrize("path", sorted(prototypes._FOLDER.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_value_has_its_unit_and_its_source(path):
-    entries = list(_entries(tomllib.loads(path.read_text())))
-    assert len(entries) == 5 + 3 * 3
-    for key, entry in entries:
-        assert {"unit", "source"} <= entry.keys(), key
+    for key, entry in _entries(tomllib.loads(path.read_text())):
+        expected = {"source"} if key == "links" else {"unit", "source"}
+        assert expected <= entry.keys(), key
         assert ("value" in entry) != ("same_as" in entry), key
+
+
+@pytest.mark.parametrize("name", ["L1", "GT_A", "D1", "F1", "F1_ideal"])
+def test_what_is_assumed_is_there(name):
+    robot = getattr(prototypes, name)
+    for path in robot.assumed:
+        values = [robot]
+        for step in path.replace("]", "").split("."):
+            field, *index = step.split("[")
+            values = [getattr(value, field) for value in values]
+            if index:
+                values = [value[int(index[0])] for value in values]
+            elif field in ("arms", "links", "turntables"):
+                values = [item for value in values for item in value]
+        assert values, path
 
 
 def test_a_record_cannot_be_changed_but_varied():
@@ -101,6 +168,23 @@ def test_a_record_cannot_be_changed_but_varied():
         ({"link_masses": (0.0, 0.0, -1.0)}, r"link_masses\[2\]: found -1\.0, .* of at least 0 in kg"),
         ({"coulomb": (math.inf, 0.0, 0.0)}, r"coulomb\[0\]: found inf, expected a finite number"),
         ({"viscous": (0.0, -2.0, 0.0)}, r"viscous\[1\]: found -2\.0, .* in kg/s"),
+        ({"plate_inertia": [[1, 0], [0, 1]]}, r"L1\.plate_inertia: found .* three rows of three numbers"),
+        (
+            {"plate_inertia": [[1, 0], [0, 1], [0, 0]]},
+            r"L1\.plate_inertia\[0\]: found \[1, 0\], expected three",
+        ),
+        ({"plate_inertia": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, r"plate_inertia: .* expected a symmetric"),
+        ({"plate_inertia": np.diag([1.0, 1.0, 0.0])}, r"moments 0, 1, 1 kg\.m2, expected all above 0"),
+        (
+            {"plate_inertia": np.diag([1.0, 1.0, 2.1])},
+            r"moments 1, 1, 2\.1 kg\.m2, expected none above the sum",
+        ),
+        ({"plate_rotation": np.diag([1.0, 1.0, -1.0])}, r"L1\.plate_rotation: .* expected a rotation matrix"),
+        ({"plate_rotation": 1.1 * np.eye(3)}, r"L1\.plate_rotation: .* expected a rotation matrix"),
+        (
+            {"plate_centre": (0.0, 0.0)},
+            r"L1\.plate_centre: found \(0\.0, 0\.0\), expected three numbers in m",
+        ),
         ({"arms": ()}, r"L1\.arms: found nothing; expected three Arm records; correct"),
     ],
 )
@@ -115,6 +199,8 @@ def test_a_prototype_refuses_impossible_values(changes, message):
         ({"length": -2.0}, r"Arm\.length: found -2\.0, expected a finite number above 0 in m"),
         ({"offset": (0.0, 0.0)}, r"Arm\.offset: found \(0\.0, 0\.0\), expected three numbers in m"),
         ({"direction": "xyz"}, r"Arm\.direction: found 'xyz', expected three numbers in no unit"),
+        ({"links": (1.0,)}, r"Arm\.links: found float; expected Link records"),
+        ({"links": None}, r"Arm\.links: found NoneType; expected Link records"),
         ({"direction": (0, 0, 0)}, r"Arm\.direction: found \(0, 0, 0\), expected the axis of a guideway"),
     ],
 )
@@ -124,8 +210,44 @@ def test_an_arm_refuses_impossible_values(changes, message):
         Arm(**(good | changes))
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"length": 0.0}, r"Link\.length: found 0\.0, expected a finite number above 0 in m; correct"),
+        ({"mass": -0.5}, r"Link\.mass: found -0\.5, expected a finite number of at least 0 in kg"),
+        ({"plate_offset": 0.1}, r"Link\.plate_offset: found 0\.1, expected three numbers in m"),
+        ({"offset": (0.0, math.inf, 0.0)}, r"Link\.offset\[1\]: found inf, expected a finite number"),
+        ({"direction": (0, 0, 0)}, r"Link\.direction: found \(0, 0, 0\), expected the axis of a guideway"),
+    ],
+)
+def test_a_link_refuses_impossible_values(changes, message):
+    with pytest.raises(ModelError, match=message):
+        dataclasses.replace(prototypes.L1.arms[0].links[0], **changes)
+
+
+def test_one_link_may_be_longer():
+    robot = prototypes.L1
+    arms = list(robot.arms)
+    links = list(arms[1].links)
+    links[0] = dataclasses.replace(links[0], length=links[0].length + 1e-4)
+    arms[1] = dataclasses.replace(arms[1], links=links)  # pyright: ignore[reportArgumentType]
+    longer = dataclasses.replace(robot, arms=arms)  # pyright: ignore[reportArgumentType]
+    assert [link.length for link in longer.arms[1].links] == [2.0633 + 1e-4, 2.0633]
+    assert {longer, robot} == {robot, longer}  # tuples, whatever was given: hashable
+    assert longer != robot
+    assert (longer.arms[0], longer.arms[2]) == (robot.arms[0], robot.arms[2])
+
+
+def test_names_lists_what_there_is():
+    assert prototypes.names() == ["D1", "F1", "F1_ideal", "F1_printed", "GT_A", "L1"]
+    # what type checkers and editors are told
+    assert set(prototypes.names()) <= set(prototypes.__annotations__)
+
+
 def test_an_unknown_prototype_is_named_with_those_that_exist():
-    message = r"there is no 'L11', expected one of D1, GT_A, L1; did you mean 'L1'\?"
+    message = (
+        r"there is no 'L11', expected one of D1, F1, F1_ideal, F1_printed, GT_A, L1; did you mean 'L1'\?"
+    )
     with pytest.raises(ModelError, match=message):
         _ = prototypes.L11
     assert not hasattr(prototypes, "NOPE")
@@ -150,3 +272,25 @@ def test_files_are_read_when_a_prototype_is_named():
         "p.L1; assert p._read.cache_info().currsize == 1"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("L1", 1e-9), ("GT_A", 1e-9), ("D1", 0.5)])
+def test_six_links_assemble_near_the_nominal_orientation(name, degrees):
+    # the orientation of D1 is known from offsets that fit within 0.9 mm, on a plate with joints 0.2 m apart
+    robot = getattr(prototypes, name)
+    links = [link for arm in robot.arms for link in arm.links]
+    cart, plate = (np.array([getattr(link, key) for link in links]) for key in ("offset", "plate_offset"))
+    length = np.array([link.length for link in links])
+    forward = np.mean([arm.direction for arm in robot.arms], axis=0)
+    tool = np.mean([arm.offset for arm in robot.arms], axis=0) + 0.85 * length.mean() * forward
+    turn = Rotation.from_matrix(robot.plate_rotation)
+    nominal = turn
+    for _ in range(20):
+        lever = turn.apply(plate)
+        rod = tool + lever - cart
+        jacobian = 2 * np.hstack([rod, np.cross(lever, rod)])
+        step = np.linalg.solve(jacobian, length**2 - (rod**2).sum(axis=1))
+        tool, turn = tool + step[:3], Rotation.from_rotvec(step[3:]) * turn
+    np.testing.assert_allclose(np.linalg.norm(tool + turn.apply(plate) - cart, axis=1), length, rtol=1e-13)
+    assert (forward @ (tool - cart).T > 0).all()  # the tool ahead of the carts
+    assert np.degrees((turn * nominal.inv()).magnitude()) < degrees

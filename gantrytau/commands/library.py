@@ -1,0 +1,61 @@
+"""`gantrytau library`: models, components and prototypes by name, each with a line of explanation."""
+
+import importlib
+import pkgutil
+from typing import Any
+
+import typer
+
+from gantrytau.commands import models
+from gantrytau.commands.options import Json
+from gantrytau.commands.reporting import as_json
+from gantrytau.model import Declared
+
+
+def library(json: Json = False) -> None:
+    """List what the library holds: complete models, components to build your own, and measures of real robots."""
+    held = {
+        "models": {name: models.first_sentence(m.__doc__) for name, m in models.library().items()},
+        "components": components(),
+        "prototypes": models.sources(),
+    }
+    if json:
+        typer.echo(as_json(held))
+        return
+    _show("Models (gantrytau_models), for `gantrytau check`, `simulate` and `equations`", held["models"])
+    for module, classes in held["components"].items():
+        _show(f"Components of {module}", classes)
+    _show("Prototypes (gantrytau_models.prototypes), for --prototype", held["prototypes"])
+
+
+def components() -> dict[str, dict[str, str]]:
+    """Module of gantrytau.mechanics -> class -> first line of its docstring."""
+    from gantrytau import mechanics
+
+    found: dict[str, dict[str, str]] = {}
+    for info in pkgutil.iter_modules(mechanics.__path__, f"{mechanics.__name__}."):
+        if info.name.rpartition(".")[2].startswith("_"):
+            continue
+        module = importlib.import_module(info.name)
+        classes = {
+            name: models.first_sentence(value.__doc__)
+            for name, value in vars(module).items()
+            if isinstance(value, type) and issubclass(value, Declared) and _belongs(name, value, module)
+        }
+        if classes:
+            found[info.name] = classes
+    return found
+
+
+def _belongs(name: str, value: type, module: Any) -> bool:
+    """Whether a module offers a class: it lists it, or the class is written in it or in a module below."""
+    if hasattr(module, "__all__"):
+        return name in module.__all__
+    return not name.startswith("_") and f"{value.__module__}.".startswith(f"{module.__name__}.")
+
+
+def _show(title: str, lines: dict[str, str]) -> None:
+    width = max((len(name) for name in lines), default=0)
+    typer.echo(f"\n{title}")
+    for name, words in lines.items():
+        typer.echo(f"  {name:{width}}  {words}".rstrip())

@@ -1,0 +1,48 @@
+"""Arguments and options that several commands share."""
+
+from typing import Annotated
+
+import typer
+
+ModelName = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="A model of the library (`gantrytau library` lists them), as Pendulum or 'GantryTau(D1)', "
+        "or a class in a file of yours, as robot.py:Robot.",
+        show_default=False,
+    ),
+]
+PrototypeName = Annotated[
+    str | None,
+    typer.Option(
+        "--prototype",
+        metavar="NAME",
+        help="The robot whose measures the model takes, for models that need one.",
+        show_default="L1",
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a parameter (m=2.5, offset=1,2,3 as '[1,2,3]') or a start value (x.start=0.1). Repeatable.",
+        show_default=False,
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]
+
+
+def listed(texts: list[str] | None) -> tuple[str, ...]:
+    """Names of a repeatable option, also several in one, separated by commas outside of brackets."""
+    found: list[str] = []
+    for text in texts or ():
+        depth, begin = 0, 0
+        for place, letter in enumerate(text):
+            depth += (letter in "([") - (letter in ")]")
+            if letter == "," and depth == 0:
+                found.append(text[begin:place])
+                begin = place + 1
+        found.append(text[begin:])
+    return tuple(name.strip() for name in found if name.strip())

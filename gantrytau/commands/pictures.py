@@ -1,0 +1,59 @@
+"""Drawing a result on the command line: to a file, or in a window where there is a display."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gantrytau.commands.reporting import CommandError, writable
+
+if TYPE_CHECKING:
+    from gantrytau.result import Result
+
+WINDOW = "window"
+
+
+def rehearse(to: str) -> None:
+    """CommandError if there is no window to draw in, or no picture of that format or in that folder."""
+    import matplotlib
+
+    if to == WINDOW:
+        import matplotlib.pyplot as plt
+
+        if not _has_windows(plt.get_backend()):
+            raise CommandError(
+                f"--to window: no window can be opened here (Matplotlib draws with '{plt.get_backend()}'). "
+                "Write a picture with --to picture.png, or work where there is a display (ssh -X) "
+                "and a window toolkit is installed (pip install pyqt6)"
+            )
+        return
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    matplotlib.use("agg")  # a picture needs no display
+    file, formats = Path(to), FigureCanvasBase.get_supported_filetypes()
+    if file.suffix.removeprefix(".").lower() not in formats:
+        raise CommandError(
+            f"--to {to}: found the suffix '{file.suffix}', expected 'window' or a picture: "
+            f"{', '.join(f'.{name}' for name in sorted(formats))}"
+        )
+    if not file.parent.is_dir():
+        raise CommandError(f"--to {to}: the folder '{file.parent}' does not exist; create it first")
+
+
+def draw(result: "Result", names: tuple[str, ...], to: str) -> list[str]:
+    """Draw the variables; the files written."""
+    if to != WINDOW:
+        with writable(Path(to)):
+            result.plot(*names, file=to)
+        return [to]
+    import matplotlib.pyplot as plt
+
+    result.plot(*names)
+    plt.show()
+    return []
+
+
+def _has_windows(backend: str) -> bool:
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    return backend.lower() in {
+        name.lower() for name in backend_registry.list_builtin(BackendFilter.INTERACTIVE)
+    }

@@ -1,0 +1,170 @@
+"""`gantrytau simulate`: a model over time, its result as figures, files and pictures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gantrytau.commands import pictures
+from gantrytau.commands.models import Chosen, build, source_of
+from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.reporting import (
+    FAULT,
+    INTERRUPTED,
+    as_json,
+    busy,
+    fail,
+    reporting,
+    writable,
+)
+from gantrytau.commands.values import signal
+from gantrytau.errors import GantryTauError, SolveError
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+    from gantrytau.result import Result
+
+
+def simulate(
+    model: ModelName,
+    stop: Annotated[float, typer.Option(help="Time at which to stop, in s.", show_default=False)],
+    start: Annotated[float, typer.Option(help="Time at which to start, in s.")] = 0.0,
+    tolerance: Annotated[float, typer.Option(help="Relative and absolute error per step.")] = 1e-8,
+    points: Annotated[int, typer.Option(help="Number of output times.")] = 501,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
+            "as f=forces.csv:f. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Save all variables: .csv, .nc, .mat (Dymola) or .parquet.", show_default=False),
+    ] = None,
+    plot: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAMES", help="Draw these variables, separated by commas.", show_default=False),
+    ] = None,
+    to: Annotated[
+        str, typer.Option(help="Where to draw: a picture (.png, .pdf, .svg) or 'window'.")
+    ] = "window",
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Simulate a model from its start values, and print where its states begin and end.
+
+    Ctrl-C stops early; what was computed until then is saved to --output.
+    """
+    with reporting(json, source_of(model)):
+        drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
+        _rehearse(output, to if drawn else None)
+        chosen = build(model, prototype, set_ or ())
+        dae = _translated(chosen, drawn)
+        try:
+            result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
+        except SolveError as error:
+            _stop(error, output, json)
+            raise
+        files = _save(result, output)
+        if drawn:
+            files += pictures.draw(result, drawn, to)
+        summary = _summary(chosen, dae, result, files)
+        if json:
+            typer.echo(as_json(summary))
+        else:
+            _show(summary, dae, result)
+
+
+def _rehearse(output: Path | None, to: str | None) -> None:
+    """Find out before the work whether its result can be saved and drawn."""
+    from gantrytau.result import Result
+
+    if output is not None:
+        trial = output.with_name(f".{output.stem}.trial{output.suffix}")
+        with writable(output):
+            try:
+                Result([0.0], {"x": 0.0}).save(trial)
+            except GantryTauError as error:
+                raise type(error)(str(error).replace(str(trial), str(output))) from error
+            finally:
+                if trial.parent.is_dir():
+                    trial.unlink(missing_ok=True)
+    if to is not None:
+        pictures.rehearse(to)
+
+
+def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
+    from gantrytau import translate
+
+    with busy(f"translating {chosen.name}"):
+        return translate(chosen.model, find=drawn)
+
+
+def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
+    import gantrytau
+
+    return gantrytau.simulate(dae, inputs=signals, **policy)
+
+
+def _stop(error: SolveError, output: Path | None, json: bool) -> None:
+    """Save what a simulation found until it stopped, say so, and leave."""
+    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    message = str(error).partition(";")[0] if pressed else str(error)
+    files: list[str] = []
+    if output is not None and error.result is not None:
+        files = _save(error.result, output)
+        message += f"\nWhat was computed until then is in {output}"
+    elif pressed:
+        message += "; with --output its result would have been saved"
+    code = INTERRUPTED if pressed else FAULT
+    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
+
+
+def _save(result: "Result", output: Path | None) -> list[str]:
+    if output is None:
+        return []
+    with writable(output):
+        return [str(result.save(output))]
+
+
+def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> dict[str, Any]:
+    return {
+        "model": chosen.name,
+        "prototype": chosen.prototype,
+        "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+        "states": dae.states,
+        "final": {name: result.final(name) for name in result.names},
+        "files": files,
+    }
+
+
+def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
+    """The states at both ends as a table; texts of the model are no markup."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    time = summary["time"]
+    typer.echo(
+        f"{summary['model']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
+        f"{len(result.names)} variables"
+    )
+    if dae.states:
+        table = Table(box=SIMPLE, pad_edge=False)
+        table.add_column("state", no_wrap=True)
+        for heading in ("start", "end", "least", "greatest"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("unit")
+        for name in dae.states:
+            values = result[name]
+            numbers = (values[0], values[-1], values.min(), values.max())
+            table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))
+        Console().print(table)
+    for file in summary["files"]:
+        typer.echo(f"Written: {file}")

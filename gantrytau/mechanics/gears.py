@@ -1,0 +1,65 @@
+"""Gears: what joins two shafts, or a shaft and a slide. All are free of loss and backlash.
+
+The housing rests on the ground, which takes up the difference of the torques. Power that enters at
+flange_a leaves at flange_b: a.tau a.phi' + b.tau b.phi' = 0, and the same with b.f b.s' for a slide.
+"""
+
+from math import pi
+
+from gantrytau import Model, Parameter, connect
+from gantrytau.mechanics import rotational, translational
+
+
+class IdealGear(Model):
+    """A gear of two shafts: flange_a, the motor's, makes `ratio` turns for one of flange_b; negative reverses."""
+
+    ratio = Parameter(1.0, unit="1", description="angle of flange_a for a unit of angle of flange_b")
+    flange_a = rotational.Flange()
+    flange_b = rotational.Flange()
+
+    def equations(self):
+        yield self.flange_a.phi == self.ratio * self.flange_b.phi
+        yield self.flange_b.tau == -self.ratio * self.flange_a.tau
+
+
+class ElasticGear(Model):
+    """A gear whose output shaft gives way: an ideal gear, then a spring and damper on the side of flange_b."""
+
+    ratio = Parameter(1.0, unit="1", description="turns of flange_a for one of flange_b")
+    c = Parameter(1e4, unit="N.m/rad", description="stiffness seen at flange_b, flange_a held")
+    d = Parameter(1.0, unit="N.m.s/rad", description="damping seen at flange_b")
+    flange_a = rotational.Flange()
+    flange_b = rotational.Flange()
+    gear = IdealGear(ratio=ratio)
+    shaft = rotational.SpringDamper(c=c, d=d)
+
+    def equations(self):
+        yield connect(self.flange_a, self.gear.flange_a)
+        yield connect(self.gear.flange_b, self.shaft.flange_a)
+        yield connect(self.shaft.flange_b, self.flange_b)
+
+
+class RackAndPinion(Model):
+    """A pinion at flange_a that moves a rack at flange_b; also a pulley with its belt, or a wheel that rolls."""
+
+    radius = Parameter(0.1, unit="m", description="pitch radius of the pinion; negative reverses")
+    flange_a = rotational.Flange()
+    flange_b = translational.Flange()
+
+    def equations(self):
+        yield self.flange_b.s == self.radius * self.flange_a.phi
+        yield self.flange_a.tau == -self.radius * self.flange_b.f
+
+
+class BallScrew(Model):
+    """A spindle at flange_a that moves its nut at flange_b; the nut is kept from turning."""
+
+    lead = Parameter(
+        0.01, unit="m", description="travel of the nut for one turn; negative for a left-hand screw"
+    )
+    flange_a = rotational.Flange()
+    flange_b = translational.Flange()
+
+    def equations(self):
+        yield self.flange_b.s == self.lead * self.flange_a.phi / (2 * pi)
+        yield self.flange_a.tau == -self.lead * self.flange_b.f / (2 * pi)

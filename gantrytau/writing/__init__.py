@@ -1,0 +1,35 @@
+"""The equations of a translated model, written out for readers and for other tools."""
+
+from typing import TYPE_CHECKING
+
+from gantrytau.errors import ModelError
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+FORMATS = ("text", "latex", "html", "modelica")
+
+
+def write_equations(dae: "Dae", format: str) -> str:
+    """The equations as "text", "latex", "html" (blocks, with their origin) or "modelica" (the flat model).
+
+    Raises ModelError for another format, and for a function that the format has no words for.
+    """
+    if format == "text":
+        from gantrytau.writing.text import block_text
+
+        return block_text(dae)
+    if format == "latex":
+        from gantrytau.writing.latex import latex_text
+
+        return latex_text(dae)
+    if format == "html":
+        from gantrytau.writing.html import html_page
+
+        return html_page(dae)
+    if format == "modelica":
+        from gantrytau.writing.modelica import modelica_text
+
+        return modelica_text(dae)
+    expected = ", ".join(f"'{f}'" for f in FORMATS)
+    raise ModelError(f"{dae.name}.equations(format={format!r}): expected one of {expected}; choose one")

@@ -1,0 +1,162 @@
+"""The flat model as one Modelica class: declarations, initial equations, equations.
+
+Names are quoted identifiers, `'carts[0].s'`, so that every name of the model is one name there. What is known
+of the Dae is `input`. Derivatives of higher order get variables of their own, `'der(x)' = der('x')`; so do
+propagated quantities and large subexpressions that occur more than once. The text has as many equations as
+unknowns. Modelica Language Specification 3.6, chapters 2, 3 and 8.
+"""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.declarations import StateSelect
+from gantrytau.errors import ModelError
+from gantrytau.flat_model import FlatParameter, FlatVariable
+from gantrytau.statements import Equation
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.writing.graph import Graph, Node
+from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
+from gantrytau.writing.sharing import Text, written
+from gantrytau.writing.syntax import CHOICE, Written, write
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+SELECT = {
+    StateSelect.NEVER: "never", StateSelect.AVOID: "avoid",
+    StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
+}  # fmt: skip
+
+
+def modelica_text(dae: "Dae") -> str:
+    """The flat model as a Modelica class; ModelError for a function that Modelica does not have."""
+    return _Writer(dae).text()
+
+
+class _Writer:
+    def __init__(self, dae: "Dae"):
+        self.dae, self.flat, self.graph = dae, dae.flat, Graph()
+        redundant = {id(e) for e in dae.reduced.redundant}
+        self.equations = [e for e in self.flat.equations if id(e) not in redundant]
+        self.orders = self._orders()
+        self.syntax = ModelicaSyntax({n for n, order in self.orders.items() if order > 1})
+
+    def _orders(self) -> dict[str, int]:
+        """The highest derivative of each variable that the text needs."""
+        found: dict[str, int] = {}
+        used = [side for e in (*self.equations, *self.flat.initial_equations) for side in (e.left, e.right)]
+        for leaf in ca.symvar(ca.vertcat(*used, *self.flat.definitions.values())):
+            name, order = split_derivative(leaf.name())
+            found[name] = max(order, found.get(name, 0))
+        return found
+
+    def text(self) -> str:
+        sections = self._equations()  # first: they decide which variables there are
+        name = class_name(self.flat.name)
+        lines = [f"model {name} {string('flat equations of ' + self.flat.name)}"]
+        lines += [self._parameter(p, k) for p in self.flat.parameters for k in range(len(p.elements))]
+        known = set(self.dae.known)
+        lines += [self._variable(v, k, known) for v in self.flat.variables for k in range(len(v.elements))]
+        lines += self.auxiliaries
+        return "\n".join([*lines, *sections, f"end {name};"]) + "\n"
+
+    def _equations(self) -> list[str]:
+        written_out = (*self.equations, *self.flat.initial_equations)
+        sides = self._read([side for e in written_out for side in (e.left, e.right)], written_out)
+        nodes = self.graph.read(self.flat.definitions.values())
+        propagated = dict(zip(self.flat.definitions, nodes, strict=True))
+        named: dict[Node, Written] = {}
+        for name, node in propagated.items():
+            if not node.leaf:
+                named.setdefault(node, Written(quoted(name)))
+        text = written([*sides, *propagated.values()], self.syntax, named)
+        pairs = list(
+            zip(text.expressions[: len(sides) : 2], text.expressions[1 : len(sides) : 2], strict=True)
+        )
+        count = len(self.equations)
+        own = [self._equation(e, *pair) for e, pair in zip(self.equations, pairs[:count], strict=True)]
+        initial = [
+            self._equation(e, *pair)
+            for e, pair in zip(self.flat.initial_equations, pairs[count:], strict=True)
+        ]
+        found = ["initial equation", *initial] if initial else []
+        found += ["equation", *own, *self._derivatives(), *self._named(propagated, text, len(sides))]
+        return [*found, *self._left_out()]
+
+    def _read(self, sides: list[ca.SX], equations: Iterable[Equation]) -> list[Node]:
+        try:
+            return self.graph.read(sides)
+        except ModelError:
+            for equation in equations:  # find the one at fault, to name it
+                try:
+                    Graph().read([equation.left, equation.right])
+                except ModelError as error:
+                    raise ModelError(f"{equation.name}: {error}") from error
+            raise
+
+    def _equation(self, equation: Equation, left: Written, right: Written) -> str:
+        side = f"({left.text})" if left.level == CHOICE else left.text
+        return f"  {side} = {right.text} {string(equation.name)};"
+
+    def _derivatives(self) -> list[str]:
+        """One equation for each derivative that is differentiated again."""
+        found, self.auxiliaries = [], []
+        for name, top in self.orders.items():
+            for order in range(1, top):
+                new, old = derivative_name(name, order), derivative_name(name, order - 1)
+                words = "" if order == 1 else f"derivative {order} of {name}"
+                self.auxiliaries.append(f"  Real {quoted(new)} {string(words or f'derivative of {name}')};")
+                found.append(f"  {quoted(new)} = der({quoted(old)});")
+        return found
+
+    def _named(self, propagated: dict[str, Node], text: Text, start: int) -> list[str]:
+        """Equations of shared subexpressions and propagated quantities."""
+        own = dict(text.definitions)
+        for name, expression in zip(propagated, text.expressions[start:], strict=True):
+            own.setdefault(quoted(name), expression.text)
+        spoken = {quoted(name): "propagated quantity" for name in propagated}
+        constant = {quoted(name) for name, node in propagated.items() if node.operation == "number"}
+        for name, expression in own.items():
+            kind, value = ("constant ", f" = {expression}") if name in constant else ("", "")
+            words = string(spoken.get(name, "shared subexpression"))
+            self.auxiliaries.append(f"  {kind}Real {name}{value} {words};")
+        return [f"  {name} = {expression};" for name, expression in own.items() if name not in constant]
+
+    def _left_out(self) -> list[str]:
+        redundant = self.dae.reduced.redundant
+        return [f"  // left out, it follows from the others: {e.name}" for e in redundant]
+
+    def _parameter(self, parameter: FlatParameter, k: int) -> str:
+        value = self._expressions([parameter.value[k]])[0]
+        end = " annotation(Evaluate=true)" if parameter.fold else ""
+        head = f"  parameter Real {quoted(parameter.elements[k])}{self._attributes(parameter, k)} = {value}"
+        return f"{head}{self._comment(parameter)}{end};"
+
+    def _variable(self, variable: FlatVariable, k: int, known: set[str]) -> str:
+        name = variable.elements[k]
+        kind = "input " if name in known else "output " if variable.kind == "output" else ""
+        return f"  {kind}Real {quoted(name)}{self._attributes(variable, k)}{self._comment(variable)};"
+
+    def _comment(self, variable: FlatVariable) -> str:
+        return f" {string(variable.description)}" if variable.description else ""
+
+    def _attributes(self, variable: FlatVariable, k: int) -> str:
+        found = [] if variable.unit is None else [f"unit={string(variable.unit)}"]
+        for key in ("min", "max", "start", "nominal"):
+            values = getattr(variable, key)
+            if values is None or (values[k].is_constant() and abs(float(values[k])) == float("inf")):
+                continue
+            found.append(f"{key}={self._expressions([values[k]])[0]}")
+        if variable.fixed:
+            found.append("fixed=true")
+        if variable.prefer in SELECT:
+            found.append(f"stateSelect=StateSelect.{SELECT[variable.prefer]}")
+        return f"({', '.join(found)})" if found else ""
+
+    def _expressions(self, values: list[ca.SX]) -> list[str]:
+        """Expressions of parameters, written out in full."""
+        nodes = self.graph.read(values)
+        found = write(nodes, self.syntax, {})
+        return [found[node].text for node in nodes]

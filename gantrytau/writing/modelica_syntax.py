@@ -1,0 +1,104 @@
+"""Expressions, names and strings in Modelica (Language Specification 3.6, sections 2.3 and 3.7)."""
+
+from collections.abc import Collection
+
+from gantrytau.errors import ModelError
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.writing.syntax import AND, CHOICE, OR, POWER, PRODUCT, SUM, Arguments, Written, infix
+from gantrytau.writing.text import WORDS, plain_number
+
+OPERATORS = {key: word for key, word in WORDS.items() if key not in ("==", "!=")}
+FUNCTIONS = {
+    "abs": "abs", "sign": "sign", "sqrt": "sqrt", "exp": "exp", "log": "log",
+    "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
+    "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "floor": "floor", "ceil": "ceil",
+    "min": "min", "max": "max", "fmod": "rem",
+}  # fmt: skip
+KEYWORDS = """algorithm and annotation block break class connect connector constant constrainedby der discrete
+    each else elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow
+    for function if import impure in initial inner input loop model not operator or outer output package parameter
+    partial protected public pure record redeclare replaceable return stream then true type when while within
+    Real Integer Boolean String"""
+
+
+def quoted(name: str) -> str:
+    """A name as a quoted identifier; letters beyond ASCII, which may not stand there, as their code."""
+    escaped = name.replace("\\", "\\\\").replace("'", "\\'")
+    return "'" + "".join(c if c.isascii() else f"U+{ord(c):04X}" for c in escaped) + "'"
+
+
+def class_name(name: str) -> str:
+    """The name of a class, quoted only where it has to be."""
+    plain = name.isascii() and name.isidentifier() and name not in KEYWORDS.split()
+    return name if plain else quoted(name)
+
+
+def string(text: str) -> str:
+    """A text as a Modelica string, on one line."""
+    escaped = " ".join(text.split()).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+class ModelicaSyntax:
+    """Modelica; `lowered` are the variables whose first derivative is a variable of its own."""
+
+    name = "Modelica"
+
+    def __init__(self, lowered: Collection[str] = ()):
+        self._lowered = frozenset(lowered)
+
+    def number(self, value: float) -> Written:
+        """A number; ModelError for an infinite one."""
+        if abs(value) == float("inf"):
+            raise ModelError(
+                "an expression: found an infinite number, which Modelica cannot write; expected a finite one"
+            )
+        return Written(plain_number(value), SUM if value < 0 else 8, value < 0)
+
+    def symbol(self, name: str) -> Written:
+        """A quoted name, the derivative of one, or `time`."""
+        base, order = split_derivative(name)
+        if order == 0:
+            return Written("time" if name == "time" else quoted(name))
+        return Written(f"der({quoted(derivative_name(base, order - 1))})")
+
+    def shared(self, number: int) -> Written:
+        """'shared 1', which is no name that Python could have."""
+        return Written(quoted(f"shared {number}"))
+
+    def enclose(self, text: str) -> str:
+        """(text)."""
+        return f"({text})"
+
+    def apply(self, operation: str, arguments: Arguments) -> Written | None:
+        """Operators, `if`, the built-in functions, and what can be said with them."""
+        if operation == "select":
+            text = f"if {arguments.bare(0)} then {arguments.bare(1)} else {arguments.bare(2)}"
+            return Written(text, CHOICE)
+        found = infix(arguments, operation, OPERATORS)
+        if found is not None:
+            return found
+        if operation in FUNCTIONS:
+            inside = ", ".join(arguments.bare(k) for k in range(len(arguments)))
+            return Written(f"{FUNCTIONS[operation]}({inside})")
+        return _paraphrase(operation, arguments)
+
+
+def _paraphrase(operation: str, arguments: Arguments) -> Written | None:
+    """What Modelica has no word for, in other words; None for what stays unsaid (erf and the like)."""
+    a, b = arguments.bare(0), arguments.bare(len(arguments) - 1)
+    sum_a, sum_b = arguments.held(0, SUM), arguments.held(len(arguments) - 1, SUM)
+    base_a, base_b = arguments.held(0, 8), arguments.held(len(arguments) - 1, 8)
+    forms = {
+        # equality of reals is not allowed outside of functions (section 3.5)
+        "==": Written(f"{sum_a} <= {sum_b} and {sum_a} >= {sum_b}", AND),
+        "!=": Written(f"{sum_a} < {sum_b} or {sum_a} > {sum_b}", OR),
+        "asinh": Written(f"sign({a})*log(abs({a}) + sqrt({base_a}^2 + 1))", PRODUCT),
+        "acosh": Written(f"log({sum_a} + sqrt({base_a}^2 - 1))", POWER),
+        "atanh": Written(f"log((1 + {sum_a})/(1 - {arguments.held(0, PRODUCT)}))/2", PRODUCT),
+        "hypot": Written(f"sqrt({base_a}^2 + {base_b}^2)", POWER),
+        "log1p": Written(f"log(1 + {sum_a})", POWER),
+        "expm1": Written(f"exp({a}) - 1", SUM),
+        "copysign": Written(f"if {b} >= 0 then abs({a}) else -abs({a})", CHOICE),
+    }
+    return forms.get(operation)

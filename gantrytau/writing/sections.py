@@ -1,0 +1,87 @@
+"""A translated model as sections to be read: one per block, in the order of solution."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.index_reduction import Key
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """`left` = `right`; left None: zero. `determines` names the unknown that an implicit equation yields."""
+
+    left: str | None
+    right: ca.SX
+    determines: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """One block: its lines, and where its equations come from.
+
+    kind: how it is solved; unknowns: names; torn: how many unknowns are found first.
+    """
+
+    number: int
+    kind: str
+    unknowns: tuple[str, ...]
+    torn: int
+    origins: tuple[str, ...]
+    lines: tuple[Line, ...]
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one unknown in closed form."""
+        return len(self.lines) == 1 and self.lines[0].left is not None
+
+    @property
+    def title(self) -> str:
+        """'linear block of 48 unknowns, torn to 5'."""
+        if self.single:
+            return self.kind
+        count = len(self.unknowns)
+        plural = "" if count == 1 else "s"
+        return f"{self.kind} block of {count} unknown{plural}, torn to {self.torn}"
+
+
+def sections(dae: "Dae") -> list[Section]:
+    """The blocks of a Dae as lines to be read."""
+    found: list[Section] = []
+    for number, block in enumerate(dae.blocks, start=1):
+        if len(block.unknowns) == 1 and block.solution is not None:
+            (value,) = block.solution
+            lines = [Line(block.unknowns[0], value)]
+        else:
+            pairs = zip(block.tears, block.residuals, strict=True)
+            lines = [Line(None, residual, tear.name()) for tear, residual in pairs]
+            lines += [Line(symbol.name(), value) for symbol, value in block.inner]
+        origins = origin_words(dae, block.equations)
+        found.append(Section(number, block.kind, block.unknowns, len(block.tears), origins, tuple(lines)))
+    return found
+
+
+def origin_words(dae: "Dae", equations: Iterable[Key]) -> tuple[str, ...]:
+    """Where equations come from, rows of one vector equation put together: 'tool (Tool), equation 2, rows 0 to 2'."""
+    rows: dict[tuple[str, str], list[int]] = {}
+    for index, times in equations:
+        name, _, row = dae.reduced.equations[index].name.partition(", row ")
+        often = "" if times == 0 else ", differentiated " + ("once" if times == 1 else f"{times} times")
+        rows.setdefault((name, often), []).extend([int(row)] if row else [])
+    return tuple(f"{name}{_row_words(found)}{often}" for (name, often), found in rows.items())
+
+
+def _row_words(rows: list[int]) -> str:
+    rows = sorted(set(rows))
+    if not rows:
+        return ""
+    if len(rows) == 1:
+        return f", row {rows[0]}"
+    if len(rows) == 2 or rows != list(range(rows[0], rows[-1] + 1)):
+        return f", rows {', '.join(str(r) for r in rows[:-1])} and {rows[-1]}"
+    return f", rows {rows[0]} to {rows[-1]}"

@@ -1,0 +1,56 @@
+"""Subexpressions that are written once and referred to by name.
+
+An orientation at the end of a chain of joints is a small graph but, written out, a text that grows
+exponentially with the chain. A subexpression is given a name if that saves SAVING nodes of text.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+from gantrytau.writing.graph import Node
+from gantrytau.writing.syntax import Syntax, Written, ordered, write
+
+SAVING = 20  # nodes; below it, a name costs the reader more than the repetition
+SMALLEST = 6  # nodes; a sum of three is clearer than a name
+
+
+@dataclass(frozen=True)
+class Text:
+    """Expressions written out.
+
+    definitions: (name, expression) of what was named, each after those it needs; expressions: what was asked for.
+    """
+
+    definitions: tuple[tuple[str, str], ...]
+    expressions: tuple[Written, ...]
+
+
+def worth_a_name(roots: Iterable[Node], named: Collection[Node] = ()) -> list[Node]:
+    """The nodes below `roots` to be written apart, each after those it needs; `named` have names already."""
+    roots = list(roots)
+    uses: dict[Node, int] = {}
+    order = ordered(roots)
+    for node in (*roots, *(a for n in order for a in n.arguments)):
+        uses[node] = uses.get(node, 0) + 1
+    size: dict[Node, int] = {}
+    found: list[Node] = []
+    for node in order:
+        size[node] = 1 + sum(size[a] for a in node.arguments)
+        saved = (uses[node] - 1) * size[node]
+        if node in named:
+            size[node] = 1
+        elif not (node.leaf or node.boolean) and size[node] >= SMALLEST and saved >= SAVING:
+            found.append(node)
+            size[node] = 1
+    return found
+
+
+def written(roots: Iterable[Node], syntax: Syntax, named: Mapping[Node, Written] | None = None) -> Text:
+    """`roots` in a language, with their shared subexpressions apart; `named` are written apart under these names."""
+    roots = list(roots)
+    names = dict(named or {})
+    shared = worth_a_name(roots, names)
+    names |= {node: syntax.shared(number) for number, node in enumerate(shared, start=1)}
+    found = write(roots, syntax, names)
+    definitions = tuple((names[node].text, text.text) for node, text in found.items() if node in names)
+    return Text(definitions, tuple(names.get(root) or found[root] for root in roots))

@@ -1,0 +1,85 @@
+"""The blocks of a Dae as plain text, in the order of solution, with the component equation each line comes from."""
+
+from typing import TYPE_CHECKING
+
+from gantrytau.writing.graph import Graph
+from gantrytau.writing.sections import Section, sections
+from gantrytau.writing.sharing import written
+from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+WORDS = {
+    "or": " or ", "and": " and ", "not": "not ", "neg": "-",
+    "<": " < ", "<=": " <= ", ">": " > ", ">=": " >= ", "==": " == ", "!=": " != ",
+    "add": " + ", "sub": " - ", "mul": "*", "div": "/", "pow": "^",
+}  # fmt: skip
+
+
+def plain_number(value: float) -> str:
+    """A number with as many digits as it needs; whole ones without a point."""
+    whole = value == int(value) and abs(value) < 1e15 if abs(value) != float("inf") else False
+    return str(int(value)) if whole else repr(float(value))
+
+
+class PlainSyntax:
+    """Names as in Python, powers with ^, functions by their usual names."""
+
+    name = "plain text"
+
+    def number(self, value: float) -> Written:
+        """A number."""
+        return Written(plain_number(value), SUM if value < 0 else 8, value < 0)
+
+    def symbol(self, name: str) -> Written:
+        """A name."""
+        return Written(name)
+
+    def shared(self, number: int) -> Written:
+        """#1."""
+        return Written(f"#{number}")
+
+    def enclose(self, text: str) -> str:
+        """(text)."""
+        return f"({text})"
+
+    def apply(self, operation: str, arguments: Arguments) -> Written | None:
+        """Operators, `if c then a else b`, or a function call."""
+        if operation == "select":
+            text = f"if {arguments.bare(0)} then {arguments.bare(1)} else {arguments.bare(2)}"
+            return Written(text, CHOICE)
+        found = infix(arguments, operation, WORDS)
+        if found is not None:
+            return found
+        return Written(f"{operation}({', '.join(arguments.bare(k) for k in range(len(arguments)))})")
+
+
+def block_text(dae: "Dae") -> str:
+    """One line per solved unknown, in the order of solution, with the component equation it comes from."""
+    lines = [
+        f"{dae.name}",
+        f"known: {', '.join(dae.known) or 'nothing'}",
+        f"states: {', '.join(dae.states) or 'none'}",
+    ]
+    for section in sections(dae):
+        lines += _section(section)
+    return "\n".join(lines) + "\n"
+
+
+def _section(section: Section) -> list[str]:
+    graph = Graph()
+    text = written(graph.read(line.right for line in section.lines), PlainSyntax())
+    origin = "; ".join(section.origins)
+    where = [f"      with {name} = {expression}" for name, expression in text.definitions]
+    if section.single:
+        value = text.expressions[0].text
+        return [
+            f"[{section.number}] {section.lines[0].left} = {value}    # {section.kind}, from {origin}",
+            *where,
+        ]
+    lines = [f"[{section.number}] {section.title}    # from {origin}", *where]
+    for line, value in zip(section.lines, text.expressions, strict=True):
+        note = f"    # determines {line.determines}" if line.determines else ""
+        lines.append(f"      {line.left or '0'} = {value.text}{note}")
+    return lines

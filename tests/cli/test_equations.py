@@ -1,0 +1,101 @@
+"""`gantrytau equations`: text in several formats, causality, C code."""
+
+import importlib.util
+
+import pytest
+
+from gantrytau import translate
+from gantrytau_models import Pendulum
+
+FAULT, MISUSE = 1, 2
+
+
+def test_the_text_is_that_of_the_model(run, answer):
+    text = translate(Pendulum()).equations()
+    assert run("equations", "Pendulum").stdout == text
+    found = answer("equations", "Pendulum")
+    assert found == {
+        "model": "Pendulum",
+        "prototype": None,
+        "format": "text",
+        "given": [],
+        "find": [],
+        "file": None,
+        "text": text,
+    }
+
+
+def test_given_and_find_choose_the_causality(run):
+    names = "carts[0].s,carts[1].s, carts[2].s"
+    found = run("equations", "GantryTau(GT_A)", "--given", "tool.r", "--find", names)
+    assert found.exit_code == 0
+    assert "known: tool.r[0], tool.r[1], tool.r[2]" in found.stdout
+    assert "states: none" in found.stdout
+
+
+def test_the_equations_go_to_a_file(run, answer, tmp_path):
+    file = tmp_path / "pendulum.txt"
+    found = run("equations", "Pendulum", "--output", file)
+    assert found.stdout == ""
+    assert f"The equations of Pendulum are in {file}" in found.stderr
+    assert file.read_text() == translate(Pendulum()).equations()
+    told = answer("equations", "Pendulum", "--output", file)
+    assert told["file"] == str(file)
+    assert "text" not in told
+
+
+@pytest.mark.parametrize("format", ["latex", "html", "modelica"])
+def test_other_formats(run, format):
+    found = run("equations", "Pendulum", "--format", format)
+    assert found.exit_code == 0, found.output
+    assert found.stdout == translate(Pendulum()).equations(format).rstrip("\n") + "\n"
+
+
+def test_an_unknown_format_is_told(fails):
+    message = fails(FAULT, "equations", "Pendulum", "--format", "word")
+    assert "equations(format='word')" in message
+    assert "'text'" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--c",), "--c: a function needs arguments and results, as --given tool.r --find carts[0].s"),
+        (("--c", "--given", "x"), "--c: a function needs arguments and results"),
+        (("--jacobian",), "--jacobian, --forward and --reverse are derivatives of C code; add --c"),
+        (("--forward", "1"), "are derivatives of C code; add --c"),
+        (("--output", "no_such_folder/a.txt"), "the folder 'no_such_folder' does not exist"),
+    ],
+)
+def test_misuse(fails, options, message):
+    assert message in fails(MISUSE, "equations", "Pendulum", *options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--given", "xx"), "'xx'; did you mean 'x'?"),
+        (("--find", "der(xx)"), "Pendulum has no variable or parameter 'der(xx)'"),
+        (("--given", "x"), "Pendulum: 6 unknowns, 7 equations. Overdetermined by 1"),
+    ],
+)
+def test_names_and_causalities_that_do_not_fit(fails, options, message):
+    assert message in fails(FAULT, "equations", "Pendulum", *options)
+
+
+def test_an_unwritable_place_is_told(fails, tmp_path):
+    assert "is a folder" in fails(MISUSE, "equations", "Pendulum", "--output", tmp_path)
+    assert "Cannot write" in fails(MISUSE, "equations", "Pendulum", "--output", tmp_path / ("x" * 300))
+
+
+@pytest.mark.skipif(importlib.util.find_spec("gantrytau.c_code") is None, reason="no C code in this version")
+def test_c_code_of_a_function(answer):
+    names = ("--c", "--given", "tool.r", "--find", "carts[0].s,carts[1].s")
+    plain = answer("equations", "GantryTau(GT_A)", *names)
+    assert plain["format"] == "c"
+    assert "carts[1].s" in plain["text"]  # the table of arguments and results
+    assert "casadi_real" in plain["text"]
+    more = answer("equations", "GantryTau(GT_A)", *names, "--jacobian", "--forward", "1", "--reverse", "2")
+    assert "jac_" in more["text"]
+    assert "fwd1_" in more["text"]
+    assert "adj2_" in more["text"]

@@ -1,0 +1,53 @@
+"""`gantrytau library`, and help for those who are new."""
+
+import pytest
+
+import gantrytau_models
+from gantrytau.commands.options import listed
+from gantrytau.mechanics.multibody import Prismatic
+from gantrytau_models import prototypes
+
+
+def test_the_library_lists_models_components_and_prototypes(answer):
+    found = answer("library")
+    assert set(found["models"]) == set(gantrytau_models.__all__) - {"prototypes"}
+    assert Prismatic.__doc__ is not None
+    assert found["components"]["gantrytau.mechanics.multibody"]["Prismatic"] in Prismatic.__doc__
+    assert found["prototypes"]["L1"] == prototypes.L1.source
+    assert {"D1", "GT_A", "F1_printed"} <= found["prototypes"].keys()
+
+
+def test_what_is_listed_explains_itself(answer):
+    found = answer("library")
+    groups = (found["models"], found["prototypes"], *found["components"].values())
+    assert [name for group in groups for name, words in group.items() if not words] == []
+
+
+def test_a_component_is_listed_where_it_is_at_home(answer):
+    components = answer("library")["components"]
+    assert "Flange" in components["gantrytau.mechanics.rotational"]
+    assert "Model" not in components["gantrytau.mechanics.rotational"]
+
+
+def test_the_library_is_printed(run):
+    lines = run("library").stdout.splitlines()
+    assert any(line.split()[:1] == ["Pendulum"] for line in lines)
+    assert "Components of gantrytau.mechanics.translational" in lines
+
+
+@pytest.mark.parametrize("command", ["check", "simulate", "equations", "library"])
+def test_each_command_has_help_with_an_example(run, command):
+    found = run(command, "--help")
+    assert found.exit_code == 0
+    assert f"Example: gantrytau {command}" in found.stdout
+    assert "--json" in found.stdout
+
+
+def test_brackets_in_the_help_are_not_taken_for_markup(run):
+    assert "'[1,2,3]'" in run("check", "--help").stdout
+    assert "carts[0].s,carts[1].s,carts[2].s" in run("equations", "--help").stdout
+
+
+def test_names_are_separated_by_commas_outside_of_brackets():
+    assert listed(["a, b", "R[0,1],der(tool.r[2])", " "]) == ("a", "b", "R[0,1]", "der(tool.r[2])")
+    assert listed(None) == ()

@@ -1,0 +1,249 @@
+"""`gantrytau simulate`: figures, files, pictures, inputs, and runs that stop early."""
+
+import csv
+import json
+import signal
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from gantrytau.simulation import _Run
+
+FAULT, MISUSE, INTERRUPTED = 1, 2, 130
+
+
+def columns(file):
+    """Header -> values of a CSV file."""
+    with file.open() as opened:
+        rows = list(csv.reader(opened))
+    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
+
+
+def test_a_pushed_cart_goes_as_far_as_newton_says(run, answer, robots):
+    arguments = (
+        "simulate",
+        f"{robots}:Cart",
+        "--set",
+        "m=2",
+        "--input",
+        "f=3",
+        "--start",
+        "1",
+        "--stop",
+        "5",
+    )
+    found = answer(*arguments, "--points", "9")
+    assert found["final"]["x"] == pytest.approx(3 / 2 * 4**2 / 2, rel=1e-7)  # ten times the tolerance
+    assert found["final"]["v"] == pytest.approx(3 / 2 * 4, rel=1e-7)
+    assert found["time"] == {"start": 1.0, "stop": 5.0, "points": 9}
+    assert found["states"] == ["x", "v"]
+    assert found["files"] == []
+    spoken = run(*arguments)
+    assert spoken.exit_code == 0
+    assert "Cart: 1 s to 5 s, 501 points" in spoken.stdout
+    assert [line.split()[:3] for line in spoken.stdout.splitlines() if line.strip().startswith("x ")] == [
+        ["x", "0", "12"]
+    ]
+
+
+def test_names_and_units_are_not_taken_for_markup(run, robots):
+    found = run("simulate", f"{robots}:Painted", "--stop", "1")
+    assert found.exit_code == 0
+    row = next(line for line in found.stdout.splitlines() if line.strip().startswith("level "))
+    name, start, end, *_, unit = row.split()
+    assert (name, start, unit) == ("level", "1", "m")
+    assert float(end) == pytest.approx(np.exp(-1), abs=1e-5)  # a hundred steps, each within the tolerance
+
+
+@pytest.mark.parametrize("column", [":push", ":push [N]"])
+def test_an_input_comes_from_a_column(answer, robots, tmp_path, column):
+    file = tmp_path / "push.csv"
+    file.write_text("time [s],push [N],f\n0,0,1\n\n1,2,1\n2,2,1\n")
+    found = answer(
+        "simulate", f"{robots}:Cart", "--set", "m=1", "--stop", "2", "--input", f"f={file}{column}"
+    )
+    assert found["final"]["v"] == pytest.approx(1 + 2, rel=1e-6)  # fifty stretches, each within the tolerance
+    found = answer("simulate", f"{robots}:Cart", "--set", "m=1", "--stop", "2", "--input", f"f={file}")
+    assert found["final"]["v"] == pytest.approx(2, rel=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc", ".mat", ".parquet"])
+def test_results_are_saved(answer, tmp_path, suffix):
+    file = tmp_path / f"swing{suffix}"
+    found = answer("simulate", "Pendulum", "--stop", "1", "--points", "11", "--output", file)
+    assert found["files"] == [str(file)]
+    assert file.stat().st_size > 1000  # 17 variables at 11 times
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+
+
+def test_a_saved_result_holds_what_was_printed(answer, tmp_path):
+    file = tmp_path / "swing.csv"
+    found = answer("simulate", "Pendulum", "--stop", "1", "--output", file)
+    table = columns(file)
+    assert table["time [s]"][-1] == 1.0
+    assert table["x [m]"][-1] == found["final"]["x"]
+    assert np.allclose(table["x [m]"] ** 2 + table["y [m]"] ** 2, 1.0, atol=1e-9)  # the rod stays as long
+
+
+@pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")])
+def test_pictures_are_drawn(answer, tmp_path, suffix, start):
+    file = tmp_path / f"swing{suffix}"
+    found = answer("simulate", "Pendulum", "--stop", "1", "--plot", "x,y", "--plot", "der(v_x)", "--to", file)
+    assert found["files"] == [str(file)]
+    assert file.read_bytes().startswith(start)
+    assert file.stat().st_size > 5000
+
+
+def test_a_picture_of_a_curve_is_not_blank(answer, tmp_path):
+    file = tmp_path / "swing.png"
+    answer("simulate", "Pendulum", "--stop", "1", "--plot", "x", "--to", file)
+    assert len(np.unique(plt.imread(file).reshape(-1, 4), axis=0)) > 20  # paper, axes, the line's colour
+
+
+def test_a_vector_of_the_robot_is_drawn_and_its_files_are_told(run, tmp_path):
+    picture, table = tmp_path / "tool.png", tmp_path / "tool.csv"
+    found = run(
+        "simulate",
+        "GantryTau(GT_A)",
+        "--stop",
+        "0.05",
+        "--plot",
+        "tool.r",
+        "--to",
+        picture,
+        "--output",
+        table,
+    )
+    assert found.exit_code == 0, found.output
+    assert f"Written: {table}\nWritten: {picture}" in found.stdout
+    assert picture.stat().st_size > 5000
+
+
+def test_a_window_is_opened_where_there_is_one(run, monkeypatch):
+    shown = []
+    monkeypatch.setattr(plt, "get_backend", lambda: "QtAgg")
+    monkeypatch.setattr(plt, "show", lambda: shown.append(True))
+    assert run("simulate", "Pendulum", "--stop", "1", "--plot", "x").exit_code == 0
+    assert shown == [True]
+    plt.close("all")
+
+
+def test_without_a_display_the_window_has_a_remedy(fails, monkeypatch):
+    monkeypatch.setattr(plt, "get_backend", lambda: "agg")
+    message = fails(MISUSE, "simulate", "Pendulum", "--stop", "1", "--plot", "x")
+    assert "no window can be opened here (Matplotlib draws with 'agg')" in message
+    assert "--to picture.png" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--plot", "x", "--to", "picture.xyz"), "found the suffix '.xyz', expected 'window' or a picture"),
+        (("--plot", "x", "--to", "no_such_folder/a.png"), "the folder 'no_such_folder' does not exist"),
+        (("--output", "result.cvs"), "result.cvs: found the suffix '.cvs'"),
+        (("--output", "no_such_folder/a.csv"), "the folder 'no_such_folder' does not exist; create it"),
+        (("--input", "f"), "--input f: expected NAME=VALUE, as --input m=2.5"),
+        (("--input", "f=fast"), "--input f=fast: expected a number as 2.5"),
+        (("--input", "f=no_such_file.csv:f"), "no_such_file.csv: there is no such file; check the path"),
+    ],
+)
+def test_misuse_is_told_before_the_work(fails, monkeypatch, options, message):
+    monkeypatch.setattr("gantrytau.translate", None)
+    assert message in fails(MISUSE, "simulate", "Pendulum", "--stop", "1", *options)
+
+
+def test_what_cannot_be_written_is_told(fails, tmp_path):
+    assert "is a folder, expected the name of a file in it" in fails(
+        MISUSE, "simulate", "Pendulum", "--stop", "1", "--output", tmp_path
+    )
+    name = "x" * 300 + ".csv"  # longer than file systems allow
+    assert "Cannot write" in fails(MISUSE, "simulate", "Pendulum", "--stop", "1", "--output", tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "found 0 rows, expected a header and a row for each time"),
+        ("time,f\n", "found 1 rows, expected a header and a row for each time"),
+        ("times,f\n0,1\n", "has no column 'time'; did you mean 'times'? A file of samples has a header"),
+        ("time,force\n0,1\n", "has no column 'f'; there is time, force. A file of samples"),
+        ("time,f\n0,1\n1,much\n", "row 3, column 'f': found 'much', expected a number"),
+        ("time,f\n0,1\n1\n", "row 3 ends before column 'f'; complete or remove it"),
+    ],
+)
+def test_a_file_of_samples_with_a_fault(fails, robots, tmp_path, text, message):
+    file = tmp_path / "push.csv"
+    file.write_text(text)
+    arguments = ("simulate", f"{robots}:Cart", "--set", "m=1", "--stop", "1", "--input", f"f={file}")
+    assert message in fails(MISUSE, *arguments)
+
+
+def test_a_file_of_samples_that_is_no_text(fails, robots, tmp_path):
+    file = tmp_path / "push.csv"
+    file.write_bytes(b"\xff\xfe\x00")
+    arguments = ("simulate", f"{robots}:Cart", "--set", "m=1", "--stop", "1", "--input", f"f={file}")
+    assert "cannot be read as CSV" in fails(MISUSE, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--stop", "-1"), "expected start < stop"),
+        (("--stop", "1", "--points", "1"), "found points=1, expected a whole number of at least 2"),
+        (("--stop", "1", "--tolerance", "2"), "found tolerance=2.0"),
+        (("--stop", "1", "--input", "x=1"), "x is not an input of Pendulum (inputs: none)"),
+        (("--stop", "1", "--plot", "xx", "--to", "a.png"), "has no variable or parameter 'xx'"),
+    ],
+)
+def test_what_the_model_does_not_have(fails, options, message):
+    assert message in fails(FAULT, "simulate", "Pendulum", *options)
+
+
+def test_a_solution_without_end_leaves_what_was_found(fails, run, robots, tmp_path):
+    file = tmp_path / "part.csv"
+    arguments = ("simulate", f"{robots}:Runaway", "--stop", "2", "--output", file)
+    message = fails(FAULT, *arguments)
+    assert "Runaway: the integration stopped at t = " in message
+    assert f"What was computed until then is in {file}" in message
+    table = columns(file)
+    assert 0.9 < table["time [s]"][-1] <= 1.0
+    early = table["time [s]"] < 0.5
+    exact = 1 / (1 - table["time [s]"][early])
+    assert np.allclose(table["x [1]"][early], exact, rtol=1e-5)  # a hundred steps; errors grow as x^2
+    report = json.loads(run(*arguments, "--json").stdout)
+    assert report["time"] == pytest.approx(1.0, abs=0.01)
+    assert report["files"] == [str(file)]
+
+
+def press_ctrl_c(monkeypatch):
+    """Let Ctrl-C be pressed after the first stretch of a simulation."""
+    advance = _Run._advance
+
+    def pressed(run, count):
+        advance(run, count)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(_Run, "_advance", pressed)
+
+
+def test_ctrl_c_leaves_what_was_found(fails, run, tmp_path, monkeypatch):
+    press_ctrl_c(monkeypatch)
+    file = tmp_path / "part.csv"
+    message = fails(INTERRUPTED, "simulate", "Pendulum", "--stop", "10", "--output", file)
+    assert "Pendulum: simulation interrupted at t = 0.2 s\nWhat was computed until then is in " in message
+    assert columns(file)["time [s]"][-1] == pytest.approx(0.2)  # ten of 500 intervals
+    message = fails(INTERRUPTED, "simulate", "Pendulum", "--stop", "10")
+    assert "with --output its result would have been saved" in message
+
+
+def test_nothing_is_left_in_the_folder_of_a_result_that_is_refused(run, tmp_path):
+    assert run("simulate", "Pendulum", "--stop", "-1", "--output", tmp_path / "a.csv").exit_code == FAULT
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_extra_is_told_before_the_work(fails, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    message = fails(MISUSE, "simulate", "Pendulum", "--stop", "1", "--output", tmp_path / "a.parquet")
+    assert "pip install 'gantrytau[results]'" in message

@@ -1,0 +1,91 @@
+"""The flat Modelica text says what the flat model says, as an independent parser reads it."""
+
+import casadi as ca
+import pytest
+
+from gantrytau import Input, Model, Output, Parameter, Real, connect, der
+from gantrytau.declarations import Array, StateSelect
+from gantrytau.mechanics import multibody, rotational, translational
+from gantrytau.mechanics.translational import LinearFriction
+from gantrytau_models import GantryTau, Pendulum, prototypes
+from tests.equations.residuals import assert_same_residuals
+
+
+class Oscillator(Model):
+    """A mass between a spring and a damper, pushed by a force."""
+
+    wall = translational.Fixed()
+    mass = translational.Mass(m=2.0)
+    spring = translational.Spring(c=30.0)
+    damper = translational.Damper(d=0.4)
+    push = translational.Force()
+
+    def equations(self):
+        yield connect(self.wall.flange, self.spring.flange_a)
+        yield connect(self.wall.flange, self.damper.flange_a)
+        yield connect(self.spring.flange_b, self.mass.flange)
+        yield connect(self.damper.flange_b, self.mass.flange)
+        yield connect(self.push.flange, self.mass.flange)
+
+
+class Shaft(Model):
+    """Two inertias, a spring between them, and a torque."""
+
+    torque = rotational.Torque()
+    inertias = Array(rotational.Inertia, [dict(J=1.0), dict(J=0.2)])
+    spring = rotational.Spring(c=100.0)
+
+    def equations(self):
+        yield connect(self.torque.flange, self.inertias[0].flange_a)
+        yield connect(self.inertias[0].flange_b, self.spring.flange_a)
+        yield connect(self.spring.flange_b, self.inertias[1].flange_a)
+
+
+class Slide(Model):
+    """A point mass on a slide in space."""
+
+    world = multibody.World()
+    bar = multibody.FixedTranslation(r=[0.1, 0.2, 0.3])
+    slide = multibody.Prismatic(n=[1.0, 2.0, 2.0])
+    mass = multibody.PointMass(m=3.0)
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.bar.frame_a)
+        yield connect(self.bar.frame_b, self.slide.frame_a)
+        yield connect(self.slide.frame_b, self.mass.frame_a)
+
+
+class Started(Model):
+    """Attributes of every kind, an initial equation, an output, a third derivative."""
+
+    a = Parameter(2.0, unit="1/s", description='the "rate"')
+    b = Parameter(lambda self: ca.sqrt(self.a) * 3, unit="1/s", min=0.0)
+    x = Real(2, unit="m", start=[0.5, -1.5], fixed=True, description="place \\ way")
+    w = Real(unit="m", start=1e-5, min=-10.0, prefer=StateSelect.AVOID)
+    u = Input(unit="m/s3", start=1.0)
+    y = Output(unit="m")
+
+    def equations(self):
+        yield der(self.x) == -self.a * self.x + ca.vertcat(0, self.b * self.x[0])
+        yield der(der(der(self.w))) == self.u - self.b**3 * self.w
+        yield self.y == self.w + self.x[0]
+
+    def initial_equations(self):
+        yield self.w == 3 * self.y
+
+
+MODELS = [
+    pytest.param(Pendulum(), id="pendulum"),
+    pytest.param(GantryTau(prototypes.L1), id="robot"),
+    pytest.param(GantryTau(prototypes.L1, friction=LinearFriction), id="robot with linear friction"),
+    pytest.param(GantryTau(prototypes.GT_A, friction=None), id="robot without friction"),
+    pytest.param(Oscillator(), id="oscillator"),
+    pytest.param(Shaft(), id="shaft"),
+    pytest.param(Slide(), id="slide"),
+    pytest.param(Started(), id="started"),
+]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_an_independent_parser_reads_the_same_residuals(model):
+    assert_same_residuals(model)
