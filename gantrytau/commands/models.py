@@ -110,7 +110,8 @@ def _in_library(name: str) -> Any:
     models = library()
     if name in models:
         return models[name]
-    if Path(name.rpartition(":")[0] or name).exists():
+    path = Path(name.rpartition(":")[0] or name)
+    if path.is_file() or len(path.parts) > 1:
         raise CommandError(f"{name} is no Python file, expected one, as robot.py:Robot")
     module, dot, last = name.rpartition(".")
     try:
