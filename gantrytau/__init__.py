@@ -21,6 +21,7 @@ from gantrytau.errors import (
     SolveError,
     StructureError,
 )
+from gantrytau.extraction import Mechanism, extract_mechanism
 from gantrytau.flat_model import FlatModel
 from gantrytau.flattening import flatten
 from gantrytau.functions import (
@@ -42,6 +43,7 @@ from gantrytau.functions import (
     tan,
     tanh,
 )
+from gantrytau.linearization import Linearization, linearize
 from gantrytau.model import Connector, Model, outer
 from gantrytau.result import Result
 from gantrytau.simulation import simulate
@@ -60,6 +62,8 @@ __all__ = [
     "GantryTauError",
     "InitializationError",
     "Input",
+    "Linearization",
+    "Mechanism",
     "Model",
     "ModelError",
     "Output",
@@ -84,9 +88,11 @@ __all__ = [
     "der",
     "dot",
     "exp",
+    "extract_mechanism",
     "fabs",
     "flatten",
     "if_else",
+    "linearize",
     "log",
     "norm_2",
     "outer",

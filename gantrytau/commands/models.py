@@ -94,10 +94,10 @@ def library() -> dict[str, type[Model]]:
 
 
 def prototype_names() -> tuple[str, ...]:
-    """The names of the records of real robots, those that `prototypes` reads when they are asked for."""
+    """The names of the records of robots."""
     from gantrytau_models import prototypes
 
-    return tuple(sorted(name for name in dir(prototypes) if name not in vars(prototypes)))
+    return tuple(prototypes.names())
 
 
 def first_sentence(text: str | None) -> str:
@@ -110,6 +110,9 @@ def _in_library(name: str) -> Any:
     models = library()
     if name in models:
         return models[name]
+    path = Path(name.rpartition(":")[0] or name)
+    if path.is_file() or len(path.parts) > 1:
+        raise CommandError(f"{name} is no Python file, expected one, as robot.py:Robot")
     module, dot, last = name.rpartition(".")
     try:
         if dot and hasattr(found := importlib.import_module(module), last):

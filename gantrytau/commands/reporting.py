@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import typer
 
@@ -46,7 +46,7 @@ def reporting(json: bool, source: Path | None = None) -> Iterator[None]:
         fail(in_words(error, lines), FAULT, json, kind=type(error).__name__)
 
 
-def fail(message: str, code: int, json: bool, **more: Any) -> None:
+def fail(message: str, code: int, json: bool, **more: Any) -> NoReturn:
     """Say what is wrong, on stdout as JSON or else on stderr, and leave with an exit code."""
     if json:
         typer.echo(as_json({"error": message, **more}))

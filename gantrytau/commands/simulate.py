@@ -1,7 +1,7 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and pictures."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -69,7 +69,6 @@ def simulate(
             result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
         except SolveError as error:
             _stop(error, output, json)
-            raise
         files = _save(result, output)
         if drawn:
             files += pictures.draw(result, drawn, to)
@@ -99,10 +98,14 @@ def _rehearse(output: Path | None, to: str | None) -> None:
 
 
 def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
+    """The model with the derivatives that are to be drawn; ModelError for a name that it does not have."""
     from gantrytau import translate
 
     with busy(f"translating {chosen.name}"):
-        return translate(chosen.model, find=drawn)
+        dae = translate(chosen.model, find=[name for name in drawn if name.startswith("der(")])
+    for name in drawn:
+        dae.expand(name)
+    return dae
 
 
 def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
@@ -111,7 +114,7 @@ def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
     return gantrytau.simulate(dae, inputs=signals, **policy)
 
 
-def _stop(error: SolveError, output: Path | None, json: bool) -> None:
+def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     """Save what a simulation found until it stopped, say so, and leave."""
     pressed = isinstance(error.__context__, KeyboardInterrupt)
     message = str(error).partition(";")[0] if pressed else str(error)

@@ -129,6 +129,13 @@ def test_a_name_that_is_no_model_of_the_file(fails, robots, name, message):
     assert message in fails(MISUSE, "check", f"{robots}{name}")
 
 
+def test_what_is_no_python_file(fails, tmp_path):
+    file = tmp_path / "robot.txt"
+    file.write_text("x = 1\n")
+    assert f"{file} is no Python file, expected one, as robot.py:Robot" in fails(MISUSE, "check", file)
+    assert f"{tmp_path}:Robot is no Python file" in fails(MISUSE, "check", f"{tmp_path}:Robot")
+
+
 def test_a_file_without_models(fails, tmp_path):
     file = tmp_path / "empty.py"
     file.write_text("x = 1\n")

@@ -110,7 +110,7 @@ def test_a_vector_of_the_robot_is_drawn_and_its_files_are_told(run, tmp_path):
         "--stop",
         "0.05",
         "--plot",
-        "tool.r",
+        "tool.r,arms[0].rail.frame_b.R[0,0],time",
         "--to",
         picture,
         "--output",

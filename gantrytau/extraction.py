@@ -1,0 +1,312 @@
+"""The equations of a mechanism between its tool T, its joints q and their forces f, cut out of the model.
+
+The model is translated in the causality of its inverse dynamics: the motion of the tool is known. Then more is made
+known, stratum by stratum, the blocks that follow are solved, and what is left over are the equations.
+
+| known | found | Dressler (2012) |
+|---|---|---|
+| T, q | constraints g(T, q) = 0, left over | 6.3 |
+| T, q, T' | speeds q' = J^-1 T' | 6.5 |
+| T, q, T', q', q'' | accelerations T'' | 6.6 |
+| all, f too | balance R = S1 T'' + S2 q'' + S0(T, q, T', q') - S f = 0, left over | 6.7 |
+
+The forces inside are found from the equations nearest to f, so what is left over is the balance of the tool. Virtual
+work makes it unique: with K S = J^-T, M1 = K S1, M2 = K S2, G = K S0 at rest, and the bias K S0 - G.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.model import Model
+from gantrytau.strata import EVERYTHING, Strata
+from gantrytau.symbols import derivative_name
+from gantrytau.translation import names, translate, translate_flat
+from gantrytau.writing.graph import Graph
+from gantrytau.writing.sharing import written
+from gantrytau.writing.text import PlainSyntax
+
+SAME = 1e-9  # relative difference below which numbers at all sample points count as one constant
+POINTS, SPREAD = 12, 0.1  # sample points around the start, and how far, relative or in SI
+LEAST = 1e-10  # of the largest singular value, below which a matrix is singular
+Sections = tuple[tuple[str, tuple[str, ...]], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """M1 T'' + M2 q'' + G + bias = J^-T f, with constraints g(T, q) = 0 and q' = J^-1 T'; prints itself.
+
+    tool, joints, forces: scalar names, n each, in the order of T, q and f. The functions are CasADi's, vectors (n,), SI:
+    constraints(T, q) -> g (n,); velocity_jacobian(T, q) -> J^-1 (n, n); accelerations(T, q, T', q', q'') -> T'';
+    M1(T, q), M2(T, q) -> (n, n); G(T, q) -> (n,), gravity and other forces of position; bias(T, q, T', q') -> (n,),
+    friction and products of velocities. M1 belongs to what moves with T, M2 to what moves with q, and a body
+    between them to both. They are meant at positions that satisfy the constraints.
+    """
+
+    model: str
+    tool: tuple[str, ...]
+    joints: tuple[str, ...]
+    forces: tuple[str, ...]
+    constraints: ca.Function
+    velocity_jacobian: ca.Function
+    accelerations: ca.Function
+    M1: ca.Function
+    M2: ca.Function
+    G: ca.Function
+    bias: ca.Function
+    written: Sections = field(repr=False)
+
+    def equations(self) -> str:
+        """The four systems of equations in the names of the model, parameters included."""
+        lines = [f"{self.model}"]
+        lines += [f"{role}: {', '.join(getattr(self, attribute))}" for role, attribute in ROLES.items()]
+        for title, rows in self.written:
+            lines += ["", title, *(f"  {row}" for row in rows)]
+        return "\n".join(lines) + "\n"
+
+    def __str__(self) -> str:
+        return self.equations()
+
+
+ROLES = {"T": "tool", "q": "joints", "f": "forces"}
+ARGUMENTS = {
+    "constraints": ("T", "q"),
+    "velocity_jacobian": ("T", "q"),
+    "accelerations": ("T", "q", "dT", "dq", "ddq"),
+    "M1": ("T", "q"),
+    "M2": ("T", "q"),
+    "G": ("T", "q"),
+    "bias": ("T", "q", "dT", "dq"),
+}
+
+
+RELATIONS = ("constraints", "accelerations")  # written as 0 = ...
+TITLES = {
+    "constraints": "constraints of tool and joints (6.3)",
+    "velocity_jacobian": "speeds: q' = J^-1 T' (6.5)",
+    "accelerations": "accelerations: 0 = D' (T'' - q'' e) + c, to be solved for T'' (6.6)",
+    "M1": "balance of forces: M1 T'' + M2 q'' + G + bias = J^-T f (6.7)",
+    "M2": "inertia that moves with the joints",
+    "G": "gravity and other forces of position",
+    "bias": "with friction and products of velocities",
+}
+
+
+def extract_mechanism(
+    model: Model | Dae, *, tool: str | Sequence[str], joints: Sequence[str], forces: Sequence[str]
+) -> Mechanism:
+    """The equations of a mechanism as named functions, extracted from the model.
+
+    tool: names of the tool's coordinates, such as "tool.r"; joints: coordinates of the driven joints; forces: what drives
+    each of them. There are as many of each as the mechanism has degrees of freedom. Other inputs keep their start
+    values. Source: Dressler (2012), section 6.3. Raises ModelError for unknown names and counts that do not fit,
+    StructureError where tool, joints and forces do not determine each other.
+    """
+    dae = model if isinstance(model, Dae) else translate(model)
+    roles = _roles(dae, {"T": tool, "q": joints, "f": forces})
+    strata = Strata(_moved_by_tool(dae, roles), roles)
+    functions = _pieces(strata)
+    weights = _weights(strata, functions)
+    kind = ca.SX if _written_out(functions) else ca.MX
+    arguments = {k: kind.sym(k, len(strata.names(k))) for k in EVERYTHING}
+    systems = _systems(functions, {**arguments, "p": strata.numbers}, weights)
+    found = {
+        name: ca.Function(
+            name, [arguments[k] for k in kinds], [systems[name]], list(kinds), [name.lower()], {"cse": True}
+        )
+        for name, kinds in ARGUMENTS.items()
+    }
+    lists = {ROLES[k]: v for k, v in roles.items()}
+    return Mechanism(model=dae.name, **lists, **found, written=_written(strata, functions, weights))
+
+
+def _roles(dae: Dae, given: Mapping[str, str | Sequence[str]]) -> dict[str, tuple[str, ...]]:
+    """Scalar names of T, q and f; ModelError for names and counts that cannot be right."""
+    found: dict[str, tuple[str, ...]] = {}
+    for role, wanted in given.items():
+        wanted = (wanted,) if role == "T" and isinstance(wanted, str) else names(wanted)
+        found[role] = tuple(n for name in wanted for n in dae.expand(name))
+        for name in found[role]:
+            alias = dae.reduced.aliases.get(name)
+            if alias is None or alias.root is None:
+                what = "constant" if alias else "a derivative, a parameter, or follows from other variables"
+                raise ModelError(
+                    f"{ROLES[role]}: {name} of {dae.name} is {what}, expected a variable that is free to move"
+                )
+            if role != "f" and alias.order > 0:
+                raise ModelError(
+                    f"{ROLES[role]}: {name} of {dae.name} is a speed, expected a position; name what it is the rate of"
+                )
+    mobility = dae.diagnosis.mobility
+    if any(len(scalars) != mobility for scalars in found.values()):
+        counts = ", ".join(f"{len(scalars)} {ROLES[role]}" for role, scalars in found.items())
+        raise ModelError(
+            f"{dae.name}: found {counts}; mobility {mobility} needs {mobility} of each. Name independent coordinates of the "
+            "tool, the driven joints, and one force for each of these"
+        )
+    return found
+
+
+def _moved_by_tool(dae: Dae, roles: Mapping[str, Sequence[str]]) -> Dae:
+    """The same model with the motion of the tool known, and as many inputs unknown."""
+    roots = {dae.reduced.aliases[n].root for n in roles["f"]}
+    others = [n for n in dae.known if n not in roots]
+    if len(dae.known) - len(others) != len(roles["f"]):
+        others = []  # the forces are no inputs: all inputs follow from them
+    accelerations = [derivative_name(n, 2) for n in (*roles["q"], *roles["T"])]
+    try:
+        return translate_flat(dae.flat, given=(*roles["T"], *others), find=accelerations, start=dae.start)
+    except StructureError as error:
+        raise StructureError(
+            f"tool: {', '.join(roles['T'])} cannot be moved at will by {', '.join(roles['f'])}. {error} Name independent "
+            "coordinates of the tool, and forces that act on it"
+        ) from error
+
+
+def _pieces(strata: Strata) -> dict[str, ca.Function]:
+    """Constraints, speeds, accelerations and balance, as functions of what is known and the parameters."""
+    residuals, dae = strata.dae.indexed.residuals, strata.dae
+    positions = strata.cut(("T", "q"))
+    rows = {"constraints": (positions, [residuals[k] for k in positions.left] + list(positions.twins))}
+    for name, known, find, words in (
+        ("speeds", ("T", "q", "dT"), "dq", "the speed of the tool does not determine that of the joints"),
+        ("accelerations", ARGUMENTS["accelerations"], "ddT", "the joints do not determine the tool"),
+    ):
+        cut = strata.cut(known, find, words)
+        rows[name] = (cut, [dae.expression(n) for n in strata.names(find)])
+    motion = strata.cut([k for k in EVERYTHING if k != "f"])
+    last = {i: times for i, times in motion.left if i in strata.constraints}
+    twins = motion.twins[len(motion.twins) - len(positions.twins) :]
+    rows["relations"] = (motion, [*(residuals[k] for k in last.items()), *twins])
+    balance = strata.cut(EVERYTHING)
+    left = [k for k in balance.left if k[0] not in strata.constraints]
+    rows["balance"] = (balance, [residuals[k] for k in left])
+    found = {name: cut.function(name, expressions) for name, (cut, expressions) in rows.items()}
+    n = len(strata.roles["T"])
+    for name in ("constraints", "balance"):
+        if found[name].size1_out(0) != n:
+            raise StructureError(
+                f"{dae.name}: found {found[name].size1_out(0)} equations of {name} between tool and joints, expected {n}; "
+                "name the coordinates of one tool, the joints that move it, and the forces in these joints"
+            )
+    return found
+
+
+def _written_out(functions: Mapping[str, ca.Function]) -> bool:
+    """Whether all blocks have closed forms, so that nothing is found by iteration."""
+    return all(f.is_a("SXFunction") for f in functions.values())
+
+
+def _call(function: ca.Function, values: Mapping[str, Any]) -> Any:
+    return function(*(values[k] for k in function.name_in()))
+
+
+def _slope(function: ca.Function, kind: str, at: Mapping[str, Any]) -> Any:
+    """Derivative by one argument at rest, where the others are zero but for positions and parameters."""
+    rest = {k: type(at["T"]).zeros(*at[k].shape) for k in EVERYTHING}
+    rest |= {k: at[k] for k in ("T", "q", "p")}
+    slope = ca.jacobian(_call(function, {**rest, kind: at[kind]}), at[kind])
+    # what it is multiplied with enters the equations linearly
+    return ca.densify(ca.substitute(slope, at[kind], rest[kind]))
+
+
+def _systems(
+    functions: Mapping[str, ca.Function], at: Mapping[str, Any], weights: ca.DM | None
+) -> dict[str, Any]:
+    """The four systems as expressions of T, q, their rates and p; weights: K where it is constant."""
+    balance, zeros = functions["balance"], {k: type(at["T"]).zeros(*at[k].shape) for k in EVERYTHING}
+    inverse, S = _slope(functions["speeds"], "dT", at), -_slope(balance, "f", at)
+    K = ca.solve(S.T, inverse).T if weights is None else weights
+    G = K @ _call(balance, {**zeros, **{k: at[k] for k in ("T", "q", "p")}})
+    moving = _call(balance, {**zeros, **{k: at[k] for k in ("T", "q", "dT", "dq", "p")}})
+    return {
+        "constraints": _call(functions["constraints"], at),
+        "velocity_jacobian": inverse,
+        "accelerations": _call(functions["accelerations"], at),
+        "M1": K @ _slope(balance, "ddT", at),
+        "M2": K @ _slope(balance, "ddq", at),
+        "G": G,
+        "bias": K @ moving - G,
+    }
+
+
+def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | None:
+    """K of K S = J^-T if it is constant near the start, else None; StructureError where J^-1 or S is singular there."""
+    kind = ca.SX if _written_out(functions) else ca.MX
+    at = {k: kind.sym(k, len(strata.names(k))) for k in EVERYTHING} | {"p": strata.numbers}
+    slopes = [
+        _slope(functions["speeds"], "dT", at),
+        -_slope(functions["balance"], "f", at),
+    ]
+    function = ca.Function("relations", [at["T"], at["q"]], slopes)
+    start = np.concatenate([strata.start("T"), strata.start("q")])
+    steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (POINTS, start.size))
+    found = []
+    for point in (start, *(start + steps * np.maximum(np.abs(start), 1.0))):
+        try:
+            inverse, S = (np.array(m) for m in function(*np.split(point, 2)))
+        except RuntimeError:  # no position of the passive joints there
+            continue
+        if not found:
+            _require_regular(strata, inverse, S)
+        if np.all(np.isfinite(inverse)) and np.all(np.isfinite(S)) and np.linalg.cond(S) < 1 / LEAST:
+            found.append(np.linalg.solve(S.T, inverse).T)
+    weights = found[0]
+    if any(np.abs(other - weights).max() > SAME * np.abs(weights).max() for other in found):
+        return None
+    whole = np.round(weights)
+    return ca.DM(np.where(np.abs(weights - whole) < SAME, whole, weights))
+
+
+def _require_regular(strata: Strata, inverse: np.ndarray, S: np.ndarray) -> None:
+    """StructureError where speeds do not determine each other, or forces do not act."""
+    name, roles = strata.dae.name, {ROLES[k]: ", ".join(v) for k, v in strata.roles.items()}
+    if not np.all(np.isfinite(inverse)):
+        raise StructureError(
+            f"{name}: at the start, the speed of the tool does not determine that of {roles['joints']}, expected one for "
+            "each motion of the tool; name other joints, or another start"
+        )
+    idle = [n for n, column in zip(strata.roles["f"], S.T, strict=True) if not np.any(column)]
+    if idle:
+        raise StructureError(
+            f"{name}: {', '.join(idle)} does not act on the mechanism, expected a force that moves {roles['tool']}; name "
+            f"the forces of {roles['joints']}"
+        )
+    for matrix, words in (
+        (inverse, f"{roles['joints']} do not determine {roles['tool']}"),
+        (S, f"{roles['forces']} do not act independently on {roles['tool']}"),
+    ):
+        sizes = np.linalg.svd(matrix, compute_uv=False)
+        if not sizes[-1] > LEAST * sizes[0]:
+            raise StructureError(
+                f"{name}: at the start, {words} (smallest singular value {sizes[-1]:.2g}, largest {sizes[0]:.2g}), expected "
+                "a regular matrix; name others, or start away from the singular position"
+            )
+
+
+def _written(strata: Strata, functions: Mapping[str, ca.Function], weights: ca.DM | None) -> Sections:
+    """Titles and rows of text; what occurs more than once is written once, in front."""
+    if not _written_out(functions):
+        return tuple((title, ("found by iteration, not in closed form",)) for title in TITLES.values())
+    systems = _systems(functions, {**strata.columns, "p": strata.p}, weights)
+    systems["bias"] = systems["G"] + systems["bias"]
+    systems["accelerations"] = _call(functions["relations"], {**strata.columns, "p": strata.p})
+    values = {name: ca.SX(systems[name]) for name in TITLES}
+    elements = [element for value in values.values() for element in ca.densify(value).elements()]
+    text = written(Graph().read(elements), PlainSyntax())
+    right = iter(text.expressions)
+    sections = [("abbreviations", tuple(f"{name} = {value}" for name, value in text.definitions))]
+    for name, value in values.items():
+        head = {"velocity_jacobian": "J^-1", "bias": "(G + bias)"}.get(name, name)
+        rows = {}
+        for j, i in np.ndindex(value.shape[1], value.shape[0]):
+            left = f"{head}[{i},{j}]" if value.shape[1] > 1 else f"{head}[{i}]"
+            rows[i, j] = f"{'0' if name in RELATIONS else left} = {next(right).text}"
+        shown = [rows[at] for at in sorted(rows) if name in RELATIONS or not value[at].is_zero()]
+        sections.append((TITLES[name], tuple(shown) or ("all zero",)))
+    return tuple(sections)

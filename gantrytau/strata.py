@@ -1,0 +1,217 @@
+"""Cuts through the equations of a mechanism: some quantities are known, the blocks that follow are solved.
+
+A mechanism has tool coordinates T, joint coordinates q and forces f, and dT, dq, ddT, ddq are their rates. The
+equations that a cut leaves over are relations between what is known: constraints, and the balance of forces.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.blocks import block_pattern
+from gantrytau.dae import Dae
+from gantrytau.errors import StructureError
+from gantrytau.guide import Guide
+from gantrytau.index_reduction import Key
+from gantrytau.solution import Block, solve_blocks
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.translation import all_symbols
+
+ORDERS = {
+    "T": ("T", 0),
+    "dT": ("T", 1),
+    "ddT": ("T", 2),
+    "q": ("q", 0),
+    "dq": ("q", 1),
+    "ddq": ("q", 2),
+    "f": ("f", 0),
+}
+EVERYTHING = tuple(ORDERS)
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Blocks solved from what is known; left: equations that are relations of known quantities.
+
+    twins: relations of the same kind between coordinates that are aliases of each other.
+    """
+
+    strata: "Strata"
+    kinds: tuple[str, ...]
+    known: Mapping[str, ca.SX]
+    blocks: tuple[Block, ...]
+    left: tuple[Key, ...]
+    twins: tuple[ca.SX, ...]
+
+    def function(self, name: str, expressions: Sequence[ca.SX]) -> ca.Function:
+        """Expressions as a function of the known quantities, one vector each, and of the parameters p."""
+        dae, strata = self.strata.dae, self.strata
+        implicit = [b for b in self.blocks if b.solution is None]
+        definitions = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
+        definitions += [d for block in self.blocks for d in block.definitions]
+        found = [*(r for b in implicit for r in b.residuals), _column(expressions)]
+        if definitions:
+            symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
+            _, found = ca.substitute_inplace(symbols, values, found, False)
+        if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
+            raise StructureError(
+                f"{dae.name}: its equations depend on time explicitly, expected a mechanism whose equations do not; make "
+                "what varies an Input, which keeps its start value here"
+            )
+        arguments = [*(strata.columns[k] for k in self.kinds), strata.p]
+        inside = [*self.kinds, "p"]
+        if not implicit:
+            return ca.Function(name, arguments, [found[-1]], inside, ["value"], {"cse": True})
+        return _iterated(name, implicit, list(found), arguments, inside, dae)
+
+
+def _iterated(
+    name, implicit: Sequence[Block], found: list[ca.SX], arguments, inside, dae: Dae
+) -> ca.Function:
+    """Blocks without closed form are solved by Newton's method, one after another."""
+    x = [ca.MX.sym(k, a.shape[0]) for k, a in zip(inside, arguments, strict=True)]
+    a, before, solved, place = ca.vertcat(*arguments), ca.SX(0, 1), ca.MX(0, 1), 0
+    options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
+    for number, block in enumerate(implicit):
+        y, count = ca.vertcat(*block.tears), len(block.tears)
+        residual = ca.Function(
+            "residual", [y, ca.vertcat(a, before)], [ca.vertcat(*found[place : place + count])], {"cse": True}
+        )
+        place += count
+        newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
+        guess = ca.DM([dae.start[s.name()] for s in block.tears])
+        solved = ca.vertcat(solved, newton(guess, ca.vertcat(*x, solved)))
+        before = ca.vertcat(before, y)
+    outside = ca.Function("rest", [a, before], [found[-1]], {"cse": True})
+    return ca.Function(name, x, [outside(ca.vertcat(*x), solved)], inside, ["value"])
+
+
+class Strata:
+    """The equations of a mechanism whose tool moves as a known function of time, ready to be cut.
+
+    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's; p: symbols
+    of the parameters; numbers: their values; constraints: which equations relate T and q alone.
+    """
+
+    def __init__(self, dae: Dae, roles: Mapping[str, Sequence[str]]):
+        self.dae, self.roles = dae, roles
+        self.columns = {k: _column([ca.SX.sym(n) for n in self.names(k)]) for k in EVERYTHING}
+        self.p = _column([dae.table.symbols[n] for n in dae.table.independent])
+        self.numbers = ca.DM([dae.table.values[n] for n in dae.table.independent])
+        self.constraints: frozenset[int] = frozenset()
+        self.distance = self._distances()
+        self.constraints = frozenset(i for i, _ in self.cut(("T", "q")).left)
+
+    def names(self, kind: str) -> list[str]:
+        """Scalar names of a kind: `der(x)` for rates."""
+        role, order = ORDERS[kind]
+        return [derivative_name(n, order) for n in self.roles[role]]
+
+    def start(self, kind: str) -> np.ndarray:
+        """Values of a kind at the consistent start, (n,)."""
+        return self.dae.numbers(self.names(kind), self.dae.start)
+
+    def cut(self, kinds: Sequence[str], find: str = "", why: str = "") -> Cut:
+        """The blocks from `kinds` to `find`, or to the equations left over; `why`: opens the error if there is no way."""
+        known, twins = self._known(kinds)
+        residuals = self.dae.indexed.residuals
+        unknowns = [n for n in all_symbols(self.dae.indexed, self.dae.reduced.known) if n not in known]
+        keys = sorted(residuals, key=lambda k: (k[0] in self.constraints, self.distance.get(k, 0), k))
+        served = _served([_inside(residuals[k], set(unknowns)) for k in keys])
+        left = tuple(sorted(k for k, matched in zip(keys, served, strict=True) if not matched))
+        wanted = [self.dae.expression(n) for n in self.names(find)] if find else []
+        wanted += [residuals[k] for k in left] if not find else []
+        symbols = {s.name() for e in wanted for s in ca.symvar(e)} & set(unknowns)
+        rest = {k: residuals[k] for k in sorted(residuals) if k not in left}
+        pattern = block_pattern(rest, unknowns, sorted(symbols))
+        if pattern.undetermined:
+            raise StructureError(
+                f"{self.dae.name}: {why or 'the equations left over have unknowns'}. Undetermined: "
+                f"{', '.join(pattern.undetermined[:5])}. Expected tool, joints and forces that together describe the whole "
+                "mechanism: name others"
+            )
+        by_name = {n: self.dae.reduced.chains.named(n) for _, found in pattern.blocks for n in found}
+        guide = Guide(self.dae.start, self.dae.table.values, self.dae.choice.states)
+        return Cut(
+            self, tuple(kinds), known, tuple(solve_blocks(pattern.blocks, rest, by_name, guide)), left, twins
+        )
+
+    def _known(self, kinds: Iterable[str]) -> tuple[dict[str, ca.SX], tuple[ca.SX, ...]]:
+        """Expression of each known symbol; relations where two coordinates are the same one."""
+        dae = self.dae
+        known: dict[str, ca.SX] = {}
+        twins: list[ca.SX] = []
+        for kind in kinds:
+            for name, argument in zip(self.names(kind), self.columns[kind].elements(), strict=True):
+                base, order = split_derivative(name)
+                alias = dae.reduced.aliases[base]
+                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+                symbol = derivative_name(alias.root or "", alias.order + order)
+                value = (argument - offset) / alias.factor
+                if symbol in known:
+                    twins.append(value - known[symbol])
+                else:
+                    known[symbol] = value
+        inputs = [n for n in dae.known if n not in known]
+        for symbol in all_symbols(dae.indexed, dae.reduced.known):
+            base, order = split_derivative(symbol)
+            if base in inputs and base not in {dae.reduced.aliases[n].root for n in self.roles["T"]}:
+                known[symbol] = ca.SX(dae.start[symbol] if order == 0 else 0.0)
+        return known, tuple(twins)
+
+    def _distances(self) -> dict[Key, int]:
+        """How many equations away from a force f each equation is, when all motion is known."""
+        known, _ = self._known(EVERYTHING)
+        forces = {s for s in self._known(["f"])[0] if split_derivative(s)[0] not in self.dae.known}
+        found: dict[Key, int] = {}
+        rows = {
+            k: {s.name() for s in ca.symvar(r)} - (known.keys() - forces)
+            for k, r in self.dae.indexed.residuals.items()
+        }
+        reached, level = set(forces), 0
+        while front := [k for k, row in rows.items() if k not in found and row & reached]:
+            found.update(dict.fromkeys(front, level))
+            reached |= {n for k in front for n in rows[k]}
+            level += 1
+        return {k: found.get(k, level) for k in rows}
+
+
+def _served(rows: Sequence[Sequence[str]]) -> list[bool]:
+    """Which rows have an unknown of their own in a largest pairing; earlier rows are served first."""
+    row_of: dict[str, int] = {}
+    name_of: dict[int, str] = {}
+    for start in range(len(rows)):
+        came_from: dict[str, int] = {}
+        queue = [start]
+        for i in queue:
+            new = [n for n in rows[i] if n not in came_from]
+            came_from.update(dict.fromkeys(new, i))
+            free = next((n for n in new if n not in row_of), None)
+            if free is not None:
+                _shift(free, start, came_from, row_of, name_of)
+                break
+            queue += [row_of[n] for n in new]
+    return [i in name_of for i in range(len(rows))]
+
+
+def _shift(
+    free: str, start: int, came_from: Mapping[str, int], row_of: dict[str, int], name_of: dict[int, str]
+):
+    """Pair row `start` by moving the rows on the path from it to a free unknown."""
+    while True:
+        row = came_from[free]
+        before = name_of.get(row)
+        row_of[free], name_of[row] = row, free
+        if row == start or before is None:
+            return
+        free = before
+
+
+def _inside(residual: ca.SX, unknowns: set[str]) -> list[str]:
+    return [s.name() for s in ca.symvar(residual) if s.name() in unknowns]
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
