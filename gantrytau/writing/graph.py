@@ -225,6 +225,10 @@ class Graph:
         if a.negative or b.negative:
             quotient = self.divide(*(self.negate(x) if x.negative else x for x in (a, b)))
             return quotient if a.negative and b.negative else self.negate(quotient)
-        if a.operation == "mul" and a.arguments[0] is b and b.operation == "number":
-            return a.arguments[1]
+        if a.operation == "mul" and a.arguments[0].operation == "number":
+            factor, rest = a.arguments
+            if factor is b:
+                return rest
+            if b.operation == "mul" and factor is b.arguments[0]:
+                return self.divide(rest, b.arguments[1])
         return a if b.is_number(1.0) else self.node("div", a, b)

@@ -28,6 +28,7 @@ SELECT = {
     StateSelect.NEVER: "never", StateSelect.AVOID: "avoid",
     StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
 }  # fmt: skip
+LEAST_SAVING = 40  # nodes; each name is one more unknown for the tool that reads the text
 
 
 def modelica_text(dae: "Dae") -> str:
@@ -71,7 +72,7 @@ class _Writer:
         for name, node in propagated.items():
             if not node.leaf:
                 named.setdefault(node, Written(quoted(name)))
-        text = written([*sides, *propagated.values()], self.syntax, named)
+        text = written([*sides, *propagated.values()], self.syntax, named, saving=LEAST_SAVING)
         pairs = list(
             zip(text.expressions[: len(sides) : 2], text.expressions[1 : len(sides) : 2], strict=True)
         )

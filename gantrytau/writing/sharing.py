@@ -1,7 +1,7 @@
 """Subexpressions that are written once and referred to by name.
 
 An orientation at the end of a chain of joints is a small graph but, written out, a text that grows
-exponentially with the chain. A subexpression is given a name if that saves SAVING nodes of text.
+exponentially with the chain. A subexpression is given a name if that saves enough nodes of text.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from gantrytau.writing.graph import Node
 from gantrytau.writing.syntax import Syntax, Written, ordered, write
 
-SAVING = 20  # nodes; below it, a name costs the reader more than the repetition
+SAVING = 7  # nodes; for readers, who see at once what a name stands for
 SMALLEST = 6  # nodes; a sum of three is clearer than a name
 
 
@@ -25,8 +25,11 @@ class Text:
     expressions: tuple[Written, ...]
 
 
-def worth_a_name(roots: Iterable[Node], named: Collection[Node] = ()) -> list[Node]:
-    """The nodes below `roots` to be written apart, each after those it needs; `named` have names already."""
+def worth_a_name(roots: Iterable[Node], named: Collection[Node] = (), saving: int = SAVING) -> list[Node]:
+    """The nodes below `roots` to be written apart, each after those it needs.
+
+    named: nodes that have names already; saving: least number of nodes that a name has to save.
+    """
     roots = list(roots)
     uses: dict[Node, int] = {}
     order = ordered(roots)
@@ -39,17 +42,25 @@ def worth_a_name(roots: Iterable[Node], named: Collection[Node] = ()) -> list[No
         saved = (uses[node] - 1) * size[node]
         if node in named:
             size[node] = 1
-        elif not (node.leaf or node.boolean) and size[node] >= SMALLEST and saved >= SAVING:
+        elif not (node.leaf or node.boolean) and size[node] >= SMALLEST and saved >= saving:
             found.append(node)
             size[node] = 1
     return found
 
 
-def written(roots: Iterable[Node], syntax: Syntax, named: Mapping[Node, Written] | None = None) -> Text:
-    """`roots` in a language, with their shared subexpressions apart; `named` are written apart under these names."""
+def written(
+    roots: Iterable[Node],
+    syntax: Syntax,
+    named: Mapping[Node, Written] | None = None,
+    saving: int = SAVING,
+) -> Text:
+    """`roots` in a language, with their shared subexpressions apart; `named` are written apart under these names.
+
+    saving: least number of nodes that a name has to save. Raises ModelError for what the language cannot say.
+    """
     roots = list(roots)
     names = dict(named or {})
-    shared = worth_a_name(roots, names)
+    shared = worth_a_name(roots, names, saving)
     names |= {node: syntax.shared(number) for number, node in enumerate(shared, start=1)}
     found = write(roots, syntax, names)
     definitions = tuple((names[node].text, text.text) for node, text in found.items() if node in names)

@@ -1,0 +1,175 @@
+"""Text, LaTeX and HTML: complete, well formed, and with the origin of every equation."""
+
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import casadi as ca
+import pytest
+from matplotlib.mathtext import MathTextParser
+
+from gantrytau import Input, Model, ModelError, Parameter, Real, der, translate
+from gantrytau.mechanics.translational import LinearFriction
+from gantrytau_models import GantryTau, Pendulum, prototypes
+
+VOID = {"meta", "br"}
+
+
+class Rotor(Model):
+    """A turning mass on a spring that is stiff to one side."""
+
+    J = Parameter(2.0, unit="kg.m2", description="moment of inertia")
+    phi_rel0 = Parameter(0.5, unit="rad", description='angle <of> rest & "more", 50 % of x_y')
+    phi = Real(unit="rad", description="angle")
+    w = Real(unit="rad/s", description="angular velocity")
+    tau = Input(unit="N.m", description="torque")
+
+    def equations(self):
+        yield self.w == der(self.phi)
+        yield self.J * der(self.w) == self.tau - 2e-7 * ca.fabs(self.phi - self.phi_rel0)
+
+
+class Named(Model):
+    """Names of every kind, with an awkward description."""
+
+    shaft = Rotor()
+    kinetic_energy = Real(unit="J", description="energy")
+    power = Real(unit="W")
+    r = Real(2, unit="1", start=0.3)
+
+    def equations(self):
+        yield self.kinetic_energy == self.shaft.J / 2 * self.shaft.w**2
+        yield self.power == der(self.kinetic_energy)
+        yield der(self.r) == -self.r
+
+
+@pytest.fixture(scope="module", params=["pendulum", "robot", "names"])
+def dae(request):
+    models = {
+        "pendulum": Pendulum,
+        "robot": lambda: GantryTau(prototypes.L1, friction=LinearFriction),
+        "names": Named,
+    }
+    return translate(models[request.param](), units=request.param != "names")
+
+
+class Page(HTMLParser):
+    """Collects texts, links and anchors; asserts that tags are closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str | None]] = []
+        self.texts: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.attributes += [(tag, key, value) for key, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+    def values(self, key: str) -> list[str]:
+        return [value or "" for _, k, value in self.attributes if k == key]
+
+
+def read_page(text: str) -> Page:
+    page = Page()
+    page.feed(text)
+    page.close()
+    assert page.open == []
+    return page
+
+
+def test_every_block_is_in_every_format(dae):
+    text, latex, page = (dae.equations(f) for f in ("text", "latex", "html"))
+    for number, block in enumerate(dae.blocks, start=1):
+        assert f"\n[{number}] " in text
+        assert rf"\paragraph{{Block {number}}}" in latex
+        assert f"[{number}] " in page
+        for key in block.equations:
+            name = dae.reduced.equations[key[0]].name.partition(",")[0]
+            assert name in text
+            assert name in page
+    assert latex.count(r"\begin{align*}") == len(dae.blocks)
+
+
+def test_the_page_is_closed_in_itself_and_its_links_arrive(dae):
+    text = dae.equations("html")
+    page = read_page(text)
+    anchors = page.values("id")
+    assert len(anchors) == len(set(anchors))
+    assert {link.removeprefix("#") for link in page.values("href")} <= set(anchors)
+    assert "http" not in text
+    assert not page.values("src")
+
+
+def test_the_page_has_every_equation_variable_and_value(dae):
+    page = read_page(dae.equations("html"))
+    texts = set(page.texts)
+    assert {e.name for e in dae.flat.equations} <= {
+        t.removesuffix(" (follows from the others)") for t in texts
+    }
+    assert set(dae.variables) - set(dae.flat.definitions) | set(dae.parameters) <= texts
+    descriptions = {v.description for v in (*dae.flat.variables, *dae.flat.parameters)} - {""}
+    assert descriptions <= texts
+
+
+def test_formulas_of_the_page_are_well_formed(dae):
+    formulas = re.findall(r"<math.*?</math>", dae.equations("html"), flags=re.DOTALL)
+    assert len(formulas) >= len(dae.flat.equations) + len(dae.blocks)
+    for formula in formulas:
+        for fraction in ElementTree.fromstring(formula).iter():
+            assert fraction.tag not in ("mfrac", "msup") or len(fraction) == 2
+
+
+def test_latex_has_balanced_braces_and_environments(dae):
+    latex = dae.equations("latex")
+    bare = re.sub(r"\\[{}]", "", latex)
+    depth = 0
+    for letter in bare:
+        depth += (letter == "{") - (letter == "}")
+        assert depth >= 0
+    assert depth == 0
+    assert latex.count(r"\left") == latex.count(r"\right")
+    stack = []
+    for word, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", latex):
+        assert word == "begin" or stack.pop() == name
+        stack += [name] if word == "begin" else []
+    assert stack == []
+    outside = re.sub(r"\$[^$]*\$|\\begin\{align\*\}.*?\\end\{align\*\}|%.*", "", latex, flags=re.DOTALL)
+    assert not re.search(r"(?<!\\)[_^&#]", outside)
+
+
+def test_an_independent_reader_of_formulas_accepts_the_latex(dae):
+    parser = MathTextParser("path")
+    for body in re.findall(
+        r"\\begin\{align\*\}(.*?)\\end\{align\*\}", dae.equations("latex"), flags=re.DOTALL
+    ):
+        if r"\begin{cases}" in body:  # which matplotlib does not know
+            continue
+        for row in body.strip().split(" \\\\\n"):
+            assert row.count("&") == 1
+            parser.parse(f"${row.replace('&', '').replace(chr(92) + 'quad{}', '')}$")
+
+
+def test_latex_writes_letters_indices_and_dots():
+    latex = translate(Named(), units=False).equations("latex")
+    assert r"\mathit{shaft}.\ddot{\varphi}" in latex
+    assert r"\mathit{shaft}.\tau" in latex
+    assert r"\varphi_{\mathit{rel0}}" in latex
+    assert r"\dot{r}_{0}" in latex
+    assert r"\mathit{kinetic\_energy}" in latex
+    assert r"2 \cdot 10^{-7}" in latex
+    assert r"\left|" in latex
+
+
+def test_formats_other_than_the_four_are_refused():
+    with pytest.raises(
+        ModelError, match=r"Pendulum.equations\(format='pdf'\): expected one of 'text', 'latex'"
+    ):
+        translate(Pendulum()).equations("pdf")  # pyright: ignore[reportArgumentType]
