@@ -188,7 +188,7 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
 
 
 def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in, names_out) -> ca.Function:
-    """Blocks without closed form are solved by Newton's method, one after another."""
+    """Blocks without closed form are solved one after another: linear ones outright, others by Newton's method."""
     q = ca.vertcat(*arguments)
     x = [ca.MX.sym(name, a.shape[0]) for name, a in zip(names_in, arguments, strict=True)]
     qx = ca.vertcat(*x)
@@ -198,11 +198,18 @@ def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in
         y = ca.vertcat(*block.tears)
         f = ca.vertcat(*expressions[place : place + len(block.tears)])
         place += len(block.tears)
-        residual = ca.Function("residual", [y, ca.vertcat(q, before)], [f], {"cse": True})
-        options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
-        newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
-        guess = ca.DM([dae.start[s.name()] for s in block.tears])
-        solved = ca.vertcat(solved, newton(guess, ca.vertcat(qx, solved)))
+        known = ca.vertcat(qx, solved)
+        if block.kind == "linear":
+            matrix = ca.jacobian(f, y)
+            inputs = ca.Function("linear", [ca.vertcat(q, before)], [matrix, ca.substitute(f, y, 0 * y)], {"cse": True})
+            a, b = inputs(known)
+            found = ca.solve(a, -b, "qr")
+        else:
+            residual = ca.Function("residual", [y, ca.vertcat(q, before)], [f], {"cse": True})
+            options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
+            newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
+            found = newton(ca.DM([dae.start[s.name()] for s in block.tears]), known)
+        solved = ca.vertcat(solved, found)
         before = ca.vertcat(before, y)
     outside = ca.Function("rest", [q, before], list(expressions[place:]), {"cse": True})
     found = outside(qx, solved)

@@ -4,8 +4,9 @@ Positions first, then velocities, then accelerations and forces: a joint solve o
 positions that are already consistent. Values with a start move a hundred times less gladly than others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -16,7 +17,8 @@ STIFFNESS = 1e-2  # how far a value with a start moves, compared with one withou
 TOLERANCE = (
     1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
 )
-ITERATIONS = 60
+ITERATIONS = 100
+LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +29,21 @@ class Level:
     names: tuple[str, ...]  # of the residuals, for messages
     unknowns: tuple[str, ...]
 
+    @cached_property
+    def leaves(self) -> tuple[str, ...]:
+        """Names of all symbols in the residuals."""
+        return tuple(leaf.name() for leaf in ca.symvar(ca.vertcat(*self.residuals)))
+
+    @cached_property
+    def function(self) -> ca.Function:
+        """From the numbers of the leaves to the residuals and their derivatives by the leaves."""
+        residual = ca.vertcat(*self.residuals)
+        x = ca.vertcat(*ca.symvar(residual))
+        return ca.Function("level", [x], [ca.densify(residual), ca.jacobian(residual, x)], {"cse": True})
+
 
 def solve_levels(
     levels: Sequence[Level],
-    symbols: Mapping[str, ca.SX],
     values: Mapping[str, float],
     *,
     held: frozenset[str],
@@ -48,54 +61,89 @@ def solve_levels(
         if level.residuals:
             free = [n for n in moving if n not in started]
             try:  # starts that fit together are held
-                _solve(level, free, symbols, values, started, title)
+                _solve(level, free, values, started, title)
             except InitializationError:
-                _solve(level, moving, symbols, values, started, title)
+                _solve(level, moving, values, started, title)
     return values
 
 
-def _solve(level: Level, moving: list[str], symbols, values: dict[str, float], started, title: str) -> None:
-    residual = ca.vertcat(*level.residuals)
-    x = ca.vertcat(*(symbols[n] for n in moving)) if moving else ca.SX(0, 1)
-    others = [leaf for leaf in ca.symvar(residual) if leaf.name() not in set(moving)]
-    given = ca.DM([values[leaf.name()] for leaf in others])
-    here = ca.substitute(residual, ca.vertcat(*others), given) if others else residual
-    slopes = ca.jacobian(here, x)
-    evaluate = ca.Function("level", [x], [ca.densify(here), ca.densify(slopes)])
+def _solve(level: Level, moving: Sequence[str], values: dict[str, float], started, title: str) -> None:
+    place = {n: k for k, n in enumerate(level.leaves)}
+    moving = [n for n in moving if n in place]
+    columns = [place[n] for n in moving]
+    around = np.array([values[n] for n in level.leaves])
     weights = np.array([STIFFNESS if n in started else 1.0 for n in moving])
-    point = np.array([values[n] for n in moving])
 
-    def at(point: np.ndarray):
-        f, jacobian = evaluate(point)
-        return np.array(f).ravel(), np.array(jacobian).reshape(len(level.residuals), len(moving))
+    def at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        around[columns] = point
+        f, jacobian = level.function(around)
+        return np.array(f).ravel(), np.array(jacobian)[:, columns]
 
-    point = _propagated(at, point, slopes.sparsity(), {k for k, n in enumerate(moving) if n not in started})
-    f, jacobian = at(point)
-    for _ in range(ITERATIONS):
-        if not np.all(np.isfinite(f)):
-            break
-        # a residual is judged against the size of the terms it is the difference of
-        scale = np.maximum(np.abs(jacobian) @ np.abs(point) if moving else 0.0, 1.0)
-        if np.all(np.abs(f) <= TOLERANCE * scale):
-            break
-        rows = np.maximum(np.linalg.norm(jacobian * weights, axis=1), 1e-30)
-        step = weights * np.linalg.lstsq(jacobian * weights / rows[:, None], -f / rows, rcond=1e-11)[0]
-        point, f, jacobian, moved = _line_search(at, point, step, f, rows, jacobian)
-        if not moved:
-            break
-    scale = np.maximum(np.abs(jacobian) @ np.abs(point) if moving else 0.0, 1.0)
+    pattern = level.function.sparsity_out(1)
+    point = around[columns]
+    missing = {column: k for k, column in enumerate(columns) if moving[k] not in started}
+    point = _propagated(at, point, pattern, missing)
+    point, f, jacobian = newton(at, point, weights)
+    scale = _terms(jacobian, point)
     bad = ~(np.abs(f) <= 1e-9 * scale)
     if np.any(bad):
         raise InitializationError(_failure(level, f, bad, title))
     values.update(zip(moving, point.tolist(), strict=True))
 
 
-def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: set[int]) -> np.ndarray:
+def _terms(jacobian: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """The size of the terms that each residual is the difference of."""
+    return np.maximum(np.abs(jacobian) @ np.abs(point), 1.0)
+
+
+def newton(
+    at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], point: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solve at(point) = (f, jacobian) for f = 0 near a point; returns the last point, f and jacobian.
+
+    Steps are damped as far as the residual asks for it (Levenberg and Marquardt), so that a nearly singular
+    Jacobian on the way, as of a loop that is not yet closed, does not send them far away.
+    """
+    f, jacobian = at(point)
+    damping = 0.0
+    for _ in range(ITERATIONS):
+        if not np.all(np.isfinite(f)) or np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
+            break
+        rows = np.maximum(np.linalg.norm(jacobian * weights, axis=1), 1e-30)
+        scaled, target = jacobian * weights / rows[:, None], -f / rows
+        merit = np.linalg.norm(target)
+        left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
+        along = left.T @ target
+        known = sizes > 1e-11 * sizes[:1]
+        moved = False
+        for _ in range(25):
+            shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
+            step = weights * (right.T @ (shares * along))
+            step *= min(1.0, _longest(point, step))
+            f_new, jacobian_new = at(point + step)
+            size = np.linalg.norm(f_new / rows) if np.all(np.isfinite(f_new)) else np.inf
+            if size < merit * (1 - 1e-4):
+                point, f, jacobian, moved = point + step, f_new, jacobian_new, True
+                damping = 0.0 if size < 0.1 * merit else damping / 10
+                break
+            damping = max(10 * damping, 1e-8)
+        if not moved:
+            break
+    return point, f, jacobian
+
+
+def _longest(point: np.ndarray, step: np.ndarray) -> float:
+    """The share of a step that may be taken at once."""
+    reach = np.maximum(LONGEST_STEP, np.abs(point))
+    return float(np.min(reach / np.maximum(np.abs(step), 1e-300), initial=1.0))
+
+
+def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: Mapping[int, int]) -> np.ndarray:
     """Values without a start computed from those with one, as far as single equations give them outright."""
     rows: dict[int, set[int]] = {}
     for i, j in zip(*pattern.get_triplet(), strict=True):
         if j in missing:
-            rows.setdefault(i, set()).add(j)
+            rows.setdefault(i, set()).add(missing[j])
     while True:
         single = {next(iter(left)): i for i, left in rows.items() if len(left) == 1}
         if not single:
@@ -112,19 +160,6 @@ def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: set[int]) 
                 new[j] = point[j]
         point = new
         rows = {i: left - single.keys() for i, left in rows.items()}
-
-
-def _line_search(at, point, step, f, rows, jacobian):
-    """Halve the step until the residual falls; near the end, where rounding rules, accept standing still."""
-    merit = np.linalg.norm(f / rows)
-    length = 1.0
-    for _ in range(25):
-        new = point + length * step
-        f_new, jacobian_new = at(new)
-        if np.all(np.isfinite(f_new)) and np.linalg.norm(f_new / rows) < merit * (1 - 1e-4 * length):
-            return new, f_new, jacobian_new, True
-        length /= 2
-    return point, f, jacobian, False
 
 
 def _failure(level: Level, f: np.ndarray, bad: np.ndarray, title: str) -> str:

@@ -175,8 +175,10 @@ class Dae:
             shifted = type(alias)(
                 alias.root, alias.order + order, alias.factor, alias.offset if order == 0 else ca.SX(0)
             )
-            return self.table.reduce(alias_expression(shifted, self.reduced.chains))
-        return self.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+            found = alias_expression(shifted, self.reduced.chains)
+        else:
+            found = alias.offset if order == 0 else ca.SX(0)
+        return found if alias.offset.is_constant() else self.table.reduce(found)
 
     def reduce(self, expression: ca.SX) -> ca.SX:
         """An expression of the flat model's symbols in the symbols of the reduced equations; others stay."""
@@ -226,10 +228,18 @@ class Dae:
 
     def numbers(self, names: Iterable[str], values: Mapping[str, float]) -> np.ndarray:
         """Values of scalars, from numbers of all symbols of the reduced equations."""
-        expressions = ca.SX(ca.vertcat(*(self.expression(n) for n in names)))
-        leaves = ca.symvar(expressions)
-        function = ca.Function("numbers", [ca.vertcat(*leaves)], [ca.densify(expressions)])
-        return np.array(function(ca.DM([values[leaf.name()] for leaf in leaves]))).ravel()
+        names = tuple(names)
+        if names not in self._numbers:
+            expressions = ca.SX(ca.vertcat(*(self.expression(n) for n in names)))
+            leaves = ca.symvar(expressions)
+            function = ca.Function("numbers", [ca.vertcat(*leaves)], [ca.densify(expressions)])
+            self._numbers[names] = ([leaf.name() for leaf in leaves], function)
+        leaves, function = self._numbers[names]
+        return np.array(function(ca.DM([values[name] for name in leaves]))).ravel()
+
+    @cached_property
+    def _numbers(self) -> dict[tuple[str, ...], tuple[list[str], ca.Function]]:
+        return {}
 
     def equation_name(self, key: Key) -> str:
         """Where an equation of a block comes from."""

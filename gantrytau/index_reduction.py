@@ -7,11 +7,13 @@ consistent values are found: positions, then velocities, then accelerations and 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.aliases import Reduced
+from gantrytau.consistency import Level
 from gantrytau.errors import StructureError
 from gantrytau.flat_model import FlatModel
 from gantrytau.matching import best_matching, largest_matching
@@ -24,11 +26,12 @@ Key = tuple[int, int]  # equation, times differentiated
 class Indexed:
     """The equations with all their derivatives that are needed.
 
-    residuals: by (equation, times differentiated); counts: how often each equation is differentiated;
-    orders: highest derivative of each unknown, by name; structural_index as Pryce defines it.
+    residuals: by (equation, times differentiated); names: of the equations; counts: how often each
+    equation is differentiated; orders: highest derivative of each unknown, by name; structural_index as Pryce defines it.
     """
 
     residuals: Mapping[Key, ca.SX]
+    names: tuple[str, ...]
     counts: tuple[int, ...]
     orders: Mapping[str, int]
 
@@ -37,6 +40,17 @@ class Indexed:
         """Differentiation index of the equations as their structure shows it."""
         algebraic = any(order == 0 for order in self.orders.values())
         return max(self.counts, default=0) + int(algebraic)
+
+    @cached_property
+    def levels(self) -> tuple[Level, ...]:
+        """Positions, velocities, accelerations and forces: the equations and unknowns of each level."""
+        found: list[Level] = []
+        for stage in range(-max(self.orders.values(), default=0), 1):
+            keys = [(i, stage + c) for i, c in enumerate(self.counts) if stage + c >= 0]
+            unknowns = [derivative_name(n, stage + top) for n, top in self.orders.items() if stage + top >= 0]
+            words = [self.names[i] + (f", differentiated {m} times" if m else "") for i, m in keys]
+            found.append(Level(tuple(self.residuals[k] for k in keys), tuple(words), tuple(unknowns)))
+        return tuple(found)
 
     def unknown_symbols(self) -> list[str]:
         """Every unknown with all its derivatives up to the highest, by name."""
@@ -51,7 +65,8 @@ def reduce_index(reduced: Reduced, flat: FlatModel) -> Indexed:
     counts, tops = _offsets(reduced, signature, flat)
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
-    return Indexed(residuals, tuple(int(c) for c in counts), orders)
+    names = tuple(e.name for e in reduced.equations)
+    return Indexed(residuals, names, tuple(int(c) for c in counts), orders)
 
 
 def _signature(reduced: Reduced) -> list[dict[int, int]]:

@@ -17,24 +17,6 @@ from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
 
 
-def levels(indexed: Indexed, reduced: Reduced) -> list[Level]:
-    """Positions, velocities, accelerations and forces: the equations and unknowns of each level."""
-    found: list[Level] = []
-    for stage in range(-max(indexed.orders.values(), default=0), 1):
-        keys = [(i, stage + c) for i, c in enumerate(indexed.counts) if stage + c >= 0]
-        unknowns = [derivative_name(n, stage + top) for n, top in indexed.orders.items() if stage + top >= 0]
-        found.append(
-            Level(
-                tuple(indexed.residuals[k] for k in keys),
-                tuple(
-                    reduced.equations[i].name + (f", differentiated {m} times" if m else "") for i, m in keys
-                ),
-                tuple(unknowns),
-            )
-        )
-    return found
-
-
 def consistent_start(
     flat: FlatModel,
     table: ParameterTable,
@@ -45,18 +27,17 @@ def consistent_start(
     free: tuple[str, ...] = (),
 ) -> dict[str, float]:
     """Consistent numbers of all symbols; `held` must not move, `free` are inputs that may (last level)."""
-    stages = levels(indexed, reduced)
+    stages = list(indexed.levels)
     if free:
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
-    symbols = {n: reduced.chains.named(n) for level in stages for n in level.unknowns}
     title, fixed = flat.name, guess.fixed | held
     values = solve_levels(
-        stages, symbols, guess.values, held=fixed, started=guess.started | held, title=title
+        stages, guess.values, held=fixed, started=guess.started | held, title=title
     )
     if flat.initial_equations and not held:
         extra = _initial_level(flat, table, reduced, stages)
-        values = solve_levels([extra], symbols, values, held=fixed, started=guess.started, title=title)
+        values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
     return values
 
 

@@ -175,9 +175,8 @@ def _steady(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
     failures: list[InitializationError] = []
     for unknowns in (tuple(dae.indexed.orders), (*dae.indexed.orders, *free)):
         level = Level(tuple(residuals), equations, unknowns)
-        moving = {n: dae.reduced.chains.named(n) for n in unknowns}
         try:
-            return solve_levels([level], moving, values, held=held, started=started, title=title)
+            return solve_levels([level], values, held=held, started=started, title=title)
         except InitializationError as error:
             failures.append(error)
     raise InitializationError(

@@ -34,7 +34,6 @@ class Constraints:
     """
 
     level: Level
-    symbols: Mapping[str, ca.SX]
     equations: tuple[Equation, ...]
 
     @property
@@ -63,7 +62,7 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
     reduced = eliminate_aliases(bare, table, known)
     constraints = _constraints(flat, table, reduced, duals)
-    guess = starting_guess(flat, table, reduced, list(constraints.symbols))
+    guess = starting_guess(flat, table, reduced, list(constraints.level.leaves))
     closed = _close(constraints, guess, guess.values, flat.name)
     matrices = [_matrix(constraints, closed)]
     matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, matrices[0], flat.name)]
@@ -97,8 +96,7 @@ def _constraints(
         (*(reduced.equations[i].name for i in rows), *(e.name for e in duals)),
         tuple(n for n in reduced.unknowns if n in unknown),
     )
-    leaves = ca.symvar(ca.vertcat(*level.residuals))
-    return Constraints(level, {leaf.name(): leaf for leaf in leaves}, tuple(duals))
+    return Constraints(level, tuple(duals))
 
 
 def _unknowns(expression: ca.SX, reduced: Reduced) -> set[str]:
@@ -111,7 +109,6 @@ def _close(
 ) -> dict[str, float]:
     return solve_levels(
         [constraints.level],
-        constraints.symbols,
         values,
         held=guess.fixed,
         started=guess.started,
@@ -121,11 +118,10 @@ def _close(
 
 def _matrix(constraints: Constraints, values: Mapping[str, float]) -> np.ndarray:
     """Jacobian of the rows, each of length one; rows that are zero stay zero."""
-    rows = ca.vertcat(*constraints.level.residuals)
-    x = ca.vertcat(*(constraints.symbols[n] for n in constraints.level.unknowns))
-    leaves = list(constraints.symbols.values())
-    function = ca.Function("rows", [ca.vertcat(*leaves)], [ca.densify(ca.jacobian(rows, x))])
-    found = np.array(function(ca.DM([values[leaf.name()] for leaf in leaves])))
+    level = constraints.level
+    _, jacobian = level.function(np.array([values[n] for n in level.leaves]))
+    place = {n: k for k, n in enumerate(level.leaves)}
+    found = np.array(jacobian)[:, [place[n] for n in level.unknowns if n in place]]
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
@@ -138,7 +134,7 @@ def _poses(
     free = right[np.count_nonzero(sizes > RANK) :]
     found: list[dict[str, float]] = []
     random = np.random.default_rng(0)
-    names = constraints.level.unknowns
+    names = [n for n in constraints.level.unknowns if n in set(constraints.level.leaves)]
     here = np.array([closed[n] for n in names])
     loose = replace(guess, fixed=frozenset(), started=frozenset())
     for _ in range(POSES if len(free) else 0):

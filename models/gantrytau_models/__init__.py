@@ -1,7 +1,8 @@
-"""Complete models and robots, built from the components of gantrytau."""
+"""Complete models: a pendulum, linkages and the Gantry-Tau robots with their parameters."""
 
 from gantrytau_models import prototypes
 from gantrytau_models.gantry_tau import GantryTau
 from gantrytau_models.pendulum import Pendulum
+from gantrytau_models.six_link import SixLinkGantryTau
 
-__all__ = ["GantryTau", "Pendulum", "prototypes"]
+__all__ = ["GantryTau", "Pendulum", "SixLinkGantryTau", "prototypes"]

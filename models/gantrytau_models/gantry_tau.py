@@ -115,14 +115,7 @@ class GantryTau(Model):
     def __init__(
         self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
     ):
-        if not isinstance(prototype, Prototype):
-            raise TypeError(
-                f"GantryTau: found {prototype!r}, expected a prototype record such as prototypes.L1"
-            )
-        if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
-            raise TypeError(
-                f"GantryTau: found friction={friction!r}, expected a class such as LinearFriction, or None"
-            )
+        carts = driven_carts(prototype, friction, type(self).__name__)
         defaults = dict(
             plate_mass=prototype.plate_mass,
             arms=[
@@ -131,13 +124,8 @@ class GantryTau(Model):
                 )
                 for arm, mass in zip(prototype.arms, prototype.link_masses, strict=True)
             ],
-            carts=[
-                dict(m=mass, law=_law(friction, coulomb, viscous))
-                for mass, coulomb, viscous in zip(
-                    prototype.cart_masses, prototype.coulomb, prototype.viscous, strict=True
-                )
-            ],
-            tool=dict(r=dict(start=_tool_ahead_of_carts(prototype)), v=dict(start=0.0)),
+            carts=carts,
+            tool=dict(r=dict(start=tool_ahead_of_carts(prototype)), v=dict(start=0.0)),
         )
         super().__init__(defaults, **modifications)
 
@@ -153,7 +141,23 @@ def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Fri
     return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
 
 
-def _tool_ahead_of_carts(prototype: Prototype) -> list[float]:
+def driven_carts(prototype: Prototype, friction: type[Friction] | None, robot: str) -> list[dict]:
+    """Modifications of the carts of a robot; TypeError for what is no prototype or no friction."""
+    if not isinstance(prototype, Prototype):
+        raise TypeError(f"{robot}: found {prototype!r}, expected a prototype record such as prototypes.L1")
+    if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
+        raise TypeError(
+            f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"
+        )
+    return [
+        dict(m=mass, law=_law(friction, coulomb, viscous))
+        for mass, coulomb, viscous in zip(
+            prototype.cart_masses, prototype.coulomb, prototype.viscous, strict=True
+        )
+    ]
+
+
+def tool_ahead_of_carts(prototype: Prototype) -> list[float]:
     """A guess of the tool that lies on the branch where the tool is ahead of the carts, carts at s = 1 m."""
     offset = np.mean([arm.offset for arm in prototype.arms], axis=0)
     direction = np.mean([arm.direction for arm in prototype.arms], axis=0)

@@ -1,0 +1,156 @@
+"""The six-link Gantry-Tau robot: the plate is a rigid body that six links hold.
+
+Dressler (2012), section 4.4. Where the links of an arm are exactly parallel and of equal length the plate
+keeps its orientation; offsets and lengths of their own make this the kinematic error model of (4.14).
+"""
+
+import numpy as np
+
+from gantrytau import Array, Model, Parameter, Real, StateSelect, connect
+from gantrytau.mechanics.multibody import (
+    Body,
+    FixedTranslation,
+    Frame,
+    Prismatic,
+    SphericalSpherical,
+    World,
+)
+from gantrytau.mechanics.translational import Flange, Friction, TanhFriction
+from gantrytau_models.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
+from gantrytau_models.prototypes import Prototype
+
+
+class Link(Model):
+    """One link from a cart to the plate, with its joints on both."""
+
+    length = Parameter(unit="m", min=0.0, description="length between the ball joints")
+    offset = Parameter(shape=3, unit="m", description="joint on the cart where s = 0, A_ij of (4.14)")
+    plate_offset = Parameter(
+        shape=3, unit="m", description="joint on the plate, in plate axes, B_ij of (4.14)"
+    )
+    mass = Parameter(0.0, unit="kg", min=0.0, description="mass, in the middle of the link")
+    frame_cart = Frame()
+    frame_plate = Frame()
+    on_cart = FixedTranslation(r=offset)
+    rod = SphericalSpherical(L=length, m=mass)
+    on_plate = FixedTranslation(r=plate_offset)
+
+    def equations(self):
+        yield connect(self.frame_cart, self.on_cart.frame_a)
+        yield connect(self.on_cart.frame_b, self.rod.frame_a)
+        yield connect(self.rod.frame_b, self.on_plate.frame_b)
+        yield connect(self.on_plate.frame_a, self.frame_plate)
+
+
+class Cluster(Model):
+    """Guideway and links of one arm; subclasses say how many links there are."""
+
+    direction = Parameter(
+        shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
+    )
+    frame_a = Frame()
+    frame_cart = Frame()
+    frame_b = Frame()
+    rail = Prismatic(
+        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
+    )
+    links = Array(Link, 1)
+    axis = Flange()
+
+    def equations(self):
+        yield connect(self.frame_a, self.rail.frame_a)
+        yield connect(self.rail.frame_b, self.frame_cart)
+        yield connect(self.rail.axis, self.axis)
+        for link in self.links:
+            yield connect(self.frame_cart, link.frame_cart)
+            yield connect(link.frame_plate, self.frame_b)
+
+
+class TwoLinks(Cluster):
+    """A cluster of two links."""
+
+    links = Array(Link, 2)
+
+
+class ThreeLinks(Cluster):
+    """A cluster of three links."""
+
+    links = Array(Link, 3)
+
+
+class Plate(Body):
+    """The plate with its tool, a rigid body that only the links hold."""
+
+    R = Real((3, 3), unit="1", description="orientation, world = R @ plate")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.R == self.frame_a.R
+
+
+class SixLinkGantryTau(Model):
+    """The six-link Gantry-Tau robot, driven by the actuator forces `carts[i].f`.
+
+    prototype: a record such as `prototypes.L1` with links; friction: the class of friction of the carts, or
+    None. Further keywords modify members. `tool.r`, `tool.v`, `tool.w` and `tool.R` are the pose of the plate;
+    lengths and offsets are the parameters `arms[i].links[j].length`, `.offset`, `.plate_offset`.
+    """
+
+    world = World()
+    arms = Array(Cluster, 3)
+    carts = Array(Cart, 3)
+    tool = Plate(r=dict(prefer=StateSelect.PREFER), v=dict(prefer=StateSelect.PREFER))
+
+    def __init__(
+        self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
+    ):
+        defaults = dict(
+            arms=[_cluster(arm) for arm in prototype.arms],
+            carts=driven_carts(prototype, friction, type(self).__name__),
+            tool=dict(
+                m=prototype.plate_mass,
+                J=np.array(prototype.plate_inertia),
+                r_cm=list(prototype.plate_centre),
+                r=dict(start=tool_ahead_of_carts(prototype)),
+                v=dict(start=0.0),
+                q=dict(start=quaternion(np.array(prototype.plate_rotation))),
+            ),
+        )
+        super().__init__(defaults, **modifications)
+
+    def equations(self):
+        for arm, cart in zip(self.arms, self.carts, strict=True):
+            yield connect(self.world.frame_b, arm.frame_a)
+            yield connect(arm.frame_cart, cart.frame)
+            yield connect(arm.axis, cart.axis)
+            yield connect(arm.frame_b, self.tool.frame_a)
+
+
+def _cluster(arm) -> Cluster:
+    kinds = {1: Cluster, 2: TwoLinks, 3: ThreeLinks}
+    links = [
+        dict(
+            length=link.length,
+            offset=list(link.offset),
+            plate_offset=list(link.plate_offset),
+            mass=link.mass,
+        )
+        for link in arm.links
+    ]
+    return kinds[len(links)](direction=list(arm.direction), links=links)
+
+
+def quaternion(R: np.ndarray) -> list[float]:
+    """The unit quaternion of a rotation matrix, scalar first and not negative."""
+    # the largest of four times the squares of its components is safe to divide by (Shepperd, 1978)
+    a = np.array([
+        1 + R[0, 0] + R[1, 1] + R[2, 2],
+        1 + R[0, 0] - R[1, 1] - R[2, 2],
+        1 - R[0, 0] + R[1, 1] - R[2, 2],
+        1 - R[0, 0] - R[1, 1] + R[2, 2],
+    ])  # fmt: skip
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    p, s, t = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
+    rows = np.array([[a[0], x, y, z], [x, a[1], p, s], [y, p, a[2], t], [z, s, t, a[3]]])
+    row = rows[int(np.argmax(a))]
+    return list(row / np.linalg.norm(row) * (1.0 if row[0] >= 0 else -1.0))
