@@ -47,8 +47,8 @@ def equations(
 ) -> None:
     """Write the equations of a model, sorted in the order in which they are solved.
 
-    Which way they are solved is your choice: with --given tool.r and --find carts[0].s,carts[1].s,carts[2].s
-    they are inverse kinematics; derivatives are called der(x). With --c the same becomes a C function.
+    Which way they are solved is your choice: given the tool and finding the carts, as in the example below, they
+    are inverse kinematics. Derivatives are called der(x). With --c the same becomes a C function.
     """
     from gantrytau import translate
 
