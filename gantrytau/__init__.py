@@ -1,5 +1,6 @@
 """gantrytau: acausal modelling on CasADi, for robots with closed kinematic loops and everything else."""
 
+from gantrytau.c_code import c_source
 from gantrytau.dae import Dae
 from gantrytau.declarations import (
     Array,
@@ -81,6 +82,7 @@ __all__ = [
     "atan2",
     "between",
     "branch",
+    "c_source",
     "connect",
     "constraint",
     "cos",

@@ -5,13 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau.commands.models import build, source_of
+from gantrytau.commands.models import Chosen, build, source_of
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, write_text
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
-    from gantrytau.model import Model
 
 
 def equations(
@@ -48,8 +47,8 @@ def equations(
 ) -> None:
     """Write the equations of a model, sorted in the order in which they are solved.
 
-    Which way they are solved is your choice: with --given tool.r and --find carts[0].s,carts[1].s,carts[2].s
-    they are inverse kinematics; derivatives are called der(x). With --c the same becomes a C function.
+    Which way they are solved is your choice: given the tool and finding the carts, as in the example below, they
+    are inverse kinematics. Derivatives are called der(x). With --c the same becomes a C function.
     """
     from gantrytau import translate
 
@@ -64,7 +63,7 @@ def equations(
         chosen = build(model, prototype, set_ or ())
         with busy(f"translating {chosen.name}"):
             if c:
-                text = _c_code(chosen.model, known, wanted, jacobian, forward, reverse)
+                text = _c_code(chosen, known, wanted, jacobian, forward, reverse)
             else:
                 text = _written(translate(chosen.model, given=known, find=wanted), format)
         if output is not None:
@@ -84,15 +83,26 @@ def _written(dae: "Dae", format: Any) -> str:
 
 
 def _c_code(
-    model: "Model",
+    chosen: Chosen,
     given: tuple[str, ...],
     find: tuple[str, ...],
     jacobian: bool,
     forward: int,
     reverse: int,
 ) -> str:
+    """C code of the function from `given` to `find`, parameters at their values."""
     from gantrytau import translate
     from gantrytau.c_code import c_source
 
-    function = translate(model, find=find).function(list(given), list(find))
-    return c_source(function, jacobian=jacobian, forward=forward, reverse=reverse)
+    function = translate(chosen.model).function(list(given), list(find))
+    origin = f" of prototype {chosen.prototype}" if chosen.prototype else ""
+    return c_source(
+        function,
+        name=chosen.name,
+        given=given,
+        find=find,
+        jacobian=jacobian,
+        forward=forward,
+        reverse=reverse,
+        header=f"{chosen.name}{origin}: {', '.join(find)} from {', '.join(given)}; parameters are numbers.",
+    )

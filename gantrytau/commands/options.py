@@ -27,7 +27,7 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Set a parameter (m=2.5, offset=1,2,3 as '[1,2,3]') or a start value (x.start=0.1). Repeatable.",
+        help="Set a parameter (m=2.5, 'offset=[1,2,3]') or a start value (x.start=0.1). Repeatable.",
         show_default=False,
     ),
 ]

@@ -78,9 +78,7 @@ class Graph:
     def number(self, value: float) -> Node:
         """A number; ModelError for nan, which no equation can hold."""
         if value != value:
-            raise ModelError(
-                "an expression: found nan, expected finite numbers; correct the equation it stands in"
-            )
+            raise ModelError("found nan, expected finite numbers; correct the equation it stands in")
         return self.node("number", value=float(value) + 0.0)  # no negative zero
 
     def symbol(self, name: str) -> Node:
@@ -142,7 +140,7 @@ class Graph:
         if operator in one:
             return one[operator](a)
         raise ModelError(
-            f"an expression: found CasADi's operator number {operator}, which has no mathematical form; "
+            f"found CasADi's operator number {operator}, which has no mathematical form; "
             "expected arithmetic, elementary functions and choices; leave it out of the model"
         )
 

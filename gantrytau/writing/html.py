@@ -9,10 +9,9 @@ import casadi as ca
 from gantrytau.flat_model import FlatParameter, FlatVariable
 from gantrytau.statements import Equation
 from gantrytau.symbols import split_derivative
-from gantrytau.writing.graph import Graph
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written
+from gantrytau.writing.sharing import written_at
 from gantrytau.writing.text import PlainSyntax, plain_number
 
 if TYPE_CHECKING:
@@ -52,8 +51,8 @@ class _Page:
         }
         names = (*self.declared, *self.flat.definitions)
         self.anchors = {name: f"v{number}" for number, name in enumerate(names)}
-        leaves = [s.name() for s in ca.symvar(ca.vertcat(*(e.residual for e in self.flat.equations)))]
-        inner = [s.name() for s in ca.symvar(ca.vertcat(*dae.indexed.residuals.values()))]
+        leaves = [s.name() for s in ca.symvar(ca.SX(ca.vertcat(*(e.residual for e in self.flat.equations))))]
+        inner = [s.name() for s in ca.symvar(ca.SX(ca.vertcat(*dae.indexed.residuals.values())))]
         for name in (*leaves, *inner):  # a derivative leads to its variable
             base = split_derivative(name)[0]
             if base in self.anchors:
@@ -103,7 +102,7 @@ class _Page:
 
     def _component(self, heading: str, equations: list[Equation]) -> str:
         sides = [side for e in equations for side in (e.left, e.right)]
-        text = written(Graph().read(sides), self.syntax)
+        text = written_at(heading, sides, self.syntax)
         redundant = {id(e) for e in self.dae.reduced.redundant}
         lines = [_row(equality(name, value)) for name, value in text.definitions]
         for number, equation in enumerate(equations):
@@ -115,14 +114,14 @@ class _Page:
         return _details(summary, [*lines, self._glossary(sides)])
 
     def _block(self, section: Section) -> str:
-        text = written(Graph().read(line.right for line in section.lines), self.syntax)
+        text = written_at(section.origin, (line.right for line in section.lines), self.syntax)
         lines = [_row(equality(name, value)) for name, value in text.definitions]
         for line, value in zip(section.lines, text.expressions, strict=True):
             left = "<mn>0</mn>" if line.left is None else self.syntax.symbol(line.left).text
             lines.append(
                 _row(equality(left, value.text), f"determines {line.determines}" if line.determines else "")
             )
-        origin = f'<div class="origin">from {escape("; ".join(section.origins))}</div>'
+        origin = f'<div class="origin">from {escape(section.origin)}</div>'
         unknowns = [html_name(n) for n in section.unknowns[:4]]
         more = f" and {len(section.unknowns) - 4} more" if len(section.unknowns) > 4 else ""
         summary = f"[{section.number}] {', '.join(unknowns)}{more} ({escape(section.title)})"
@@ -133,7 +132,7 @@ class _Page:
 
     def _glossary(self, expressions: Iterable[ca.SX], more: Iterable[str] = ()) -> str:
         """What the names in some expressions mean."""
-        used = dict.fromkeys([*more, *(s.name() for s in ca.symvar(ca.vertcat(*expressions)))])
+        used = dict.fromkeys([*more, *(s.name() for s in ca.symvar(ca.SX(ca.vertcat(*expressions))))])
         bases = dict.fromkeys(split_derivative(n)[0] for n in used)
         rows = [
             f"<tr>{''.join(f'<td>{c}</td>' for c in self._cells(n)[:3])}</tr>"
@@ -197,7 +196,7 @@ class _Page:
         return _plain(variable.start[k]) + (", fixed" if variable.fixed else "")
 
     def _definitions(self) -> str:
-        text = written(Graph().read(self.flat.definitions.values()), self.syntax)
+        text = written_at("propagated quantities", self.flat.definitions.values(), self.syntax)
         lines = [_row(equality(name, value)) for name, value in text.definitions]
         for name, value in zip(self.flat.definitions, text.expressions, strict=True):
             math = equality(f"<mtext>{html_name(name)}</mtext>", value.text)
@@ -206,7 +205,7 @@ class _Page:
 
 
 def _plain(expression: ca.SX) -> str:
-    text = written(Graph().read([expression]), PlainSyntax())
+    text = written_at("a value", [expression], PlainSyntax())
     where = [f"{name} = {value}" for name, value in text.definitions]
     return text.expressions[0].text + (f" with {', '.join(where)}" if where else "")
 

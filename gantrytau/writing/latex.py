@@ -6,10 +6,9 @@ The fragment is included in a document with \usepackage{amsmath}; it defines not
 import re
 from typing import TYPE_CHECKING
 
-from gantrytau.writing.graph import Graph
 from gantrytau.writing.names import GREEK, Name, name_of
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written
+from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import ATOM, CHOICE, POWER, PRODUCT, SUM, Arguments, Written, infix
 from gantrytau.writing.text import plain_number
 
@@ -148,13 +147,12 @@ def latex_text(dae: "Dae") -> str:
 
 def _section(section: Section) -> list[str]:
     syntax = LatexSyntax()
-    text = written(Graph().read(line.right for line in section.lines), syntax)
-    origin = "; ".join(section.origins)
+    text = written_at(section.origin, (line.right for line in section.lines), syntax)
     rows = [f"{name} &= {_broken(expression)}" for name, expression in text.definitions]
     for line, value in zip(section.lines, text.expressions, strict=True):
         left = "0" if line.left is None else syntax.symbol(line.left).text
         rows.append(f"{left} &= {_broken(value.text)}")
-    head = rf"\paragraph{{Block {section.number}}} {escaped(section.title)}, from {escaped(origin)}."
+    head = rf"\paragraph{{Block {section.number}}} {escaped(section.title)}, from {escaped(section.origin)}."
     return [head, r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}"]
 
 

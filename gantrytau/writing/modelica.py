@@ -6,7 +6,6 @@ propagated quantities and large subexpressions that occur more than once. The te
 unknowns. Modelica Language Specification 3.6, chapters 2, 3 and 8.
 """
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -18,7 +17,7 @@ from gantrytau.statements import Equation
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
-from gantrytau.writing.sharing import Text, written
+from gantrytau.writing.sharing import Text, located, written, written_at
 from gantrytau.writing.syntax import CHOICE, Written, write
 
 if TYPE_CHECKING:
@@ -41,6 +40,7 @@ class _Writer:
         self.dae, self.flat, self.graph = dae, dae.flat, Graph()
         redundant = {id(e) for e in dae.reduced.redundant}
         self.equations = [e for e in self.flat.equations if id(e) not in redundant]
+        self.auxiliaries: list[str] = []
         self.orders = self._orders()
         self.syntax = ModelicaSyntax({n for n, order in self.orders.items() if order > 1})
 
@@ -48,7 +48,7 @@ class _Writer:
         """The highest derivative of each variable that the text needs."""
         found: dict[str, int] = {}
         used = [side for e in (*self.equations, *self.flat.initial_equations) for side in (e.left, e.right)]
-        for leaf in ca.symvar(ca.vertcat(*used, *self.flat.definitions.values())):
+        for leaf in ca.symvar(ca.SX(ca.vertcat(*used, *self.flat.definitions.values()))):
             name, order = split_derivative(leaf.name())
             found[name] = max(order, found.get(name, 0))
         return found
@@ -64,38 +64,29 @@ class _Writer:
         return "\n".join([*lines, *sections, f"end {name};"]) + "\n"
 
     def _equations(self) -> list[str]:
-        written_out = (*self.equations, *self.flat.initial_equations)
-        sides = self._read([side for e in written_out for side in (e.left, e.right)], written_out)
-        nodes = self.graph.read(self.flat.definitions.values())
-        propagated = dict(zip(self.flat.definitions, nodes, strict=True))
-        named: dict[Node, Written] = {}
-        for name, node in propagated.items():
-            if not node.leaf:
-                named.setdefault(node, Written(quoted(name)))
-        text = written([*sides, *propagated.values()], self.syntax, named, saving=LEAST_SAVING)
-        pairs = list(
-            zip(text.expressions[: len(sides) : 2], text.expressions[1 : len(sides) : 2], strict=True)
-        )
-        count = len(self.equations)
-        own = [self._equation(e, *pair) for e, pair in zip(self.equations, pairs[:count], strict=True)]
-        initial = [
-            self._equation(e, *pair)
-            for e, pair in zip(self.flat.initial_equations, pairs[count:], strict=True)
-        ]
+        """The sections of equations; on the way, the declarations of auxiliary variables are collected."""
+        equations = [*self.equations, *self.flat.initial_equations]
+        try:
+            propagated = self._propagated()
+            sides = self.graph.read(side for e in equations for side in (e.left, e.right))
+            named: dict[Node, Written] = {}
+            for name, node in propagated.items():
+                if not node.leaf:
+                    named.setdefault(node, Written(quoted(name)))
+            text = written([*sides, *propagated.values()], self.syntax, named, saving=LEAST_SAVING)
+        except ModelError:
+            for equation in equations:  # one of them is at fault, and is named
+                written_at(equation.name, [equation.left, equation.right], self.syntax)
+            raise
+        lines = [self._equation(e, *text.expressions[2 * k : 2 * k + 2]) for k, e in enumerate(equations)]
+        own, initial = lines[: len(self.equations)], lines[len(self.equations) :]
         found = ["initial equation", *initial] if initial else []
         found += ["equation", *own, *self._derivatives(), *self._named(propagated, text, len(sides))]
         return [*found, *self._left_out()]
 
-    def _read(self, sides: list[ca.SX], equations: Iterable[Equation]) -> list[Node]:
-        try:
-            return self.graph.read(sides)
-        except ModelError:
-            for equation in equations:  # find the one at fault, to name it
-                try:
-                    Graph().read([equation.left, equation.right])
-                except ModelError as error:
-                    raise ModelError(f"{equation.name}: {error}") from error
-            raise
+    def _propagated(self) -> dict[str, Node]:
+        nodes = self.graph.read(self.flat.definitions.values())
+        return dict(zip(self.flat.definitions, nodes, strict=True))
 
     def _equation(self, equation: Equation, left: Written, right: Written) -> str:
         side = f"({left.text})" if left.level == CHOICE else left.text
@@ -103,7 +94,7 @@ class _Writer:
 
     def _derivatives(self) -> list[str]:
         """One equation for each derivative that is differentiated again."""
-        found, self.auxiliaries = [], []
+        found: list[str] = []
         for name, top in self.orders.items():
             for order in range(1, top):
                 new, old = derivative_name(name, order), derivative_name(name, order - 1)
@@ -126,11 +117,11 @@ class _Writer:
         return [f"  {name} = {expression};" for name, expression in own.items() if name not in constant]
 
     def _left_out(self) -> list[str]:
-        redundant = self.dae.reduced.redundant
+        redundant = (*self.dae.redundant, *self.dae.reduced.redundant)
         return [f"  // left out, it follows from the others: {e.name}" for e in redundant]
 
     def _parameter(self, parameter: FlatParameter, k: int) -> str:
-        value = self._expressions([parameter.value[k]])[0]
+        value = self._expression(parameter.elements[k], parameter.value[k])
         end = " annotation(Evaluate=true)" if parameter.fold else ""
         head = f"  parameter Real {quoted(parameter.elements[k])}{self._attributes(parameter, k)} = {value}"
         return f"{head}{self._comment(parameter)}{end};"
@@ -149,15 +140,15 @@ class _Writer:
             values = getattr(variable, key)
             if values is None or (values[k].is_constant() and abs(float(values[k])) == float("inf")):
                 continue
-            found.append(f"{key}={self._expressions([values[k]])[0]}")
+            found.append(f"{key}={self._expression(f'{variable.elements[k]}, {key}', values[k])}")
         if variable.fixed:
             found.append("fixed=true")
         if variable.prefer in SELECT:
             found.append(f"stateSelect=StateSelect.{SELECT[variable.prefer]}")
         return f"({', '.join(found)})" if found else ""
 
-    def _expressions(self, values: list[ca.SX]) -> list[str]:
-        """Expressions of parameters, written out in full."""
-        nodes = self.graph.read(values)
-        found = write(nodes, self.syntax, {})
-        return [found[node].text for node in nodes]
+    def _expression(self, place: str, value: ca.SX) -> str:
+        """An expression of parameters, written out in full."""
+        with located(place):
+            (node,) = self.graph.read([value])
+            return write([node], self.syntax, {})[node].text

@@ -50,9 +50,7 @@ class ModelicaSyntax:
     def number(self, value: float) -> Written:
         """A number; ModelError for an infinite one."""
         if abs(value) == float("inf"):
-            raise ModelError(
-                "an expression: found an infinite number, which Modelica cannot write; expected a finite one"
-            )
+            raise ModelError("found an infinite number, which Modelica cannot write; expected a finite one")
         return Written(plain_number(value), SUM if value < 0 else 8, value < 0)
 
     def symbol(self, name: str) -> Written:

@@ -41,6 +41,11 @@ class Section:
         return len(self.lines) == 1 and self.lines[0].left is not None
 
     @property
+    def origin(self) -> str:
+        """Where its equations come from, in one line."""
+        return "; ".join(self.origins)
+
+    @property
     def title(self) -> str:
         """'linear block of 48 unknowns, torn to 5'."""
         if self.single:

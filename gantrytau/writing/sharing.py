@@ -5,9 +5,13 @@ exponentially with the chain. A subexpression is given a name if that saves enou
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
-from gantrytau.writing.graph import Node
+import casadi as ca
+
+from gantrytau.errors import ModelError
+from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.syntax import Syntax, Written, ordered, write
 
 SAVING = 7  # nodes; for readers, who see at once what a name stands for
@@ -65,3 +69,18 @@ def written(
     found = write(roots, syntax, names)
     definitions = tuple((names[node].text, text.text) for node, text in found.items() if node in names)
     return Text(definitions, tuple(names.get(root) or found[root] for root in roots))
+
+
+def written_at(place: str, expressions: Iterable[ca.SX], syntax: Syntax) -> Text:
+    """Expressions in a language; a ModelError about them names the place where they stand."""
+    with located(place):
+        return written(Graph().read(expressions), syntax)
+
+
+@contextmanager
+def located(place: str):
+    """Errors about expressions, which know no place, are told with it."""
+    try:
+        yield
+    except ModelError as error:
+        raise ModelError(f"{place}: {error}") from error

@@ -93,7 +93,7 @@ def write(roots: Iterable[Node], syntax: Syntax, names: Mapping[Node, Written]) 
             new = syntax.apply(node.operation, Arguments(syntax, written, node.arguments))
             if new is None:
                 raise ModelError(
-                    f"an expression: found the function {node.operation}, expected one that {syntax.name} has; "
+                    f"found the function {node.operation}, expected one that {syntax.name} has; "
                     "write it with others, or choose another format"
                 )
             found[node] = new

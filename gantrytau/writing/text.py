@@ -2,9 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from gantrytau.writing.graph import Graph
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written
+from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
 
 if TYPE_CHECKING:
@@ -68,17 +67,15 @@ def block_text(dae: "Dae") -> str:
 
 
 def _section(section: Section) -> list[str]:
-    graph = Graph()
-    text = written(graph.read(line.right for line in section.lines), PlainSyntax())
-    origin = "; ".join(section.origins)
+    text = written_at(section.origin, (line.right for line in section.lines), PlainSyntax())
     where = [f"      with {name} = {expression}" for name, expression in text.definitions]
     if section.single:
         value = text.expressions[0].text
         return [
-            f"[{section.number}] {section.lines[0].left} = {value}    # {section.kind}, from {origin}",
+            f"[{section.number}] {section.lines[0].left} = {value}    # {section.kind}, from {section.origin}",
             *where,
         ]
-    lines = [f"[{section.number}] {section.title}    # from {origin}", *where]
+    lines = [f"[{section.number}] {section.title}    # from {section.origin}", *where]
     for line, value in zip(section.lines, text.expressions, strict=True):
         note = f"    # determines {line.determines}" if line.determines else ""
         lines.append(f"      {line.left or '0'} = {value.text}{note}")

@@ -1,11 +1,14 @@
 """`gantrytau equations`: text in several formats, causality, C code."""
 
-import importlib.util
+import shutil
+import subprocess
 
+import casadi as ca
+import numpy as np
 import pytest
 
 from gantrytau import translate
-from gantrytau_models import Pendulum
+from gantrytau_models import Pendulum, prototypes
 
 FAULT, MISUSE = 1, 2
 
@@ -88,14 +91,32 @@ def test_an_unwritable_place_is_told(fails, tmp_path):
     assert "Cannot write" in fails(MISUSE, "equations", "Pendulum", "--output", tmp_path / ("x" * 300))
 
 
-@pytest.mark.skipif(importlib.util.find_spec("gantrytau.c_code") is None, reason="no C code in this version")
 def test_c_code_of_a_function(answer):
     names = ("--c", "--given", "tool.r", "--find", "carts[0].s,carts[1].s")
     plain = answer("equations", "GantryTau(GT_A)", *names)
     assert plain["format"] == "c"
-    assert "carts[1].s" in plain["text"]  # the table of arguments and results
-    assert "casadi_real" in plain["text"]
+    assert "GantryTau of prototype GT_A: carts[0].s, carts[1].s from tool.r" in plain["text"]
+    assert "int GantryTau(const casadi_real** arg" in plain["text"]
+    assert "jac_GantryTau" not in plain["text"]
     more = answer("equations", "GantryTau(GT_A)", *names, "--jacobian", "--forward", "1", "--reverse", "2")
-    assert "jac_" in more["text"]
-    assert "fwd1_" in more["text"]
-    assert "adj2_" in more["text"]
+    for function in ("jac_GantryTau", "fwd1_GantryTau", "adj2_GantryTau"):
+        assert f"int {function}(const casadi_real** arg" in more["text"]
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_compiled_c_code_keeps_the_length_of_a_link(run, tmp_path):
+    """The cart that the code finds is as far from the tool as the link is long."""
+    source, binary = tmp_path / "inverse.c", tmp_path / "inverse.so"
+    names = ("--given", "tool.r", "--find", "carts[0].s")
+    assert run("equations", "GantryTau(GT_A)", "--c", *names, "--output", source).exit_code == 0
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", binary, source, "-lm"], check=True)
+    arm, tool = prototypes.GT_A.arms[0], np.array([0.5, 3.0, -0.6])
+    s = float(ca.external("GantryTau", str(binary))(tool))
+    link = tool - (np.array(arm.offset) + s * np.array(arm.direction))
+    assert np.linalg.norm(link) == pytest.approx(arm.length, rel=1e-14)  # a square root and few sums
+    assert link[0] > 0  # the tool is ahead of the cart
+
+
+def test_c_code_of_names_that_do_not_determine_each_other(fails):
+    message = fails(FAULT, "equations", "GantryTau(GT_A)", "--c", "--given", "carts[0].s", "--find", "tool.r")
+    assert "Undetermined: " in message

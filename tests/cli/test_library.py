@@ -44,7 +44,7 @@ def test_each_command_has_help_with_an_example(run, command):
 
 
 def test_brackets_in_the_help_are_not_taken_for_markup(run):
-    assert "'[1,2,3]'" in run("check", "--help").stdout
+    assert "'offset=[1,2,3]'" in run("check", "--help").stdout
     assert "carts[0].s,carts[1].s,carts[2].s" in run("equations", "--help").stdout
 
 

@@ -40,7 +40,7 @@ class ModelicaClass:
         given = set(self.named("parameter", "constant", "input"))
         return [n for n in self.symbols if n not in given]
 
-    def attribute(self, name: str, attribute: str):
+    def attribute(self, name: str, attribute: str) -> Any:
         """The expression of an attribute of a declaration, its "value" too, or None."""
         symbol = self.symbols[name]
         modification = symbol.class_modification

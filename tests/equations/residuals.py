@@ -33,7 +33,7 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
     written = (*kept, *flat.initial_equations)
     sides = ca.vertcat(*(side for e in written for side in (e.left, e.right)), *flat.definitions.values())
     names = [n for v in flat.variables for n in v.elements]
-    symbols = ca.symvar(ca.vertcat(sides, *flat.derivatives.values()))
+    symbols = ca.symvar(ca.SX(ca.vertcat(sides, *flat.derivatives.values())))
     orders = dict.fromkeys((*names, "time"), 0)
     for name, order in (split_derivative(s.name()) for s in symbols):
         orders[name] = max(orders.get(name, 0), order)
@@ -43,7 +43,7 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
         for k in range(top + 1)
     }
     values |= dae.table.values
-    function = ca.Function("sides", [ca.vertcat(*symbols)], [ca.densify(sides)])
+    function = ca.Function("sides", [ca.vertcat(*symbols)], [ca.densify(ca.SX(sides))])
     expected = np.array(function(ca.DM([values[s.name()] for s in symbols]))).ravel()
     others = read.tree.equations[len(kept) :]
     variables = {

@@ -1,13 +1,16 @@
 """The flat Modelica text says what the flat model says, as an independent parser reads it."""
 
+import re
+
 import casadi as ca
 import pytest
 
-from gantrytau import Input, Model, Output, Parameter, Real, connect, der
+from gantrytau import Input, Model, Output, Parameter, Real, connect, der, translate
 from gantrytau.declarations import Array, StateSelect
 from gantrytau.mechanics import multibody, rotational, translational
 from gantrytau.mechanics.translational import LinearFriction
 from gantrytau_models import GantryTau, Pendulum, prototypes
+from tests.equations.modelica_reader import read_modelica
 from tests.equations.residuals import assert_same_residuals
 
 
@@ -89,3 +92,74 @@ MODELS = [
 @pytest.mark.parametrize("model", MODELS)
 def test_an_independent_parser_reads_the_same_residuals(model):
     assert_same_residuals(model)
+
+
+def test_attributes_of_declarations():
+    read = assert_same_residuals(translate(Started(), units=False))
+    assert {n: read.symbols[n].comment for n in ("a", "x[1]")} == {
+        "a": r"the \"rate\"",
+        "x[1]": r"place \\ way",
+    }
+    assert [read.attribute(f"x[{k}]", "fixed").value for k in (0, 1)] == [True, True]
+    assert read.attribute("w", "start").value == 1e-5
+    assert str(read.attribute("w", "stateSelect")) == "StateSelect.avoid"
+    assert read.attribute("u", "unit").value == "m/s3"
+    assert read.attribute("y", "start") is None
+    assert read.named("output") == ["y"]
+
+
+def test_given_variables_become_inputs_and_free_inputs_unknowns():
+    dae = translate(Oscillator(), given=["mass.s"])
+    read = assert_same_residuals(dae)
+    assert read.named("input") == ["mass.s"]
+    assert "push.f" in read.unknowns
+
+
+def test_no_derivative_of_a_derivative_and_no_dotted_name_outside_of_quotes():
+    text = translate(GantryTau(prototypes.L1)).equations("modelica")
+    bare = re.sub(r"//.*|\"[^\"]*\"", "", text)
+    assert "der(der(" not in re.sub(r"'[^']*'", "", bare)
+    assert not re.search(r"[A-Za-z_\]]\.[A-Za-z]", re.sub(r"'[^']*'", "", bare).replace("StateSelect.", ""))
+    assert not re.search(r"noEvent|smooth", bare)
+
+
+class TwiceTheSame(Model):
+    """The last equation repeats the first two."""
+
+    x, y, z = Real(unit="1", start=1.0), Real(unit="1"), Real(unit="1")
+
+    def equations(self):
+        yield self.x == self.y
+        yield self.y == self.z
+        yield der(self.x) == -self.x
+        yield self.z == self.x
+
+
+def test_equations_that_follow_from_others_are_left_out_and_named():
+    dae = translate(TwiceTheSame(), units=False)
+    assert_same_residuals(dae)
+    assert "// left out, it follows from the others: the model (TwiceTheSame), equation 4" in dae.equations(
+        "modelica"
+    )
+
+
+def test_a_model_without_equations_is_written():
+    class Plain(Model):
+        a = Parameter(3.0, unit="m")
+        b = Parameter(2 * a, unit="m")
+
+    read = assert_same_residuals(translate(Plain()))
+    assert read.named("parameter") == ["a", "b"]
+
+
+def test_names_that_modelica_cannot_spell_are_spelled_out():
+    class model(Model):
+        α = Real(unit="1", start=1.0)
+
+        def equations(self):
+            yield der(self.α) == -self.α
+
+    text = translate(model(), units=False).equations("modelica")
+    assert text.startswith("model 'model' ")
+    assert "der('U+03B1') = -'U+03B1'" in text
+    read_modelica(text)
