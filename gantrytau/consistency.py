@@ -116,17 +116,20 @@ def newton(
         along = left.T @ target
         known = sizes > 1e-11 * sizes[:1]
         moved = False
-        for _ in range(25):
+        for attempt in range(25):
             shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
             step = weights * (right.T @ (shares * along))
-            step *= min(1.0, _longest(point, step))
+            if attempt:
+                step *= min(1.0, _longest(point, step))
             f_new, jacobian_new = at(point + step)
             size = np.linalg.norm(f_new / rows) if np.all(np.isfinite(f_new)) else np.inf
-            if size < merit * (1 - 1e-4):
+            # at once only where the equations are as good as linear; a large step may reach another branch
+            if size < (1 - 1e-4 if attempt else 0.1) * merit:
                 point, f, jacobian, moved = point + step, f_new, jacobian_new, True
                 damping = 0.0 if size < 0.1 * merit else damping / 10
                 break
-            damping = max(10 * damping, 1e-8)
+            if attempt:
+                damping = max(10 * damping, 1e-8)
         if not moved:
             break
     return point, f, jacobian

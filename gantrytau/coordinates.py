@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
+from gantrytau.dependents import definitions_of, dependents
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.guide import Guide
 from gantrytau.guess import Guess
@@ -50,7 +51,7 @@ class Coordinates:
     @property
     def constrained(self) -> bool:
         """Whether there are constraints to hold."""
-        return bool(self.invariants)
+        return any(level.numel() for level in self.invariants)
 
     def integrator(self, count: int, tolerance: float) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count.
@@ -107,7 +108,9 @@ class Coordinates:
             own = {leaf.name() for leaf in ca.symvar(residual)}
             tops = self.dae.indexed.orders.items()
             level = [derivative_name(n, stage + top) for n, top in tops if stage + top >= 0]
-            columns = [positions[n] for n in level if n in own]
+            columns = [positions[n] for n in level if n in own and n in positions]
+            if not columns:
+                continue
             x = self.x[columns]
             jacobian = ca.densify(ca.jacobian(residual, x))
             found.append(
@@ -155,11 +158,13 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
     w, t0 = ca.SX.sym("w", 2 * len(sampled)), ca.SX.sym("t0")
     indexed, chains = dae.indexed, dae.reduced.chains
+    given = dependents(dae)
+    follow = {name for _, name in given}
     states = tuple(
         derivative_name(n, k)
         for k in range(max(indexed.orders.values(), default=0))
         for n, top in indexed.orders.items()
-        if k < top
+        if k < top and n not in follow
     )
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in indexed.orders.items()}
     last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
@@ -171,6 +176,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
     numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions = [*numbers, *((chains.named(n), e) for n, e in known.items())]
+    definitions += definitions_of(dae, given)
     implicit = [b for b in blocks if b.solution is None]
     for block in blocks:
         definitions += block.definitions
@@ -180,7 +186,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         else ca.SX(0, 1)
     )
     algebraic = ca.vertcat(*(r for b in implicit for r in b.residuals)) if implicit else ca.SX(0, 1)
-    invariants = _invariants(dae)
+    invariants = _invariants(dae, {i for i, _ in given})
     tops = ca.vertcat(*highest.values()) if highest else ca.SX(0, 1)
     pivots = ca.jacobian(ca.vertcat(*last.values()), tops) if last else ca.SX(0, 0)
     v, e = [s for s, _ in definitions], [d for _, d in definitions]
@@ -204,13 +210,13 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     )
 
 
-def _invariants(dae: Dae) -> list[ca.SX]:
-    """Residuals of the levels below the last: positions, then velocities."""
+def _invariants(dae: Dae, used: set[int]) -> list[ca.SX]:
+    """Residuals of the levels below the last: positions, then velocities; without equations that are used."""
     counts = dae.indexed.counts
     found = []
     for stage in range(-max(counts, default=0), 0):
-        rows = [dae.indexed.residuals[i, stage + c] for i, c in enumerate(counts) if stage + c >= 0]
-        found.append(ca.vertcat(*rows))
+        rows = [(i, stage + c) for i, c in enumerate(counts) if stage + c >= 0 and i not in used]
+        found.append(ca.vertcat(*(dae.indexed.residuals[key] for key in rows)) if rows else ca.SX(0, 1))
     return found
 
 
