@@ -158,6 +158,11 @@ def test_given_variables_become_inputs_and_free_inputs_unknowns():
     assert "push.f" in read.unknowns
 
 
+def test_derivatives_that_are_asked_for_become_outputs():
+    read = assert_same_residuals(translate(Pendulum(), find=["der(v_x)", "der(der(v_y))"]))
+    assert set(read.named("output")) == {"wanted der(der(v_y))"}  # the model has der(v_x) itself
+
+
 def test_no_derivative_of_a_derivative_and_no_dotted_name_outside_of_quotes():
     text = translate(GantryTau(prototypes.L1)).equations("modelica")
     bare = re.sub(r"//.*|\"[^\"]*\"", "", text)
