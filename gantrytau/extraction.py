@@ -130,18 +130,22 @@ def _roles(dae: Dae, given: Mapping[str, str | Sequence[str]]) -> dict[str, tupl
     found: dict[str, tuple[str, ...]] = {}
     for role, wanted in given.items():
         wanted = (wanted,) if role == "T" and isinstance(wanted, str) else names(wanted)
-        found[role] = tuple(n for name in wanted for n in dae.expand(name))
-        for name in found[role]:
+        scalars = tuple(n for name in wanted for n in dae.expand(name))
+        for place, name in enumerate(scalars):
             alias = dae.reduced.aliases.get(name)
             if alias is None or alias.root is None:
                 what = "constant" if alias else "a derivative, a parameter, or follows from other variables"
-                raise ModelError(
-                    f"{ROLES[role]}: {name} of {dae.name} is {what}, expected a variable that is free to move"
-                )
-            if role != "f" and alias.order > 0:
-                raise ModelError(
-                    f"{ROLES[role]}: {name} of {dae.name} is a speed, expected a position; name what it is the rate of"
-                )
+            elif role != "f" and alias.order > 0:
+                what = "a speed"
+            elif name in scalars[:place]:
+                what = "named twice"
+            else:
+                continue
+            kind = "force, each once" if role == "f" else "coordinate that is free to move, each once"
+            raise ModelError(
+                f"{ROLES[role]}: {name} of {dae.name} is {what}, expected a {kind}; name another"
+            )
+        found[role] = scalars
     mobility = dae.diagnosis.mobility
     if any(len(scalars) != mobility for scalars in found.values()):
         counts = ", ".join(f"{len(scalars)} {ROLES[role]}" for role, scalars in found.items())
@@ -163,8 +167,8 @@ def _moved_by_tool(dae: Dae, roles: Mapping[str, Sequence[str]]) -> Dae:
         return translate_flat(dae.flat, given=(*roles["T"], *others), find=accelerations, start=dae.start)
     except StructureError as error:
         raise StructureError(
-            f"tool: {', '.join(roles['T'])} cannot be moved at will by {', '.join(roles['f'])}. {error} Name independent "
-            "coordinates of the tool, and forces that act on it"
+            f"{', '.join(roles['T'])} cannot be moved at will by {', '.join(roles['f'])}, expected independent coordinates "
+            f"of the tool and forces that act on it; name others. Found: {error}"
         ) from error
 
 
@@ -239,21 +243,19 @@ def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | No
     """K of K S = J^-T if it is constant near the start, else None; StructureError where J^-1 or S is singular there."""
     kind = ca.SX if _written_out(functions) else ca.MX
     at = {k: kind.sym(k, len(strata.names(k))) for k in EVERYTHING} | {"p": strata.numbers}
-    slopes = [
-        _slope(functions["speeds"], "dT", at),
-        -_slope(functions["balance"], "f", at),
-    ]
-    function = ca.Function("relations", [at["T"], at["q"]], slopes)
+    inverse, balance = _slope(functions["speeds"], "dT", at), functions["balance"]
+    inertia = _slope(balance, "ddT", at) + _slope(balance, "ddq", at) @ inverse
+    function = ca.Function("slopes", [at["T"], at["q"]], [inverse, -_slope(balance, "f", at), inertia])
     start = np.concatenate([strata.start("T"), strata.start("q")])
     steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (POINTS, start.size))
     found = []
     for point in (start, *(start + steps * np.maximum(np.abs(start), 1.0))):
         try:
-            inverse, S = (np.array(m) for m in function(*np.split(point, 2)))
+            inverse, S, inertia = (np.array(m) for m in function(*np.split(point, 2)))
         except RuntimeError:  # no position of the passive joints there
             continue
         if not found:
-            _require_regular(strata, inverse, S)
+            _require_regular(strata, inverse, S, inertia)
         if np.all(np.isfinite(inverse)) and np.all(np.isfinite(S)) and np.linalg.cond(S) < 1 / LEAST:
             found.append(np.linalg.solve(S.T, inverse).T)
     weights = found[0]
@@ -263,29 +265,24 @@ def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | No
     return ca.DM(np.where(np.abs(weights - whole) < SAME, whole, weights))
 
 
-def _require_regular(strata: Strata, inverse: np.ndarray, S: np.ndarray) -> None:
+def _require_regular(strata: Strata, inverse: np.ndarray, S: np.ndarray, inertia: np.ndarray) -> None:
     """StructureError where speeds do not determine each other, or forces do not act."""
-    name, roles = strata.dae.name, {ROLES[k]: ", ".join(v) for k, v in strata.roles.items()}
-    if not np.all(np.isfinite(inverse)):
-        raise StructureError(
-            f"{name}: at the start, the speed of the tool does not determine that of {roles['joints']}, expected one for "
-            "each motion of the tool; name other joints, or another start"
-        )
-    idle = [n for n, column in zip(strata.roles["f"], S.T, strict=True) if not np.any(column)]
-    if idle:
-        raise StructureError(
-            f"{name}: {', '.join(idle)} does not act on the mechanism, expected a force that moves {roles['tool']}; name "
-            f"the forces of {roles['joints']}"
-        )
+    tool, joints, forces = (", ".join(strata.roles[k]) for k in ROLES)
     for matrix, words in (
-        (inverse, f"{roles['joints']} do not determine {roles['tool']}"),
-        (S, f"{roles['forces']} do not act independently on {roles['tool']}"),
+        (inverse, f"{joints} and {tool} do not determine each other"),
+        (S, f"{forces} do not act independently on {tool}"),
+        (inertia, f"{forces} leave accelerations of {tool} undetermined"),
     ):
-        sizes = np.linalg.svd(matrix, compute_uv=False)
+        sizes = (
+            np.linalg.svd(matrix, compute_uv=False)
+            if np.all(np.isfinite(matrix))
+            else np.array([np.inf, 0.0])
+        )
         if not sizes[-1] > LEAST * sizes[0]:
             raise StructureError(
-                f"{name}: at the start, {words} (smallest singular value {sizes[-1]:.2g}, largest {sizes[0]:.2g}), expected "
-                "a regular matrix; name others, or start away from the singular position"
+                f"{strata.dae.name}: at the start, {words} (singular values from {sizes[-1]:.2g} to {sizes[0]:.2g}), "
+                "expected a regular matrix; name the driven joints and the forces in them, or start away from a singular "
+                "position"
             )
 
 

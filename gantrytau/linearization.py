@@ -48,7 +48,7 @@ class Linearization:
     def eigenvalues(self) -> np.ndarray:
         """Poles of the system, (n,) complex, in 1/s, the slowest first."""
         found = np.asarray(np.linalg.eigvals(self.A), dtype=complex)
-        return found[np.lexsort((np.imag(found), np.abs(found).round(9)))]
+        return found[np.lexsort((np.imag(found), np.real(found), np.abs(found).round(9)))]
 
     def __str__(self) -> str:
         states, outputs = [f"der({n})" for n in self.states], list(self.outputs)

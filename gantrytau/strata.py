@@ -70,20 +70,25 @@ class Cut:
 def _iterated(
     name, implicit: Sequence[Block], found: list[ca.SX], arguments, inside, dae: Dae
 ) -> ca.Function:
-    """Blocks without closed form are solved by Newton's method, one after another."""
+    """Blocks without closed form are solved one after another: linear ones outright, others by Newton's method."""
     x = [ca.MX.sym(k, a.shape[0]) for k, a in zip(inside, arguments, strict=True)]
     a, before, solved, place = ca.vertcat(*arguments), ca.SX(0, 1), ca.MX(0, 1), 0
     options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
     for number, block in enumerate(implicit):
         y, count = ca.vertcat(*block.tears), len(block.tears)
-        residual = ca.Function(
-            "residual", [y, ca.vertcat(a, before)], [ca.vertcat(*found[place : place + count])], {"cse": True}
-        )
+        f, known = ca.vertcat(*found[place : place + count]), ca.vertcat(a, before)
         place += count
-        newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
-        guess = ca.DM([dae.start[s.name()] for s in block.tears])
-        solved = ca.vertcat(solved, newton(guess, ca.vertcat(*x, solved)))
-        before = ca.vertcat(before, y)
+        if block.kind == "linear":
+            parts = [ca.jacobian(f, y), ca.substitute(f, y, ca.SX.zeros(count))]
+            matrix, right = ca.Function("linear", [known], parts, {"cse": True})(ca.vertcat(*x, solved))
+            value = ca.solve(matrix, -right, "qr")
+        else:
+            residual = ca.Function("residual", [y, known], [f], {"cse": True})
+            guess = ca.DM([dae.start[s.name()] for s in block.tears])
+            value = ca.rootfinder(f"newton{number}", "newton", residual, options)(
+                guess, ca.vertcat(*x, solved)
+            )
+        solved, before = ca.vertcat(solved, value), ca.vertcat(before, y)
     outside = ca.Function("rest", [a, before], [found[-1]], {"cse": True})
     return ca.Function(name, x, [outside(ca.vertcat(*x), solved)], inside, ["value"])
 

@@ -11,7 +11,7 @@ import casadi as ca
 
 from gantrytau.errors import ModelError
 
-UNARY = {
+FUNCTIONS = {
     ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_FABS: "abs", ca.OP_SIGN: "sign",
     ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
     ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan",
@@ -19,12 +19,10 @@ UNARY = {
     ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh",
     ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
     ca.OP_ERF: "erf", ca.OP_ERFINV: "erfinv", ca.OP_LOG1P: "log1p", ca.OP_EXPM1: "expm1",
-}  # fmt: skip
-BINARY = {
     ca.OP_FMIN: "min", ca.OP_FMAX: "max", ca.OP_ATAN2: "atan2", ca.OP_FMOD: "fmod",
     ca.OP_REMAINDER: "remainder", ca.OP_COPYSIGN: "copysign", ca.OP_HYPOT: "hypot",
+    ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow",
 }  # fmt: skip
-POWERS = (ca.OP_POW, ca.OP_CONSTPOW)
 FORWARD = (ca.OP_ASSIGN, ca.OP_LIFT)  # they return their first argument
 COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
@@ -115,30 +113,31 @@ class Graph:
             condition, value = arguments
             return self.node("select", self.truth(condition), self.real(value), self.number(0.0))
         real = [self.real(a) for a in arguments]
-        a, b = real[0], real[-1]
         if operator in COMPARISONS:
-            return self._comparison(COMPARISONS[operator], a, b)
-        if operator in UNARY:
-            return self.node(UNARY[operator], a)
-        if operator in BINARY:
-            return self.node(BINARY[operator], a, b)
-        if operator in POWERS:
-            return self.node("pow", a, b)
+            return self._comparison(COMPARISONS[operator], *real)
+        if operator in FUNCTIONS:
+            return self.node(FUNCTIONS[operator], *real)
         if operator in FORWARD:
-            return a
-        arithmetic = {
-            ca.OP_ADD: self.add, ca.OP_SUB: self.subtract, ca.OP_MUL: self.multiply, ca.OP_DIV: self.divide,
-        }  # fmt: skip
-        if operator in arithmetic:
-            return arithmetic[operator](a, b)
-        one = {
+            return real[0]
+        return self._arithmetic(operator, real)
+
+    def _arithmetic(self, operator: int, arguments: Sequence[Node]) -> Node:
+        binary = {
+            ca.OP_ADD: self.add,
+            ca.OP_SUB: self.subtract,
+            ca.OP_MUL: self.multiply,
+            ca.OP_DIV: self.divide,
+        }
+        unary = {
             ca.OP_NEG: self.negate,
             ca.OP_SQ: lambda x: self.node("pow", x, self.number(2.0)),
             ca.OP_TWICE: lambda x: self.multiply(self.number(2.0), x),
             ca.OP_INV: lambda x: self.divide(self.number(1.0), x),
         }
-        if operator in one:
-            return one[operator](a)
+        if operator in binary:
+            return binary[operator](*arguments)
+        if operator in unary:
+            return unary[operator](*arguments)
         raise ModelError(
             f"found CasADi's operator number {operator}, which has no mathematical form; "
             "expected arithmetic, elementary functions and choices; leave it out of the model"

@@ -47,10 +47,11 @@ class _Page:
     def __init__(self, dae: "Dae"):
         self.dae, self.flat = dae, dae.flat
         self.declared: dict[str, tuple[Declared, int]] = {
-            n: (v, k) for v in (*dae.flat.variables, *dae.flat.parameters) for k, n in enumerate(v.elements)
+            n: (v, k)
+            for v in (*dae.flat.variables, *dae.flat.parameters, *dae.flat.propagated)
+            for k, n in enumerate(v.elements)
         }
-        names = (*self.declared, *self.flat.definitions)
-        self.anchors = {name: f"v{number}" for number, name in enumerate(names)}
+        self.anchors = {name: f"v{number}" for number, name in enumerate(self.declared)}
         leaves = [s.name() for s in ca.symvar(ca.SX(ca.vertcat(*(e.residual for e in self.flat.equations))))]
         inner = [s.name() for s in ca.symvar(ca.SX(ca.vertcat(*dae.indexed.residuals.values())))]
         for name in (*leaves, *inner):  # a derivative leads to its variable
@@ -62,8 +63,6 @@ class _Page:
 
     def _title(self, name: str) -> str:
         base, order = split_derivative(name)
-        if base not in self.declared:
-            return f"{name}: propagated quantity"
         variable, _ = self.declared[base]
         unit = f" [{variable.unit}]" if variable.unit and order == 0 else ""
         prefix = "derivative of " * order
@@ -174,6 +173,8 @@ class _Page:
 
     def _role(self, name: str) -> str:
         variable, _ = self.declared[name]
+        if variable.kind == "propagated":
+            return "passed on"
         if isinstance(variable, FlatParameter):
             return "parameter" if name in self.dae.table.independent else "parameter, follows from others"
         if name in self.dae.known:

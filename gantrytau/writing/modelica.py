@@ -89,6 +89,7 @@ class _Writer:
         return dict(zip(self.flat.definitions, nodes, strict=True))
 
     def _equation(self, equation: Equation, left: Written, right: Written) -> str:
+        # an `if` may stand on the right only
         side = f"({left.text})" if left.level == CHOICE else left.text
         return f"  {side} = {right.text} {string(equation.name)};"
 
@@ -108,12 +109,15 @@ class _Writer:
         own = dict(text.definitions)
         for name, expression in zip(propagated, text.expressions[start:], strict=True):
             own.setdefault(quoted(name), expression.text)
-        spoken = {quoted(name): "propagated quantity" for name in propagated}
+        declared = {quoted(n): (v, k) for v in self.flat.propagated for k, n in enumerate(v.elements)}
         constant = {quoted(name) for name, node in propagated.items() if node.operation == "number"}
         for name, expression in own.items():
-            kind, value = ("constant ", f" = {expression}") if name in constant else ("", "")
-            words = string(spoken.get(name, "shared subexpression"))
-            self.auxiliaries.append(f"  {kind}Real {name}{value} {words};")
+            if name in constant:
+                self.auxiliaries.append(self._declare("constant ", *declared[name], expression))
+            elif name in declared:
+                self.auxiliaries.append(self._declare("", *declared[name]))
+            else:
+                self.auxiliaries.append(f'  Real {name} "shared subexpression";')
         return [f"  {name} = {expression};" for name, expression in own.items() if name not in constant]
 
     def _left_out(self) -> list[str]:
@@ -122,21 +126,25 @@ class _Writer:
 
     def _parameter(self, parameter: FlatParameter, k: int) -> str:
         value = self._expression(parameter.elements[k], parameter.value[k])
-        end = " annotation(Evaluate=true)" if parameter.fold else ""
-        head = f"  parameter Real {quoted(parameter.elements[k])}{self._attributes(parameter, k)} = {value}"
-        return f"{head}{self._comment(parameter)}{end};"
+        return self._declare(
+            "parameter ", parameter, k, value, " annotation(Evaluate=true)" if parameter.fold else ""
+        )
 
     def _variable(self, variable: FlatVariable, k: int, known: set[str]) -> str:
-        name = variable.elements[k]
-        kind = "input " if name in known else "output " if variable.kind == "output" else ""
-        return f"  {kind}Real {quoted(name)}{self._attributes(variable, k)}{self._comment(variable)};"
+        if variable.elements[k] in known:
+            return self._declare("input ", variable, k)
+        return self._declare("output " if variable.kind == "output" else "", variable, k)
 
-    def _comment(self, variable: FlatVariable) -> str:
-        return f" {string(variable.description)}" if variable.description else ""
+    def _declare(self, prefix: str, variable: FlatVariable, k: int, value: str = "", end: str = "") -> str:
+        comment = f" {string(variable.description)}" if variable.description else ""
+        binding = f" = {value}" if value else ""
+        attributes = self._attributes(variable, k)
+        return f"  {prefix}Real {quoted(variable.elements[k])}{attributes}{binding}{comment}{end};"
 
     def _attributes(self, variable: FlatVariable, k: int) -> str:
         found = [] if variable.unit is None else [f"unit={string(variable.unit)}"]
-        for key in ("min", "max", "start", "nominal"):
+        passed_on = variable.kind == "propagated"  # it has an equation of its own, and needs no start
+        for key in ("min", "max", "nominal") if passed_on else ("min", "max", "start", "nominal"):
             values = getattr(variable, key)
             if values is None or (values[k].is_constant() and abs(float(values[k])) == float("inf")):
                 continue

@@ -31,10 +31,9 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
     redundant = {id(e) for e in dae.reduced.redundant}
     kept = [e for e in flat.equations if id(e) not in redundant]
     written = (*kept, *flat.initial_equations)
-    sides = ca.vertcat(*(side for e in written for side in (e.left, e.right)), *flat.definitions.values())
-    names = [n for v in flat.variables for n in v.elements]
-    symbols = ca.symvar(ca.SX(ca.vertcat(sides, *flat.derivatives.values())))
-    orders = dict.fromkeys((*names, "time"), 0)
+    sides = ca.SX(ca.vertcat(*(side for e in written for side in (e.left, e.right))))
+    symbols = ca.symvar(ca.SX(ca.vertcat(sides, *flat.definitions.values(), *flat.derivatives.values())))
+    orders = dict.fromkeys((*(n for v in flat.variables for n in v.elements), "time"), 0)
     for name, order in (split_derivative(s.name()) for s in symbols):
         orders[name] = max(orders.get(name, 0), order)
     values = {
@@ -43,12 +42,16 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
         for k in range(top + 1)
     }
     values |= dae.table.values
-    function = ca.Function("sides", [ca.vertcat(*symbols)], [ca.densify(ca.SX(sides))])
-    expected = np.array(function(ca.DM([values[s.name()] for s in symbols]))).ravel()
+    left = dict(flat.definitions)
+    while left:  # each uses others, in whatever order they stand
+        ready = {n: e for n, e in left.items() if not any(s.name() in left for s in ca.symvar(e))}
+        assert ready
+        values |= {n: float(_numbers(e, values)[0]) for n, e in ready.items()}
+        left = {n: e for n, e in left.items() if n not in ready}
+    expected = _numbers(sides, values)
     others = read.tree.equations[len(kept) :]
-    variables = {
-        n: v for n, v in values.items() if n not in dae.parameters
-    }  # parameters have what the text says
+    said = {*dae.parameters, *flat.definitions}  # they have the values that the text gives them
+    variables = {n: v for n, v in values.items() if n not in said}
     evaluate = Evaluator(read, variables, {plain(e.left.name): e.right for e in others})
     equations = [*read.tree.equations[: len(kept)], *read.tree.initial_equations]
     for number, (equation, one) in enumerate(zip(equations, written, strict=True)):
@@ -57,7 +60,13 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
         found = evaluate(equation.left) - evaluate(equation.right)
         # rounding of sums in another order, relative to the sizes of the two sides and of their terms, about 10
         assert abs(found - (left - right)) <= 1e-12 * max(abs(left), abs(right), 10.0), one.name
-    for name, value in zip(flat.definitions, expected[2 * len(written) :], strict=True):
-        assert abs(evaluate.name(name) - value) <= 1e-12 * max(abs(value), 10.0), name
+    for name in said:
+        assert abs(evaluate.name(name) - values[name]) <= 1e-12 * max(abs(values[name]), 10.0), name
     for equation in others:
         assert evaluate(equation.left) == evaluate(equation.right), str(equation.left)
+
+
+def _numbers(expressions: ca.SX, values: dict[str, float]) -> np.ndarray:
+    symbols = ca.symvar(expressions)
+    function = ca.Function("numbers", [ca.vertcat(*symbols)], [ca.densify(expressions)])
+    return np.array(function(ca.DM([values[s.name()] for s in symbols]))).ravel()

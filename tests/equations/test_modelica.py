@@ -58,6 +58,47 @@ class Slide(Model):
         yield connect(self.slide.frame_b, self.mass.frame_a)
 
 
+class Swing(Model):
+    """A body on a turning bar and a ball joint: orientations and angular velocities are passed on."""
+
+    world = multibody.World()
+    joint = multibody.Revolute(n=[0.0, 1.0, 0.0])
+    bar = multibody.FixedTranslation(r=[1.0, 0.0, 0.2])
+    ball = multibody.Spherical()
+    body = multibody.Body(m=2.0, r_cm=[0.2, 0.1, 0.0])
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.joint.frame_a)
+        yield connect(self.joint.frame_b, self.bar.frame_a)
+        yield connect(self.bar.frame_b, self.ball.frame_a)
+        yield connect(self.ball.frame_b, self.body.frame_a)
+
+
+class FourBars(Model):
+    """A planar loop in space, three of whose closing constraints repeat others."""
+
+    world = multibody.World()
+    joints = Array(multibody.Revolute, 4, n=[0.0, 1.0, 0.0])
+    crank = multibody.FixedTranslation(r=[0.0, 0.0, 1.0])
+    coupler = multibody.FixedTranslation(r=[2.0, 0.0, 0.5])
+    rocker = multibody.FixedTranslation(r=[0.0, 0.0, 1.5])
+    ground = multibody.FixedTranslation(r=[2.0, 0.0, 0.0])
+    body = multibody.Body(m=1.0, r_cm=[1.0, 0.0, 0.0])
+
+    def equations(self):
+        a, b, c, d = self.joints
+        yield connect(self.world.frame_b, a.frame_a)
+        yield connect(a.frame_b, self.crank.frame_a)
+        yield connect(self.crank.frame_b, b.frame_a)
+        yield connect(b.frame_b, self.coupler.frame_a)
+        yield connect(b.frame_b, self.body.frame_a)
+        yield connect(self.coupler.frame_b, c.frame_a)
+        yield connect(self.world.frame_b, self.ground.frame_a)
+        yield connect(self.ground.frame_b, d.frame_a)
+        yield connect(d.frame_b, self.rocker.frame_a)
+        yield connect(self.rocker.frame_b, c.frame_b)
+
+
 class Started(Model):
     """Attributes of every kind, an initial equation, an output, a third derivative."""
 
@@ -85,6 +126,8 @@ MODELS = [
     pytest.param(Oscillator(), id="oscillator"),
     pytest.param(Shaft(), id="shaft"),
     pytest.param(Slide(), id="slide"),
+    pytest.param(Swing(), id="swing"),
+    pytest.param(FourBars(), id="four bars"),
     pytest.param(Started(), id="started"),
 ]
 
@@ -113,6 +156,11 @@ def test_given_variables_become_inputs_and_free_inputs_unknowns():
     read = assert_same_residuals(dae)
     assert read.named("input") == ["mass.s"]
     assert "push.f" in read.unknowns
+
+
+def test_derivatives_that_are_asked_for_become_outputs():
+    read = assert_same_residuals(translate(Pendulum(), find=["der(v_x)", "der(der(v_y))"]))
+    assert set(read.named("output")) == {"wanted der(der(v_y))"}  # the model has der(v_x) itself
 
 
 def test_no_derivative_of_a_derivative_and_no_dotted_name_outside_of_quotes():
