@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.blocks import block_pattern
+from gantrytau.conditioning import Conditioning
 from gantrytau.dae import Dae
 from gantrytau.dependents import definitions_of, dependents
 from gantrytau.errors import ModelError, SolveError
@@ -27,7 +28,8 @@ Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """x' = ode(t, x, z, w), 0 = algebraic; invariants(t, x, w) are levels that must stay zero.
+    """x' = ode(t, x, z, w), 0 = algebraic; invariants(t, x, w) are levels that must stay zero,
+    rows the names of their equations.
 
     states: names of x, every derivative below the highest; known: expression of each known symbol in
     time and the sampled inputs w (values, then slopes); symbols: all symbols in terms of (t, x, z, w).
@@ -44,9 +46,11 @@ class Coordinates:
     ode: ca.SX
     algebraic: ca.SX
     invariants: tuple[ca.SX, ...]
+    rows: tuple[tuple[str, ...], ...]
     known: Mapping[str, ca.SX]
     definitions: tuple[tuple[ca.SX, ca.SX], ...]
     pivots: ca.SX
+    conditioning: Conditioning
 
     @property
     def constrained(self) -> bool:
@@ -100,8 +104,8 @@ class Coordinates:
         return x, np.array([found[n] for n in self.algebraics])
 
     @cached_property
-    def _levels(self) -> list[ca.Function]:
-        """Each level as a function to its residual, Jacobian and the size of its terms."""
+    def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
+        """Each level: its columns, the function to its residual and Jacobian, the names of its rows."""
         found = []
         positions = {n: k for k, n in enumerate(self.states)}
         for stage, residual in enumerate(self.invariants, start=-len(self.invariants)):
@@ -113,42 +117,73 @@ class Coordinates:
                 continue
             x = self.x[columns]
             jacobian = ca.densify(ca.jacobian(residual, x))
-            found.append(
-                (columns, ca.Function("level", [self.x, time, self.t0, self.w], [residual, jacobian]))
-            )
+            arguments = [self.x, time, self.t0, self.w]
+            function = ca.Function("level", arguments, [residual, jacobian], {"cse": True})
+            found.append((columns, function, self.rows[stage]))
         return found
 
-    def project(self, x: np.ndarray, t: float, w: np.ndarray) -> np.ndarray:
-        """The nearest point that satisfies all constraints; SolveError if there is none near."""
-        x, worst = x.copy(), 0.0
-        for columns, level in self._levels:
+    def project(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """The nearest points that satisfy all constraints, (points, n); SolveError where there is none near.
+
+        x: (points, n); t: (points,); w: (points, m).
+        """
+        x = x.copy()
+        for columns, level, _ in self._levels:
+            worst = np.zeros(len(x))
             for _ in range(STEPS):
-                residual, jacobian = (np.array(m) for m in level(x, t, t, w))
-                scale = np.maximum(np.abs(jacobian) @ np.abs(x[columns]), 1e-3)
-                worst = np.max(np.abs(residual.ravel()) / scale)
-                if not worst > LARGEST_DRIFT:
+                residual, jacobian = (np.array(m) for m in level(x.T, t[None], t[None], w.T))
+                jacobian = jacobian.reshape(len(residual), len(x), len(columns)).transpose(1, 0, 2)
+                scale = np.maximum(np.einsum("kij,kj->ki", np.abs(jacobian), np.abs(x[:, columns])), 1e-3)
+                worst = np.max(np.abs(residual.T) / scale, axis=1)
+                if not np.any(worst > LARGEST_DRIFT):
                     break
-                x[columns] -= np.linalg.lstsq(jacobian, residual.ravel(), rcond=1e-12)[0]
-            if not worst <= 1e-8:
-                raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {t:.6g} s", time=t)
+                x[:, columns] -= _shortest(jacobian, residual.T)
+            lost = np.flatnonzero(~(worst <= 1e-8))
+            if lost.size:
+                when = float(t[lost[0]])
+                raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when)
         return x
 
     def weakest(self, point: Point, start: Point) -> list[str]:
-        """Names of the equations that nearly depend on each other at a point, if they did not at the start."""
+        """Names of the equations that nearly depend on each other at a point, if they did not at the start.
+
+        The constraints are asked first: where they are sound, all equations of the accelerations are.
+        """
+        found = [
+            _dependent(*(np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start)), names)
+            for _, level, names in self._levels
+        ]
+        if any(found):
+            return next(names for names in found if names)
         if self.pivots.numel() == 0:
             return []
         function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
-        if not (np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
-            return []
-        rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
-        columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
-        left, values, _ = np.linalg.svd(here / rows / columns)
-        if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
-            return []
-        shares = np.abs(left[:, -1])
-        equations = self.dae.reduced.equations
-        return [equations[i].name for i in np.argsort(-shares)[:4] if shares[i] > 0.3 * np.max(shares)]
+        return _dependent(here, before, [e.name for e in self.dae.reduced.equations])
+
+
+def _shortest(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The shortest steps d with jacobian d = residual, (points, n)."""
+    square = jacobian @ jacobian.transpose(0, 2, 1)
+    try:
+        found = jacobian.transpose(0, 2, 1) @ np.linalg.solve(square, residual[:, :, None])
+        return found[:, :, 0]
+    except np.linalg.LinAlgError:
+        pairs = zip(jacobian, residual, strict=True)
+        return np.array([np.linalg.lstsq(j, r, rcond=1e-12)[0] for j, r in pairs])
+
+
+def _dependent(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> list[str]:
+    """Rows of a matrix that nearly depend on each other here, while before they did not."""
+    if not (here.size and np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
+        return []
+    rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
+    columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
+    left, values, _ = np.linalg.svd(here / rows / columns)
+    if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
+        return []
+    shares = np.abs(left[:, len(values) - 1])
+    return [names[i] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]
 
 
 def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[str] = ()) -> Coordinates:
@@ -186,38 +221,71 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         else ca.SX(0, 1)
     )
     algebraic = ca.vertcat(*(r for b in implicit for r in b.residuals)) if implicit else ca.SX(0, 1)
-    invariants = _invariants(dae, {i for i, _ in given})
+    invariants, rows = _invariants(dae, {i for i, _ in given})
     tops = ca.vertcat(*highest.values()) if highest else ca.SX(0, 1)
     pivots = ca.jacobian(ca.vertcat(*last.values()), tops) if last else ca.SX(0, 0)
     v, e = [s for s, _ in definitions], [d for _, d in definitions]
-    _, found = ca.substitute_inplace(v, e, [ode, algebraic, ca.densify(pivots), *invariants], False)
+    matrices = [
+        ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears))
+        for b in blocks
+        if len(b.unknowns) > 1 and b.tears
+    ]
+    wanted = [ode, algebraic, ca.densify(pivots), *matrices, *invariants]
+    _, found = ca.substitute_inplace(v, e, wanted, False)
+    row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
+    divisors = [found[2][row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
+    x = ca.vertcat(*(chains.named(n) for n in states)) if states else ca.SX(0, 1)
     tears = [y for b in implicit for y in b.tears]
+    z = ca.vertcat(*tears) if tears else ca.SX(0, 1)
     return Coordinates(
         dae=dae,
         states=states,
         algebraics=tuple(y.name() for y in tears),
         sampled=sampled,
-        x=ca.vertcat(*(chains.named(n) for n in states)) if states else ca.SX(0, 1),
-        z=ca.vertcat(*tears) if tears else ca.SX(0, 1),
+        x=x,
+        z=z,
         w=w,
         t0=t0,
         ode=found[0],
         algebraic=found[1],
-        invariants=tuple(found[3:]),
+        invariants=tuple(found[3 + len(matrices) :]),
+        rows=tuple(rows),
         known=known,
         definitions=tuple(definitions),
         pivots=found[2],
+        conditioning=Conditioning(
+            *_constraints(dae, found[3 + len(matrices) :], states),
+            divisors,
+            found[3 : 3 + len(matrices)],
+            [x, z, time, t0, w],
+        ),
     )
 
 
-def _invariants(dae: Dae, used: set[int]) -> list[ca.SX]:
-    """Residuals of the levels below the last: positions, then velocities; without equations that are used."""
-    counts = dae.indexed.counts
-    found = []
+def _constraints(dae: Dae, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
+    """Jacobian of the constraints of speeds, and which of its columns belong to dependent coordinates."""
+    if not invariants:
+        return ca.SX(0, 0), []
+    level = [derivative_name(n, top - 1) for n, top in dae.indexed.orders.items() if top]
+    names = [n for n in level if n in set(states)]
+    speeds = ca.vertcat(*(dae.reduced.chains.named(n) for n in names))
+    jacobian = ca.jacobian(invariants[-1], speeds)
+    used = [j for j in range(len(names)) if jacobian[:, j].nnz()]
+    chosen = set(dae.choice.states)
+    return jacobian[:, used], [k for k, j in enumerate(used) if names[j] not in chosen]
+
+
+def _invariants(dae: Dae, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
+    """Residuals of the levels below the last, positions, then velocities, and the names of their equations.
+
+    used: equations that give dependent variables, which hold anyway.
+    """
+    counts, found, names = dae.indexed.counts, [], []
     for stage in range(-max(counts, default=0), 0):
         rows = [(i, stage + c) for i, c in enumerate(counts) if stage + c >= 0 and i not in used]
         found.append(ca.vertcat(*(dae.indexed.residuals[key] for key in rows)) if rows else ca.SX(0, 1))
-    return found
+        names.append(tuple(dae.reduced.equations[i].name for i, _ in rows))
+    return found, names
 
 
 def _known_symbols(

@@ -4,6 +4,8 @@ The integrator sees every coordinate, not a choice of independent ones, so it ca
 that only the choice makes. Constraints and their derivatives are kept by projecting onto them.
 """
 
+import contextlib
+import io
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.coordinates import Coordinates, all_coordinates
+from gantrytau.conditioning import CLOSE, Look
+from gantrytau.coordinates import Coordinates, Point, all_coordinates
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.flat_model import FlatModel
@@ -26,7 +29,7 @@ from gantrytau.trajectories import result_of
 from gantrytau.translation import names, retranslate, translate
 
 CHUNK = 10  # output intervals between two projections onto the constraints
-HALVINGS = 8  # of the last step, to come near to where the integration stops
+HALVINGS = 14  # of the last step, to come near to where the integration stops
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
     "ERR_FAIL": "the steps became too small",
@@ -186,7 +189,8 @@ class _Run:
         rows = [self.mesh[here : here + count], h, np.arange(count)]
         if self.samples:
             rows += list(np.array([self._inputs(here + k) for k in range(count)]).T)
-        found = self.integrators[count](
+        found = self._integrate(
+            count,
             x0=self.x[here] if self.coordinates.states else 0.0,
             z0=self.z[here],
             p=[self.mesh[here], h[0]] if uniform else [],
@@ -196,52 +200,121 @@ class _Run:
         x = x if self.coordinates.states else np.zeros((count, 0))
         if not np.all(np.isfinite(x)):
             raise RuntimeError("the solution is not finite")
-        for k in range(count):
-            place = here + k + 1
-            self.x[place] = self.coordinates.project(x[k], self.mesh[place], self._inputs(place))
-            self.z[place] = z[k]
+        reached = slice(here + 1, here + count + 1)
+        inputs = np.array([self._inputs(k) for k in range(here + 1, here + count + 1)])
+        self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
+        self.z[reached] = z
         self.done = here + count
+        self._watch(here, here + count)
 
-    def _stopped(self, error: Exception) -> SolveError:
-        t, x, z, inputs = self._approach()
-        weakest = self.coordinates.weakest(
-            (x, z, t, inputs), (self.x[0], self.z[0], self.mesh[0], self._inputs(0))
-        )
-        reason = next(
-            (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
-        )
-        where = f" The equations that degenerate there: {'; '.join(weakest)}." if weakest else ""
+    def _watch(self, first: int, last: int) -> None:
+        """SolveError if a singular pose lies between two places of the mesh; `done` is then the last before it."""
+        if not self.coordinates.conditioning.needed:
+            return
+        inputs = np.array([self._inputs(k) for k in range(first, last + 1)])
+        places = slice(first, last + 1)
+        look = self._look(self.x[places], self.z[places], self.mesh[places], inputs)
+        for k in range(last - first):
+            crossed = look.side[k] * look.side[k + 1] < 0
+            if crossed or look.near[k + 1]:
+                self.done = first + k
+                point, distance, zero = self._approach(crossed=True)
+                if look.near[k + 1] or distance < CLOSE:
+                    raise self._singular_pose(point, zero)
+                self.done = last  # only the choice of coordinates fails there
+
+    def _look(self, x, z, t, inputs) -> Look:
+        return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], inputs.T)
+
+    def _singular_pose(self, point: Point, t: float) -> SolveError:
+        """What to say of a singular pose at time t, just behind a point."""
+        weakest = self._weakest(point)
         return SolveError(
-            f"{self.coordinates.dae.name}: the integration stopped at t = {t:.6g} s: {reason}.{where} The model may "
-            "run into a singular position there, or its solution may grow beyond all limits; .result holds what was "
-            "computed: look at it, and shorten the time or change the inputs",
+            f"{self.coordinates.dae.name}: the motion meets a singular pose at t = {t:.6g} s, where forces or "
+            f"accelerations are not determined. The equations that degenerate there: {'; '.join(weakest)}. .result "
+            "holds the motion up to there: keep away from that pose, or change the geometry",
             time=t,
             equations=weakest,
         )
 
-    def _approach(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """The last point that can be reached behind the last output point, by halved steps."""
+    def _weakest(self, point: Point) -> list[str]:
+        return self.coordinates.weakest(point, (self.x[0], self.z[0], float(self.mesh[0]), self._inputs(0)))
+
+    def _stopped(self, error: Exception) -> SolveError:
+        point, _, zero = self._approach()
+        if self._weakest(point):
+            return self._singular_pose(point, zero)
+        reason = next(
+            (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
+        )
+        return SolveError(
+            f"{self.coordinates.dae.name}: the integration stopped at t = {point[2]:.6g} s: {reason}. The solution "
+            "may grow beyond all limits there; .result holds what was computed: look at it, and shorten the time or "
+            "change the inputs",
+            time=point[2],
+            equations=[],
+        )
+
+    def _approach(self, crossed: bool = False) -> tuple[Point, float, float]:
+        """The last point that can be reached behind the last output point, by halved steps.
+
+        Its distance from a singular pose, and the time at which that distance would be zero. crossed: only
+        points on this side of where the determinant of the dependent coordinates changes its sign.
+        """
         t, x, z = float(self.mesh[self.done]), self.x[self.done], self.z[self.done]
         inputs = self._inputs(self.done)
-        half = len(self.samples)
-        step = self.mesh[min(self.done + 1, self.mesh.size - 1)] - t
+        step = longest = float(self.mesh[min(self.done + 1, self.mesh.size - 1)]) - t
+        if crossed and 1 not in self.integrators:
+            self.integrators[1] = self.coordinates.integrator(1, self.tolerance)
+        look = self._look(x[None], z[None], np.array([t]), inputs[None])
+        seen = [(t, float(look.distance[0]))]
         for _ in range(HALVINGS if 1 in self.integrators else 0):
             step /= 2
             try:
-                found = self.integrators[1](
-                    x0=x if self.coordinates.states else 0.0,
-                    z0=z,
-                    p=[] if half else [t, step],
-                    u=[t, step, 0, *inputs] if half else [],
-                )
-                there = np.concatenate([inputs[:half] + step * inputs[half:], inputs[half:]])
-                near = np.array(found["xf"]).ravel()[: x.size]
-                if np.all(np.isfinite(near)):
-                    near = self.coordinates.project(near, t + step, there)
-                    t, x, z, inputs = t + step, near, np.array(found["zf"]).ravel(), there
+                near, far, there = self._step(x, z, t, step, inputs)
             except (RuntimeError, SolveError):
                 continue
-        return t, x, z, inputs
+            new = self._look(near[None], far[None], np.array([t + step]), there[None])
+            if crossed and new.side[0] != look.side[0]:
+                continue
+            t, x, z, inputs, look = t + step, near, far, there, new
+            seen.append((t, float(look.distance[0])))
+            if look.near[0]:
+                break
+        return (x, z, t, inputs), seen[-1][1], _zero(seen, longest)
+
+    def _step(self, x: np.ndarray, z: np.ndarray, t: float, step: float, inputs: np.ndarray):
+        """States, algebraics and sampled inputs a step later."""
+        half = len(self.samples)
+        found = self._integrate(
+            1,
+            x0=x if self.coordinates.states else 0.0,
+            z0=z,
+            p=[] if half else [t, step],
+            u=[t, step, 0, *inputs] if half else [],
+        )
+        there = np.concatenate([inputs[:half] + step * inputs[half:], inputs[half:]])
+        near = np.array(found["xf"]).ravel()[: x.size]
+        if not np.all(np.isfinite(near)):
+            raise RuntimeError("the solution is not finite")
+        projected = self.coordinates.project(near[None], np.array([t + step]), there[None])[0]
+        return projected, np.array(found["zf"]).ravel(), there
+
+    def _integrate(self, count: int, **arguments: Any) -> dict[str, ca.DM]:
+        """One call of an integrator, which else writes its complaints to the screen."""
+        with contextlib.redirect_stderr(io.StringIO()):
+            return self.integrators[count](**arguments)
+
+
+def _zero(seen: list[tuple[float, float]], longest: float) -> float:
+    """When a distance that falls to zero along a straight line is zero; the last time if it is not soon."""
+    t, distance = seen[-1]
+    if len(seen) > 1:
+        before, larger = seen[-2]
+        wait = distance * (t - before) / max(larger - distance, 1e-300)
+        if 0 <= wait < longest:
+            return t + wait
+    return t
 
 
 class _Progress:

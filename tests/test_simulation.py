@@ -295,7 +295,7 @@ def test_a_tool_led_out_of_reach_stops_and_names_the_link():
     error = caught.value
     assert error.time == pytest.approx(reached, abs=0.01)
     assert error.equations[0] == "arms[1].link (SphericalSpherical), equation 1"
-    assert "the integration stopped at t = 1.38" in str(error)
+    assert "the motion meets a singular pose at t = 1.38" in str(error)
     ahead = error.result["tool.r"][:, 0] - error.result["arms[1].frame_cart.r"][:, 0]
     np.testing.assert_allclose(
         ahead, np.sqrt(arm.length**2 - (low[0] + error.result.time) ** 2 - low[1] ** 2), atol=1e-8
