@@ -248,14 +248,12 @@ def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | No
     function = ca.Function("slopes", [at["T"], at["q"]], [inverse, -_slope(balance, "f", at), inertia])
     start = np.concatenate([strata.start("T"), strata.start("q")])
     steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (POINTS, start.size))
+    _require_regular(strata, *(np.array(m) for m in function(*np.split(start, 2))))
+    if not _written_out(functions):
+        return None
     found = []
     for point in (start, *(start + steps * np.maximum(np.abs(start), 1.0))):
-        try:
-            inverse, S, inertia = (np.array(m) for m in function(*np.split(point, 2)))
-        except RuntimeError:  # no position of the passive joints there
-            continue
-        if not found:
-            _require_regular(strata, inverse, S, inertia)
+        inverse, S, _ = (np.array(m) for m in function(*np.split(point, 2)))
         if np.all(np.isfinite(inverse)) and np.all(np.isfinite(S)) and np.linalg.cond(S) < 1 / LEAST:
             found.append(np.linalg.solve(S.T, inverse).T)
     weights = found[0]
