@@ -29,6 +29,7 @@ ORDERS = {
     "f": ("f", 0),
 }
 EVERYTHING = tuple(ORDERS)
+FOLLOWS = ("T", "q", "dT", "ddT")  # what passive coordinates and their rates follow from
 GOOD_PIVOT = 0.05  # of an equation, what others leave of it: with less it waits for better ones
 LEAST_PIVOT = 1e-9  # below, it says nothing new
 
@@ -98,8 +99,9 @@ def _iterated(
 class Strata:
     """The equations of a mechanism whose tool moves as a known function of time, ready to be cut.
 
-    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's; p: symbols
-    of the parameters; numbers: their values; constraints: which equations relate T and q alone.
+    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's, and "s", the
+    rates of passive coordinates that the balance needs; p: symbols of the parameters; numbers: their values;
+    constraints: which equations relate T and q alone.
     """
 
     def __init__(self, dae: Dae, roles: Mapping[str, Sequence[str]]):
@@ -110,9 +112,13 @@ class Strata:
         self.constraints: frozenset[int] = frozenset()
         self.distance = self._distances()
         self.constraints = frozenset(i for i, _ in self.cut(("T", "q")).left)
+        self.passive = self._passive()
+        self.columns["s"] = _column([ca.SX.sym(n) for n in self.passive])
 
     def names(self, kind: str) -> list[str]:
         """Scalar names of a kind: `der(x)` for rates."""
+        if kind == "s":
+            return list(self.passive)
         role, order = ORDERS[kind]
         return [derivative_name(n, order) for n in self.roles[role]]
 
@@ -143,6 +149,18 @@ class Strata:
             self, tuple(kinds), known, tuple(solve_blocks(pattern.blocks, rest, by_name, guide)), left, twins
         )
 
+    def _passive(self) -> tuple[str, ...]:
+        """Rates that the motion of the tool determines without any force, and that occur in the balance of forces."""
+        dae = self.dae
+        known, _ = self._known(FOLLOWS)
+        unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+        left = self._left(unknowns)
+        motion = {k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left}
+        found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
+        forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
+        needed = {s.name() for s in ca.symvar(_column(forces))} - set(self._known(EVERYTHING)[0])
+        return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
+
     def _left(self, unknowns: Sequence[str]) -> tuple[Key, ...]:
         """Equations that are not needed to find the unknowns: constraints first, then those far from the forces."""
         residuals, dae = self.dae.indexed.residuals, self.dae
@@ -155,9 +173,10 @@ class Strata:
         )
         matrix = np.array(numbers).reshape(len(keys), len(leaves))
         last = max(self.distance.values()) + 1
-        # motion is found from what was differentiated; forces must not help out
+        first, counts = -1 - max(dae.indexed.counts), dae.indexed.counts
+        # positions, speeds and accelerations are found from what was differentiated; forces must not help out
         ranks = [
-            last if i in self.constraints else -1 if dae.indexed.counts[i] else self.distance[i, times]
+            last if i in self.constraints else first + times if counts[i] else self.distance[i, times]
             for i, times in keys
         ]
         places = [leaves.index(n) for n in unknowns if n in leaves]
