@@ -11,7 +11,8 @@ known, stratum by stratum, the blocks that follow are solved, and what is left o
 | all, f too | balance R = S1 T'' + S2 q'' + S0(T, q, T', q') - S f = 0, left over | 6.7 |
 
 The forces inside are found from the equations nearest to f, so what is left over is the balance of the tool. Virtual
-work makes it unique: with K S = J^-T, M1 = K S1, M2 = K S2, G = K S0 at rest, and the bias K S0 - G.
+work makes it unique: with K S = J^-T, M1 = K S1, M2 = K S2, G = K S0 at rest, and the bias K S0 - G. Passive joints,
+such as those that let a plate turn, are found from T and q; their rates count as following the tool.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +25,7 @@ import numpy as np
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.model import Model
-from gantrytau.strata import EVERYTHING, Strata
+from gantrytau.strata import EVERYTHING, FOLLOWS, Strata
 from gantrytau.symbols import derivative_name
 from gantrytau.translation import names, translate, translate_flat
 from gantrytau.writing.graph import Graph
@@ -187,8 +188,10 @@ def _pieces(strata: Strata) -> dict[str, ca.Function]:
     last = {i: times for i, times in motion.left if i in strata.constraints}
     twins = motion.twins[len(motion.twins) - len(positions.twins) :]
     rows["relations"] = (motion, [*(residuals[k] for k in last.items()), *twins])
-    balance = strata.cut(EVERYTHING)
-    left = [k for k in balance.left if k[0] not in strata.constraints]
+    passive = strata.cut(FOLLOWS, "s", "the speed of the tool does not determine that of passive joints")
+    rows["passive"] = (passive, [dae.expression(n) for n in strata.names("s")])
+    balance = strata.cut((*EVERYTHING, "s"))
+    left = [k for k in balance.left if not dae.indexed.counts[k[0]]]  # no relation of positions
     rows["balance"] = (balance, [residuals[k] for k in left])
     found = {name: cut.function(name, expressions) for name, (cut, expressions) in rows.items()}
     n = len(strata.roles["T"])
@@ -198,7 +201,15 @@ def _pieces(strata: Strata) -> dict[str, ca.Function]:
                 f"{dae.name}: found {found[name].size1_out(0)} equations of {name} between tool and joints, expected {n}; "
                 "name the coordinates of one tool, the joints that move it, and the forces in these joints"
             )
-    return found
+    return found | {"balance": _with_passive(found["balance"], found.pop("passive"))}
+
+
+def _with_passive(balance: ca.Function, passive: ca.Function) -> ca.Function:
+    """The balance with rates of passive joints that follow from the motion of the tool."""
+    kind = ca.SX if _written_out({"balance": balance, "passive": passive}) else ca.MX
+    at = {name: kind.sym(name, *balance.size_in(name)) for name in balance.name_in() if name != "s"}
+    value = _call(balance, {**at, "s": _call(passive, at)})
+    return ca.Function("balance", list(at.values()), [value], list(at), ["value"], {"cse": True})
 
 
 def _written_out(functions: Mapping[str, ca.Function]) -> bool:
@@ -248,14 +259,12 @@ def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | No
     function = ca.Function("slopes", [at["T"], at["q"]], [inverse, -_slope(balance, "f", at), inertia])
     start = np.concatenate([strata.start("T"), strata.start("q")])
     steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (POINTS, start.size))
+    _require_regular(strata, *(np.array(m) for m in function(*np.split(start, 2))))
+    if not _written_out(functions):
+        return None
     found = []
     for point in (start, *(start + steps * np.maximum(np.abs(start), 1.0))):
-        try:
-            inverse, S, inertia = (np.array(m) for m in function(*np.split(point, 2)))
-        except RuntimeError:  # no position of the passive joints there
-            continue
-        if not found:
-            _require_regular(strata, inverse, S, inertia)
+        inverse, S, _ = (np.array(m) for m in function(*np.split(point, 2)))
         if np.all(np.isfinite(inverse)) and np.all(np.isfinite(S)) and np.linalg.cond(S) < 1 / LEAST:
             found.append(np.linalg.solve(S.T, inverse).T)
     weights = found[0]

@@ -29,6 +29,9 @@ ORDERS = {
     "f": ("f", 0),
 }
 EVERYTHING = tuple(ORDERS)
+FOLLOWS = ("T", "q", "dT", "ddT")  # what passive coordinates and their rates follow from
+GOOD_PIVOT = 0.05  # of an equation, what others leave of it: with less it waits for better ones
+LEAST_PIVOT = 1e-9  # below, it says nothing new
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +99,9 @@ def _iterated(
 class Strata:
     """The equations of a mechanism whose tool moves as a known function of time, ready to be cut.
 
-    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's; p: symbols
-    of the parameters; numbers: their values; constraints: which equations relate T and q alone.
+    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's, and "s", the
+    rates of passive coordinates that the balance needs; p: symbols of the parameters; numbers: their values;
+    constraints: which equations relate T and q alone.
     """
 
     def __init__(self, dae: Dae, roles: Mapping[str, Sequence[str]]):
@@ -108,9 +112,13 @@ class Strata:
         self.constraints: frozenset[int] = frozenset()
         self.distance = self._distances()
         self.constraints = frozenset(i for i, _ in self.cut(("T", "q")).left)
+        self.passive = self._passive()
+        self.columns["s"] = _column([ca.SX.sym(n) for n in self.passive])
 
     def names(self, kind: str) -> list[str]:
         """Scalar names of a kind: `der(x)` for rates."""
+        if kind == "s":
+            return list(self.passive)
         role, order = ORDERS[kind]
         return [derivative_name(n, order) for n in self.roles[role]]
 
@@ -123,9 +131,7 @@ class Strata:
         known, twins = self._known(kinds)
         residuals = self.dae.indexed.residuals
         unknowns = [n for n in all_symbols(self.dae.indexed, self.dae.reduced.known) if n not in known]
-        keys = sorted(residuals, key=lambda k: (k[0] in self.constraints, self.distance.get(k, 0), k))
-        served = _served([_inside(residuals[k], set(unknowns)) for k in keys])
-        left = tuple(sorted(k for k, matched in zip(keys, served, strict=True) if not matched))
+        left = self._left(unknowns)
         wanted = [self.dae.expression(n) for n in self.names(find)] if find else []
         wanted += [residuals[k] for k in left] if not find else []
         symbols = {s.name() for e in wanted for s in ca.symvar(e)} & set(unknowns)
@@ -142,6 +148,40 @@ class Strata:
         return Cut(
             self, tuple(kinds), known, tuple(solve_blocks(pattern.blocks, rest, by_name, guide)), left, twins
         )
+
+    def _passive(self) -> tuple[str, ...]:
+        """Rates that the motion of the tool determines without any force, and that occur in the balance of forces."""
+        dae = self.dae
+        known, _ = self._known(FOLLOWS)
+        unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+        left = self._left(unknowns)
+        motion = {k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left}
+        found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
+        forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
+        needed = {s.name() for s in ca.symvar(_column(forces))} - set(self._known(EVERYTHING)[0])
+        return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
+
+    def _left(self, unknowns: Sequence[str]) -> tuple[Key, ...]:
+        """Equations that are not needed to find the unknowns: constraints first, then those far from the forces."""
+        residuals, dae = self.dae.indexed.residuals, self.dae
+        keys = sorted(residuals)
+        leaves = list(dict.fromkeys(s.name() for r in residuals.values() for s in ca.symvar(r)))
+        symbols = ca.vertcat(*{s.name(): s for r in residuals.values() for s in ca.symvar(r)}.values())
+        slopes = ca.jacobian(_column([residuals[k] for k in keys]), symbols)
+        numbers = ca.Function("slopes", [symbols], [ca.densify(slopes)])(
+            ca.DM([dae.start[n] for n in leaves])
+        )
+        matrix = np.array(numbers).reshape(len(keys), len(leaves))
+        last = max(self.distance.values()) + 1
+        first, counts = -1 - max(dae.indexed.counts), dae.indexed.counts
+        # positions, speeds and accelerations are found from what was differentiated; forces must not help out
+        ranks = [
+            last if i in self.constraints else first + times if counts[i] else self.distance[i, times]
+            for i, times in keys
+        ]
+        places = [leaves.index(n) for n in unknowns if n in leaves]
+        chosen = _independent(matrix[:, places], np.linalg.norm(matrix, axis=1), ranks)
+        return tuple(k for i, k in enumerate(keys) if i not in chosen)
 
     def _known(self, kinds: Iterable[str]) -> tuple[dict[str, ca.SX], tuple[ca.SX, ...]]:
         """Expression of each known symbol; relations where two coordinates are the same one."""
@@ -183,39 +223,25 @@ class Strata:
         return {k: found.get(k, level) for k in rows}
 
 
-def _served(rows: Sequence[Sequence[str]]) -> list[bool]:
-    """Which rows have an unknown of their own in a largest pairing; earlier rows are served first."""
-    row_of: dict[str, int] = {}
-    name_of: dict[int, str] = {}
-    for start in range(len(rows)):
-        came_from: dict[str, int] = {}
-        queue = [start]
-        for i in queue:
-            new = [n for n in rows[i] if n not in came_from]
-            came_from.update(dict.fromkeys(new, i))
-            free = next((n for n in new if n not in row_of), None)
-            if free is not None:
-                _shift(free, start, came_from, row_of, name_of)
-                break
-            queue += [row_of[n] for n in new]
-    return [i in name_of for i in range(len(rows))]
-
-
-def _shift(
-    free: str, start: int, came_from: Mapping[str, int], row_of: dict[str, int], name_of: dict[int, str]
-):
-    """Pair row `start` by moving the rows on the path from it to a free unknown."""
-    while True:
-        row = came_from[free]
-        before = name_of.get(row)
-        row_of[free], name_of[row] = row, free
-        if row == start or before is None:
-            return
-        free = before
-
-
-def _inside(residual: ca.SX, unknowns: set[str]) -> list[str]:
-    return [s.name() for s in ca.symvar(residual) if s.name() in unknowns]
+def _independent(matrix: np.ndarray, sizes: np.ndarray, ranks: Sequence[int]) -> set[int]:
+    """A largest set of independent rows, those of low rank first unless they lean on others; sizes: of whole rows."""
+    norms = np.linalg.norm(matrix, axis=1)
+    norms[norms <= LEAST_PIVOT * sizes] = 0.0  # nothing but rounding
+    rest = matrix / np.where(norms > 0, norms, np.inf)[:, None]
+    chosen: set[int] = set()
+    for least in (GOOD_PIVOT, LEAST_PIVOT):
+        for rank in sorted(set(ranks)):
+            candidates = [i for i in range(len(ranks)) if ranks[i] == rank and i not in chosen]
+            while candidates:
+                left = np.linalg.norm(rest[candidates], axis=1)
+                best = int(np.argmax(left))
+                if not left[best] > least:
+                    break
+                row = candidates.pop(best)
+                chosen.add(row)
+                direction = rest[row] / left[best]
+                rest -= np.outer(rest @ direction, direction)
+    return chosen
 
 
 def _column(elements: Sequence[ca.SX]) -> ca.SX:

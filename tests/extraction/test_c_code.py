@@ -11,6 +11,7 @@ import pytest
 from gantrytau import Input, Model, ModelError, Real, der, extract_mechanism, sin, translate
 from gantrytau.c_code import c_source
 from gantrytau_models import GantryTau, prototypes
+from gantrytau_models.six_link import SixLinkGantryTau
 
 FORCES = [f"carts[{i}].f" for i in range(3)]
 COMPILER = shutil.which("cc") or shutil.which("gcc")
@@ -102,6 +103,22 @@ def test_functions_of_a_mechanism_compile(tmp_path):
     )
     (masses,) = load(c_source(mechanism.M2, name="carts_inertia"), tmp_path, "carts_inertia")
     same([masses([0.5, 3.0, -0.6], [0.1, 0.2, 0.3])], [mechanism.M2([0.5, 3.0, -0.6], [0.1, 0.2, 0.3])])
+
+
+@compiled_only
+def test_iterations_and_linear_systems_of_the_six_link_robot_compile(tmp_path):
+    mechanism = extract_mechanism(
+        SixLinkGantryTau(prototypes.L1),
+        tool="tool.r",
+        joints=[f"carts[{i}].s" for i in range(3)],
+        forces=FORCES,
+    )
+    pose = [0.5, 3.0, -0.6]
+    q = translate(GantryTau(prototypes.L1)).function(["tool.r"], [f"carts[{i}].s" for i in range(3)])(pose)
+    (masses,) = load(c_source(mechanism.M1, name="plate_inertia"), tmp_path, "plate_inertia")
+    found, expected = np.array(masses(pose, ca.vertcat(*q))), np.array(mechanism.M1(pose, ca.vertcat(*q)))
+    # Newton's method stops at 1e-13 on a way of its own
+    assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
 
 
 def test_comment_says_which_argument_is_what(inverse_dynamics, tmp_path, monkeypatch):
