@@ -15,6 +15,7 @@ from gantrytau.declarations import (
     Start,
     StateSelect,
 )
+from gantrytau.diagnosis import Diagnosis, check
 from gantrytau.errors import (
     GantryTauError,
     InitializationError,
@@ -48,7 +49,7 @@ from gantrytau.linearization import Linearization, linearize
 from gantrytau.model import Connector, Model, outer
 from gantrytau.result import Result
 from gantrytau.simulation import simulate
-from gantrytau.statements import branch, connect, constraint, root
+from gantrytau.statements import branch, connect, constraint, require, root
 from gantrytau.symbols import der, time
 from gantrytau.translation import translate
 
@@ -57,6 +58,7 @@ __all__ = [
     "Bounds",
     "Connector",
     "Dae",
+    "Diagnosis",
     "Fixed",
     "FlatModel",
     "Flow",
@@ -82,6 +84,7 @@ __all__ = [
     "atan2",
     "between",
     "branch",
+    "check",
     "c_source",
     "connect",
     "constraint",
@@ -98,6 +101,7 @@ __all__ = [
     "log",
     "norm_2",
     "outer",
+    "require",
     "root",
     "simulate",
     "sin",

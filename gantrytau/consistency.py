@@ -87,7 +87,7 @@ def _solve(level: Level, moving: Sequence[str], values: dict[str, float], starte
     scale = _terms(jacobian, point)
     bad = ~(np.abs(f) <= 1e-9 * scale)
     if np.any(bad):
-        raise InitializationError(_failure(level, f, bad, title))
+        raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
 
 
@@ -107,7 +107,8 @@ def newton(
     f, jacobian = at(point)
     damping = 0.0
     for _ in range(ITERATIONS):
-        if not np.all(np.isfinite(f)) or np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
+        sound = np.all(np.isfinite(f)) and np.all(np.isfinite(jacobian))
+        if not sound or np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
             break
         rows = np.maximum(np.linalg.norm(jacobian * weights, axis=1), 1e-30)
         scaled, target = jacobian * weights / rows[:, None], -f / rows
@@ -122,7 +123,8 @@ def newton(
             if attempt:
                 step *= min(1.0, _longest(point, step))
             f_new, jacobian_new = at(point + step)
-            size = np.linalg.norm(f_new / rows) if np.all(np.isfinite(f_new)) else np.inf
+            sound = np.all(np.isfinite(f_new)) and np.all(np.isfinite(jacobian_new))
+            size = np.linalg.norm(f_new / rows) if sound else np.inf
             # at once only where the equations are as good as linear; a large step may reach another branch
             if size < (1 - 1e-4 if attempt else 0.1) * merit:
                 point, f, jacobian, moved = point + step, f_new, jacobian_new, True
@@ -165,10 +167,11 @@ def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: Mapping[in
         rows = {i: left - single.keys() for i, left in rows.items()}
 
 
-def _failure(level: Level, f: np.ndarray, bad: np.ndarray, title: str) -> str:
+def _failure(level: Level, f: np.ndarray, bad: np.ndarray, title: str) -> InitializationError:
     order = sorted(np.flatnonzero(bad), key=lambda i: -abs(f[i]) if np.isfinite(f[i]) else -np.inf)
     worst = "; ".join(f"{level.names[i]} is off by {f[i]:.3g}" for i in order[:5])
-    return (
+    return InitializationError(
         f"{title}: no consistent start found. Worst residuals: {worst}. Expected 0: change the start values "
-        "or the parameters (is a length out of reach?), or release a fixed start"
+        "or the parameters (is a length out of reach?), or release a fixed start",
+        residuals={level.names[i]: float(f[i]) for i in order},
     )

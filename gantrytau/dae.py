@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -19,37 +19,8 @@ from gantrytau.states import StateChoice
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.system import System, assemble
 
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """What translation found out: sizes, states and their conditioning, blocks. Prints itself."""
-
-    model: str
-    unknowns: int
-    equations: int
-    aliases: int
-    differentiated: int
-    mobility: int
-    redundant: tuple[str, ...]
-    states: tuple[str, ...]
-    condition: float
-    blocks: tuple[tuple[str, int, int], ...]  # kind, unknowns, torn unknowns
-
-    def __str__(self) -> str:
-        several = [
-            f"{kind} {size}" + (f" -> {torn}" if torn < size else "")
-            for kind, size, torn in self.blocks
-            if size > 1
-        ]
-        return "\n".join(
-            [
-                f"{self.model}: {self.equations} equations, {self.unknowns} unknowns",
-                f"  {self.aliases} aliases removed, {self.differentiated} equations differentiated",
-                f"  mobility {self.mobility}, redundant constraints: {', '.join(self.redundant) or 'none'}",
-                f"  states (condition {self.condition:.3g}): {', '.join(self.states) or 'none'}",
-                f"  {len(self.blocks)} blocks, of them with several unknowns: {', '.join(several) or 'none'}",
-            ]
-        )
+if TYPE_CHECKING:
+    from gantrytau.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +52,7 @@ class Dae:
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states (scalars), as the model calls them: a speed by its own name, not `der(...)`."""
-        return tuple(self._spoken(name) for name in self.choice.states)
+        return tuple(self.spoken(name) for name in self.choice.states)
 
     @property
     def algebraics(self) -> tuple[str, ...]:
@@ -109,21 +80,11 @@ class Dae:
         return (*(n for v in self.flat.variables for n in v.elements), *self.flat.definitions)
 
     @cached_property
-    def diagnosis(self) -> Diagnosis:
-        """Sizes, mobility, states and blocks; prints itself."""
-        positions = sum(1 for n in self.choice.states if not n.startswith("der("))
-        return Diagnosis(
-            model=self.name,
-            unknowns=sum(len(v.elements) for v in self.flat.variables) - len(self.known),
-            equations=len(self.flat.equations),
-            aliases=len(self.flat.equations) - len(self.reduced.residuals),
-            differentiated=sum(1 for c in self.indexed.counts if c),
-            mobility=positions,
-            redundant=tuple(e.name for e in (*self.redundant, *self.reduced.redundant)),
-            states=self.states,
-            condition=self.choice.condition,
-            blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in self.blocks),
-        )
+    def diagnosis(self) -> "Diagnosis":
+        """Sizes, mobility, loops, states, blocks and the start; prints itself."""
+        from gantrytau.diagnosis import diagnose
+
+        return diagnose(self)
 
     @cached_property
     def vectors(self) -> Mapping[str, FlatVariable]:
@@ -139,7 +100,7 @@ class Dae:
             return (name,)
         if base in self.flat.absent:
             raise ModelError(f"{self.name}: {base} does not exist: {self.flat.absent[base]}")
-        known = [*self._scalars, *self.vectors]
+        known = list(dict.fromkeys((*self.vectors, *self.variables, *self.parameters)))
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
 
     @cached_property
@@ -158,7 +119,8 @@ class Dae:
                     found[key] = name
         return found
 
-    def _spoken(self, name: str) -> str:
+    def spoken(self, name: str) -> str:
+        """What the model calls a symbol: a speed by its own name, not `der(...)`."""
         return self._spoken_names.get(name, name)
 
     def expression(self, name: str) -> ca.SX:

@@ -1,7 +1,7 @@
 """Everything the toolkit raises on purpose. Each message says path, found, expected, remedy."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 
@@ -18,7 +18,14 @@ class StructureError(GantryTauError):
 
 
 class InitializationError(GantryTauError):
-    """No consistent start was found; the message lists the worst residuals by name."""
+    """No consistent start was found; the message lists the worst residuals by name.
+
+    residuals: what is left of the equations that do not hold, by name.
+    """
+
+    def __init__(self, message: str, *, residuals: Mapping[str, float] | None = None):
+        super().__init__(message)
+        self.residuals = dict(residuals or {})
 
 
 class SolveError(GantryTauError):

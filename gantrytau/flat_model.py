@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.declarations import StateSelect
-from gantrytau.statements import Equation
+from gantrytau.statements import Equation, Requirement
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,8 @@ class FlatModel:
     derivatives: symbols of derivatives by name, `der(x)`; propagated: quantities, such as orientations, that
     are no unknowns but `definitions`: expressions, by scalar name, of variables and of definitions before
     them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
-    scalars known from outside; absent: declared names that this model has no use for, and why.
+    scalars known from outside; absent: declared names that this model has no use for, and why;
+    requirements: conditions on parameters.
     """
 
     name: str
@@ -82,6 +83,7 @@ class FlatModel:
     inputs: tuple[str, ...]
     hints: Mapping[str, str]
     absent: Mapping[str, str]
+    requirements: tuple[Requirement, ...]
 
     def find(self, name: str) -> FlatVariable | None:
         """The variable, parameter or propagated quantity of that name."""

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -15,7 +16,7 @@ from gantrytau.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
 from gantrytau.model import Declared, Model
 from gantrytau.propagation import Spread, Tree, spanning_tree
-from gantrytau.statements import Branch, Connection, Equation, Root, equality
+from gantrytau.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.symbols import scalars, split_derivative, time, writing
 
 HINTS = {
@@ -37,12 +38,15 @@ def write_out(instance: Instance) -> FlatModel:
     initial: list[Equation] = []
     connections: list[tuple[str, Connection]] = []
     ways: list[tuple[str, str, int, Branch | Root]] = []
+    requirements: list[Requirement] = []
     with writing(instance.symbols):
         for path, component in instance.components:
             name = type(component).__name__
             for number, statement in _statements(component.equations, path, name):
                 if isinstance(statement, Connection):
                     connections.append((path, statement))
+                elif isinstance(statement, Requirement):
+                    requirements.append(replace(statement, path=path, model=name))
                 elif isinstance(statement, (Branch, Root)):
                     ways.append((path, name, number, statement))
                 else:
@@ -69,6 +73,7 @@ def write_out(instance: Instance) -> FlatModel:
         spread.refuse_undefined((*written, *written_initial))
         absent = _absent(statements, tree)
         _refuse_absent((*written, *written_initial), absent)
+        _refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
         kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
         parameters = tuple(_parameter(p) for p in placed if kinds[p.name] == "parameter")
@@ -89,6 +94,7 @@ def write_out(instance: Instance) -> FlatModel:
         inputs=_free_inputs(instance, equations),
         hints=_hints(instance),
         absent=absent,
+        requirements=tuple(requirements),
     )
 
 
@@ -128,6 +134,17 @@ def _refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> 
                 )
 
 
+def _refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
+    """Start values of coordinates that do not exist would be lost silently."""
+    for placed in instance.quantities:
+        if placed.elements[0] in absent and "start" in placed.attributes:
+            if placed.attributes["start"].value is not placed.declaration.start:
+                raise ModelError(
+                    f"{placed.name}: found a start value, but it does not exist: {absent[placed.elements[0]]}; give start "
+                    "values to the coordinates of those joints"
+                )
+
+
 def _is_parameter(placed: Placed) -> bool:
     return isinstance(placed.declaration, Parameter)
 
@@ -139,7 +156,7 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
         for number, statement in enumerate(generate(), start=1):
             yield number, statement
     except GantryTauError as error:
-        if str(error).startswith(path or "the model"):
+        if str(error).startswith((f"{path or 'the model'} (", f"{path or 'the model'}:", f"{path}.")):
             raise
         raise type(error)(f"{path or 'the model'} ({model}), equation {number + 1}: {error}") from error
     except (

@@ -121,6 +121,7 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
         else:
             independent.append(name)
     _check_limits(flat, values)
+    _check_requirements(flat, values, symbols)
     declared = [n for p in flat.parameters for n in p.elements]
     return ParameterTable(tuple(n for n in declared if n in set(independent)), values, expressions, symbols)
 
@@ -137,6 +138,29 @@ def _check_limits(flat: FlatModel, values: Mapping[str, float]) -> None:
                     raise ModelError(
                         f"{name}: value is {values[name]:g}, expected {word} {bound:g} ({parameter.description}); correct it"
                     )
+
+
+def _check_requirements(
+    flat: FlatModel, values: Mapping[str, float], symbols: Mapping[str, ca.SX]
+) -> None:
+    """ModelError for parameters that a component cannot work with."""
+    if not flat.requirements:
+        return
+    conditions = ca.vertcat(*(ca.SX(r.condition) for r in flat.requirements))
+    names = [leaf.name() for leaf in ca.symvar(conditions)]
+    foreign = [n for n in names if n not in values]
+    if foreign:
+        raise ModelError(f"require: found the variable {foreign[0]} in a condition, expected parameters only")
+    function = ca.Function("conditions", [ca.vertcat(*(symbols[n] for n in names))], [conditions])
+    for requirement, holds in zip(
+        flat.requirements, np.array(function([values[n] for n in names])).ravel(), strict=True
+    ):
+        if not holds:
+            here = sorted(s.name() for s in ca.symvar(ca.SX(requirement.condition)))
+            found = ", ".join(f"{n} = {values[n]:g}" for n in here[:9])
+            raise ModelError(
+                f"{requirement.path or 'the model'} ({requirement.model}): found {found}; {requirement.message}"
+            )
 
 
 def _sorted(needs: Mapping[str, list[str]]) -> list[str]:

@@ -63,12 +63,40 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     reduced = eliminate_aliases(bare, table, known)
     constraints = _constraints(flat, table, reduced, duals)
     guess = starting_guess(flat, table, reduced, list(constraints.level.leaves))
-    closed = _close(constraints, guess, guess.values, flat.name)
+    try:
+        closed = _close(constraints, guess, guess.values, flat.name)
+    except InitializationError as error:
+        raise _open_loops(flat, error) from None
     matrices = [_matrix(constraints, closed)]
     matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, matrices[0], flat.name)]
     kept = _independent(matrices, constraints.firm)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
     return Settled(_with_zero_forces(flat, redundant), redundant, closed)
+
+
+def _open_loops(flat: FlatModel, error: InitializationError) -> InitializationError:
+    """Which loops stay open and by how much, where the failure is one of closing."""
+    words = []
+    for loop in flat.loops:
+        place = f"{loop.a} - {loop.b}, "
+        gaps = {
+            kind: np.linalg.norm([v for n, v in error.residuals.items() if n.startswith(place + kind)])
+            for kind in ("position", "orientation")
+        }
+        if any(gaps.values()):
+            # the residual of orientation is 2 tan(angle / 2)
+            angle = np.degrees(2 * np.arctan(gaps["orientation"] / 2))
+            words.append(
+                f"the loop through {', '.join(loop.members)} stays open between {loop.a} and {loop.b}, by "
+                f"{gaps['position']:.3g} m and {angle:.3g} deg"
+            )
+    if not words:
+        return error
+    return InitializationError(
+        f"{flat.name}: {'; '.join(words)}. Expected frames that meet: correct lengths, offsets or joint axes, or, if it "
+        "can be closed, give start values of its joints nearer to that",
+        residuals=error.residuals,
+    )
 
 
 def _constraints(

@@ -69,6 +69,16 @@ class Constraint:
 
 
 @dataclass(frozen=True, eq=False)
+class Requirement:
+    """What parameters must satisfy: an expression that is true or not, and the message if it is not."""
+
+    condition: Any
+    message: str
+    path: str = ""
+    model: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Branch:
     """A rigid or jointed way along which propagated quantities go from connector a to b and back."""
 
@@ -112,6 +122,14 @@ def constraint(equation: Any, *, dual: Any) -> Constraint:
     Where the equation repeats others, as in planar loops, it is dropped and its dual is zero.
     """
     return Constraint(equation, dual)
+
+
+def require(condition: Any, message: str) -> Requirement:
+    """State what the parameters of a component must satisfy; ModelError with the message where they do not.
+
+    condition: a relation of parameters, `self.L > 0`; message: what was expected and what to do.
+    """
+    return Requirement(condition, message)
 
 
 def branch(

@@ -9,6 +9,7 @@ import casadi as ca
 from gantrytau.aliases import eliminate_aliases
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
+from gantrytau.determinacy import refuse_undetermined
 from gantrytau.errors import ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
@@ -73,6 +74,7 @@ def translate_flat(
     indexed = reduce_index(reduced, flat)
     symbols = all_symbols(indexed, reduced.known)
     guess = starting_guess(flat, table, reduced, symbols)
+    asked = {n: guess.values[n] for n in guess.values if n in guess.started}
     better = {**settled.guess, **(start or {})}
     if better:
         guess = replace(
@@ -91,7 +93,8 @@ def translate_flat(
     blocks = solve_blocks(
         pattern.blocks, indexed.residuals, by_name, Guide(sample, table.values, choice.states)
     )
-    settings |= dict(started=guess.started, fixed=guess.fixed)
+    refuse_undetermined(blocks, indexed, reduced, sample, flat)
+    settings |= dict(started=guess.started, fixed=guess.fixed, asked=asked)
     return Dae(
         flat,
         table,

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, Parameter, Real, der, dot, outer, root
+from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
 from gantrytau.mechanics.multibody.frames import Frame, World
 from gantrytau.mechanics.multibody.rotations import of_quaternion, spin_of_quaternion
 
@@ -55,6 +55,13 @@ class Body(Model):
             coordinates=None if self.free else ca.vertcat(self.q, self.z),
             equations=[dot(self.q, self.q) == 1, self.z == der(self.w)],
         )
+        yield require(
+            positive_definite(self.J), "expected a symmetric, positive definite inertia; for a point use PointMass"
+        )
+        yield require(
+            positive_definite(ca.trace(self.J) * ca.SX.eye(3) / 2 - self.J, least=-1e-12),
+            "expected principal moments of which none exceeds the sum of the other two; no body has such an inertia",
+        )
         yield self.r == a.r
         yield self.v == der(self.r)
         yield self.w == a.w
@@ -66,3 +73,13 @@ class Body(Model):
 
     def failure_hint(self, variable: str) -> str:
         return "the body has no mass or inertia against this motion" if variable in ("r", "q", "v") else ""
+
+
+def positive_definite(A: ca.SX, least: float = 0.0) -> ca.SX:
+    """Whether a (3, 3) matrix is symmetric and its principal minors, relative to its trace, exceed `least`."""
+    size = ca.fabs(ca.trace(A)) + 1e-300
+    B = A / size
+    symmetric = ca.norm_fro(B - B.T) < 1e-9
+    pairs = [(0, 1), (0, 2), (1, 2)]
+    minors = [B[i, i] for i in range(3)] + [B[i, i] * B[j, j] - B[i, j] ** 2 for i, j in pairs] + [ca.det(B)]
+    return ca.logic_and(symmetric, ca.mmin(ca.vertcat(*minors)) > least)

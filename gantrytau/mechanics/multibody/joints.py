@@ -1,6 +1,6 @@
 """Joints: one, two or three coordinates between frame_a and frame_b, and the rod with two ball joints."""
 
-from gantrytau import Parameter, Real, branch, connect, constraint, cross, der, dot, norm_2, outer
+from gantrytau import Parameter, Real, branch, connect, constraint, cross, der, dot, norm_2, outer, require
 from gantrytau.declarations import StateSelect
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody.frames import TwoFrames, World
@@ -26,6 +26,7 @@ class Prismatic(TwoFrames):
     def equations(self):
         a, b = self.frame_a, self.frame_b
         way = a.R @ self.e
+        yield require(norm_2(self.e) > 0, "expected an axis that is not zero")
         yield branch(a, b, forward=dict(R=a.R, w=a.w), backward=dict(R=b.R, w=b.w))
         yield b.r == a.r + way * self.s
         yield self.v == der(self.s)
@@ -56,6 +57,7 @@ class Revolute(TwoFrames):
     def equations(self):
         a, b = self.frame_a, self.frame_b
         n = unit(self.n)
+        yield require(norm_2(self.n) > 0, "expected an axis that is not zero")
         spin = a.R @ n * self.w
         yield branch(
             a,
@@ -144,6 +146,7 @@ class SphericalSpherical(TwoFrames):
         middle = (a.r + b.r) / 2
         # half of the force that the mass needs comes through each end
         inertial = self.m * (der(der(middle)) - self.world.gravity) / 2
+        yield require(self.L > 0, "expected a length above zero; connect the frames through a Spherical joint instead")
         yield constraint(self.L**2 == dot(rod, rod), dual=self.tension)
         yield a.f == -self.tension * rod + inertial
         yield b.f == self.tension * rod + inertial

@@ -1,0 +1,66 @@
+"""Refuses models whose equations have the right number and form, but do not determine their unknowns in numbers.
+
+A body without mass, a rotation that no torque depends on: the coefficient is there, and it is zero.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.aliases import Reduced
+from gantrytau.errors import StructureError
+from gantrytau.flat_model import FlatModel
+from gantrytau.guide import sample_values
+from gantrytau.index_reduction import Indexed
+from gantrytau.solution import Block
+from gantrytau.symbols import split_derivative
+
+LEAST = 1e-12  # of a coefficient, or of a singular value, relative to the terms of its equation
+
+
+def refuse_undetermined(
+    blocks: Sequence[Block], indexed: Indexed, reduced: Reduced, sample: Mapping[str, float], flat: FlatModel
+) -> None:
+    """StructureError that names the unknowns which the equations leave free at the start, and why."""
+    for block in blocks:
+        if block.tears and block.kind in ("explicit", "linear"):
+            free = _free(block, sample)
+            if free:
+                raise StructureError(_message(block, free, indexed, reduced, flat))
+
+
+def _free(block: Block, sample: Mapping[str, float]) -> list[str]:
+    residual = ca.vertcat(*block.residuals)
+    matrix = sample_values(ca.jacobian(residual, ca.vertcat(*block.tears)), sample)
+    if not np.all(np.isfinite(matrix)):
+        return []
+    terms = sample_values(ca.jacobian(residual, ca.vertcat(*ca.symvar(residual))), sample)
+    rows = np.maximum(np.nan_to_num(np.abs(terms)).max(axis=1, keepdims=True), 1e-300)
+    _, values, right = np.linalg.svd(matrix / rows)
+    if values[-1] > LEAST * max(values[0], 1e-3):
+        return []
+    shares = np.abs(right[-1])
+    return [block.tears[k].name() for k in np.argsort(-shares) if shares[k] > 0.1 * shares.max()]
+
+
+def _message(
+    block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduced, flat: FlatModel
+) -> str:
+    hints = {
+        (alias.root, alias.order): flat.hints[name]
+        for name, alias in reduced.aliases.items()
+        if name in flat.hints
+    }
+    words = []
+    for name in free[:4]:
+        base, order = split_derivative(name)
+        hint = next((hints[base, k] for k in range(order, -1, -1) if (base, k) in hints), "")
+        words.append(name + (f" ({hint})" if hint else ""))
+    equations = dict.fromkeys(indexed.names[i] for i, _ in block.equations)
+    shown = "; ".join(list(equations)[:4]) + (f" and {len(equations) - 4} more" if len(equations) > 4 else "")
+    return (
+        f"{flat.name}: {', '.join(words)} {'is' if len(words) == 1 else 'are'} not determined at the start: the "
+        f"coefficients in {shown} leave it free. Expected mass, inertia or a drive for every motion: give it one, hold "
+        "the motion, or start from another pose"
+    )
