@@ -1,8 +1,9 @@
 """Complete models: a pendulum, linkages and the Gantry-Tau robots with their parameters."""
 
 from gantrytau_models import prototypes
+from gantrytau_models.four_bar import FourBar
 from gantrytau_models.gantry_tau import GantryTau
 from gantrytau_models.pendulum import Pendulum
 from gantrytau_models.six_link import SixLinkGantryTau
 
-__all__ = ["GantryTau", "Pendulum", "SixLinkGantryTau", "prototypes"]
+__all__ = ["FourBar", "GantryTau", "Pendulum", "SixLinkGantryTau", "prototypes"]
