@@ -27,9 +27,10 @@ class Closure:
         self.equations: list[Equation] = []
         self.variables: list[FlatVariable] = []
         self._flows: dict[str, list[ca.SX]] = {}
-        for words, flow, residual, rate in a.closing(b):
-            rates = [None] * residual.numel() if rate is None else scalars(rate)
-            self._add(instance, f"loops[{number}].{flow}", (loop.a, loop.b, words), scalars(residual), rates)
+        for words, flow, basis, residual, rate in a.closing(b):
+            name = f"loops[{number}].{flow}"
+            self._add(instance, name, (loop.a, loop.b, words), scalars(residual), scalars(rate))
+            self._flows[flow] = scalars(basis @ self.variables[-1].symbol)
         if not self.equations:
             raise ModelError(
                 f"connect({loop.a}, {loop.b}) closes a loop of {', '.join(propagated(a))}, and "
@@ -42,14 +43,13 @@ class Closure:
         name: str,
         where: tuple[str, str, str],
         elements: list[ca.SX],
-        rates: Sequence[ca.SX | None],
+        rates: Sequence[ca.SX],
     ) -> None:
         a, b, words = where
         flow = name.rpartition(".")[2]
         declaration = type(self.connection.a).members()[flow]
         names = element_names(name, (len(elements),))
         symbols = [instance.symbols.add(n, "real").sx for n in names]
-        self._flows[flow] = symbols
         self.variables.append(
             FlatVariable(
                 name,
@@ -58,7 +58,7 @@ class Closure:
                 tuple(names),
                 ca.vertcat(*symbols),
                 declaration.unit,
-                f"{declaration.description}, from {a} to {b}",
+                f"cut from {a} to {b}, resolved in {a}",
                 owner=name.partition(".")[0],
             )
         )

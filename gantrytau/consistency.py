@@ -18,6 +18,7 @@ TOLERANCE = (
     1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
 )
 ITERATIONS = 100
+NOISE = 1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
 LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 
 
@@ -110,7 +111,8 @@ def newton(
         sound = np.all(np.isfinite(f)) and np.all(np.isfinite(jacobian))
         if not sound or np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
             break
-        rows = np.maximum(np.linalg.norm(jacobian * weights, axis=1), 1e-30)
+        rows = np.linalg.norm(jacobian * weights, axis=1)
+        rows = np.maximum(rows, NOISE * rows.max(initial=1e-30))
         scaled, target = jacobian * weights / rows[:, None], -f / rows
         merit = np.linalg.norm(target)
         left, sizes, right = np.linalg.svd(scaled, full_matrices=False)

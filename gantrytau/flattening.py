@@ -153,7 +153,8 @@ def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
     """Numbered statements of a component; an error on the way is told with the place where it happened."""
     number = 0
     try:
-        for number, statement in enumerate(generate(), start=1):
+        for statement in generate():
+            number += not isinstance(statement, Requirement)
             yield number, statement
     except GantryTauError as error:
         if str(error).startswith((f"{path or 'the model'} (", f"{path or 'the model'}:", f"{path}.")):

@@ -67,11 +67,11 @@ class Declared(_Part):
 class Connector(Declared):
     """A set of potentials (`Real`) and flows (`Flow`) through which components are connected."""
 
-    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any]]:
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
         """What makes this connector coincide with another one where a loop of propagated quantities closes.
 
-        Words for it, the name of the flow that enforces it, the residual, of the same shape, and the time
-        derivative of the residual where it is zero (None: by the chain rule).
+        Words for it, the name of the flow that enforces it, the matrix that turns multipliers into that flow,
+        the residual to which the multipliers belong, and its time derivative where it is zero.
         """
         yield from ()
 

@@ -1,8 +1,6 @@
 """`gantrytau check`: what translation finds out about a model."""
 
 from dataclasses import asdict
-from typing import Any
-
 import typer
 
 from gantrytau.commands.models import build, source_of
@@ -18,19 +16,15 @@ def check(
     Prints the numbers of equations and unknowns, how many ways the mechanism can move, redundant constraints,
     the states and the systems of equations to be solved. A model with a fault gets a message that names it.
     """
+    import gantrytau
+
     with reporting(json, source_of(model)):
         chosen = build(model, prototype, set_ or ())
         with busy(f"translating {chosen.name}"):
-            diagnosis = _diagnosis(chosen.model)
+            diagnosis = gantrytau.check(chosen.model)
         if json:
             typer.echo(as_json({**asdict(diagnosis), "prototype": chosen.prototype}))
         else:
             typer.echo(str(diagnosis))
-
-
-def _diagnosis(model: Any) -> Any:
-    import gantrytau
-
-    if hasattr(gantrytau, "check"):
-        return gantrytau.check(model)  # pyright: ignore[reportAttributeAccessIssue]
-    return gantrytau.translate(model).diagnosis
+    if diagnosis.missing:
+        raise typer.Exit(1)

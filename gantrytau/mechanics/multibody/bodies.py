@@ -56,10 +56,10 @@ class Body(Model):
             equations=[dot(self.q, self.q) == 1, self.z == der(self.w)],
         )
         yield require(
-            positive_definite(self.J), "expected a symmetric, positive definite inertia; for a point use PointMass"
+            no_negative_eigenvalue(self.J), "expected a symmetric, positive definite inertia, or semidefinite for a rod"
         )
         yield require(
-            positive_definite(ca.trace(self.J) * ca.SX.eye(3) / 2 - self.J, least=-1e-12),
+            no_negative_eigenvalue(ca.trace(self.J) * ca.SX.eye(3) / 2 - self.J),
             "expected principal moments of which none exceeds the sum of the other two; no body has such an inertia",
         )
         yield self.r == a.r
@@ -75,11 +75,9 @@ class Body(Model):
         return "the body has no mass or inertia against this motion" if variable in ("r", "q", "v") else ""
 
 
-def positive_definite(A: ca.SX, least: float = 0.0) -> ca.SX:
-    """Whether a (3, 3) matrix is symmetric and its principal minors, relative to its trace, exceed `least`."""
-    size = ca.fabs(ca.trace(A)) + 1e-300
-    B = A / size
-    symmetric = ca.norm_fro(B - B.T) < 1e-9
+def no_negative_eigenvalue(A: ca.SX) -> ca.SX:
+    """Whether a (3, 3) matrix is symmetric and all its principal minors are at least zero, up to rounding."""
+    B = A / (ca.fabs(ca.trace(A)) + 1e-300)
     pairs = [(0, 1), (0, 2), (1, 2)]
     minors = [B[i, i] for i in range(3)] + [B[i, i] * B[j, j] - B[i, j] ** 2 for i, j in pairs] + [ca.det(B)]
-    return ca.logic_and(symmetric, ca.mmin(ca.vertcat(*minors)) > least)
+    return ca.logic_and(ca.norm_fro(B - B.T) < 1e-9, ca.mmin(ca.vertcat(*minors)) > -1e-12)

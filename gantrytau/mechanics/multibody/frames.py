@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, root
+from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, der, root
 from gantrytau.mechanics.multibody.rotations import about, turning, unit
 
 
@@ -23,9 +23,13 @@ class Frame(Connector):
     t = Flow(3, unit="N.m", description="cut torque, resolved in the world")
 
     def closing(self, other):
-        """Two frames that coincide: the cut force holds the origins together, the cut torque the axes."""
-        yield "position", "f", self.r - other.r, None
-        yield "orientation", "t", turning(self.R @ other.R.T), self.w - other.w
+        """Two frames that coincide: the cut force holds the origins together, the cut torque the axes.
+
+        Resolved in this frame: what is redundant in a planar loop stays so when the plane turns.
+        """
+        R, gap = self.R, self.r - other.r
+        yield "position", "f", R, R.T @ gap, R.T @ der(gap)
+        yield "orientation", "t", R, turning(other.R.T @ R), R.T @ (self.w - other.w)
 
 
 class World(Model):
