@@ -86,6 +86,7 @@ class Coordinates:
         }
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
+            options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
@@ -143,6 +144,28 @@ class Coordinates:
                 when = float(t[lost[0]])
                 raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when)
         return x
+
+    def settle(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
+        for _ in range(STEPS if self.algebraics else 0):
+            residual, jacobian = (np.array(m) for m in self._algebra(x.T, z.T, t[None], t[None], w.T))
+            jacobian = jacobian.reshape(len(residual), len(x), z.shape[1]).transpose(1, 0, 2)
+            try:
+                step = np.linalg.solve(jacobian, residual.T[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                return z
+            if not np.all(np.isfinite(step)):
+                return z
+            z = z - step
+            if np.all(np.abs(step) <= LARGEST_DRIFT * (1.0 + np.abs(z))):
+                return z
+        return z
+
+    @cached_property
+    def _algebra(self) -> ca.Function:
+        jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
+        arguments = [self.x, self.z, time, self.t0, self.w]
+        return ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -203,7 +226,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     )
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in indexed.orders.items()}
     last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
-    guide = Guide(dae.start, dae.table.values, dae.choice.states)
+    guide = Guide(dae.start, dae.table.values, states)
     for block in dae.blocks:
         if not highest.keys() & set(block.unknowns):
             block.enter(guide)

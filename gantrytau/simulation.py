@@ -29,6 +29,7 @@ from gantrytau.trajectories import result_of
 from gantrytau.translation import names, retranslate, translate
 
 CHUNK = 10  # output intervals between two projections onto the constraints
+WITHIN = 0.5  # relative distance of a singular pose above which none lies within one output interval
 HALVINGS = 14  # of the last step, to come near to where the integration stops
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
@@ -203,7 +204,7 @@ class _Run:
         reached = slice(here + 1, here + count + 1)
         inputs = np.array([self._inputs(k) for k in range(here + 1, here + count + 1)])
         self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
-        self.z[reached] = z
+        self.z[reached] = self.coordinates.settle(self.x[reached], z, self.mesh[reached], inputs)
         self.done = here + count
         self._watch(here, here + count)
 
@@ -215,7 +216,8 @@ class _Run:
         places = slice(first, last + 1)
         look = self._look(self.x[places], self.z[places], self.mesh[places], inputs)
         for k in range(last - first):
-            crossed = look.side[k] * look.side[k + 1] < 0
+            within = min(look.distance[k], look.distance[k + 1]) < WITHIN
+            crossed = within and look.side[k] * look.side[k + 1] < 0
             if crossed or look.near[k + 1]:
                 self.done = first + k
                 point, distance, zero = self._approach(crossed=True)

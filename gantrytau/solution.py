@@ -93,11 +93,12 @@ def solve_block(
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
     partner = {i: places.get(name, -1) for i, name in partners.items()}
     first = {j for j, name in enumerate(unknowns) if name in guide.rates}
-    torn = tear(jacobian, numbers, x, relaxed=linear, partner=partner, first=first)
     # pivots of parameters alone can vanish nowhere: where they serve as well, they are taken
-    steady = tear(jacobian, numbers, x, relaxed=linear, partner=partner, first=set(), steady=guide.parameters)
-    if len(steady.tears) <= len(torn.tears):
-        torn = steady
+    ways = [dict(first=set(), steady=guide.parameters), dict(first=first, steady=guide.parameters), dict(first=first)]
+    torn = min(
+        (tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way) for way in ways),
+        key=lambda found: len(found.tears),
+    )
     inner: list[tuple[ca.SX, ca.SX]] = []
     rows, columns = ca.vertsplit(f), ca.vertsplit(x)
     for i, j in torn.assignments:
