@@ -6,6 +6,7 @@ from gantrytau_models.four_bar import FourBar
 from gantrytau_models.gantry_tau import GantryTau
 from gantrytau_models.pendulum import Pendulum
 from gantrytau_models.six_link import SixLinkGantryTau
+from gantrytau_models.stewart import StewartPlatform
 from gantrytau_models.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "SerialWrist",
     "SixLinkGantryTau",
     "SixLinkWithWrist",
+    "StewartPlatform",
     "WithWrist",
     "prototypes",
 ]
