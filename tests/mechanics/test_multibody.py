@@ -1,21 +1,23 @@
-"""Mechanisms of several joints, driven through their axes, and models made of models with frames."""
+"""Mechanisms of several joints driven through their axes, and models nested in models."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gantrytau import Array, Fixed, Input, Model, Parameter, Start, connect, simulate, sin, translate
+from gantrytau import Array, Model, Start, connect, simulate, sin, translate
 from gantrytau.mechanics import gears, rotational, translational
 from gantrytau.mechanics.multibody import (
     Body,
+    FixedRotation,
     FixedTranslation,
+    Frame,
     PointMass,
     Prismatic,
     Revolute,
-    Spherical,
-    Universal,
+    TwoFrames,
     World,
 )
+from tests.references.rotations import turn
 
 
 def numbers(function, *arguments):
@@ -165,3 +167,156 @@ def test_slide_on_a_ball_screw():
     a, force = numbers(f, 0.25, 0.1, 0.2)
     assert a == pytest.approx((push - 4.0 * 9.81) / mass, rel=1e-12)
     assert force == pytest.approx(4.0 * (a + 9.81), rel=1e-12)  # what the axis drives carries the slide
+
+
+def test_a_fixed_rotation_from_either_side():
+    about = 0.7 * np.array([0.6, 0.0, 0.8])
+
+    class Turned(Model):
+        world = World()
+        ahead = FixedRotation(n=[3.0, 0.0, 4.0], phi=0.7)
+        back = FixedRotation(n=[3.0, 0.0, 4.0], phi=0.7)
+        one, other = FixedTranslation(r=[0.1, 0.2, 0.3]), FixedTranslation(r=[0.1, 0.2, 0.3])
+        balls = Array(PointMass, 2, m=2.0)
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.ahead.frame_a)
+            yield connect(self.ahead.frame_b, self.one.frame_a)
+            yield connect(self.one.frame_b, self.balls[0].frame_a)
+            yield connect(self.world.frame_b, self.back.frame_b)
+            yield connect(self.back.frame_a, self.other.frame_a)
+            yield connect(self.other.frame_b, self.balls[1].frame_a)
+
+    at = translate(Turned()).evaluate()
+    for ball, R in ((0, turn(about)), (1, turn(-about))):
+        place = R @ [0.1, 0.2, 0.3]
+        np.testing.assert_allclose(at[f"balls[{ball}].frame_a.r"], place, atol=1e-15)
+    weights = sum(np.cross(at[f"balls[{k}].frame_a.r"], [0.0, 0.0, -19.62]) for k in (0, 1))
+    np.testing.assert_allclose(at["world.frame_b.t"], weights, rtol=1e-13)
+    np.testing.assert_allclose(at["world.frame_b.f"], [0.0, 0.0, -2 * 19.62], rtol=1e-13)
+
+
+class Arm(TwoFrames):
+    """A hinged bar with a body."""
+
+    hinge = Revolute(n=[0.0, -1.0, 0.0])
+    body = Body(m=1.5, r_cm=[0.2, 0.0, 0.1], J=np.diag([0.02, 0.02, 0.02]))
+    bar = FixedTranslation(r=[0.5, 0.0, 0.0])
+
+    def equations(self):
+        yield connect(self.frame_a, self.hinge.frame_a)
+        yield connect(self.hinge.frame_b, self.body.frame_a)
+        yield connect(self.hinge.frame_b, self.bar.frame_a)
+        yield connect(self.bar.frame_b, self.frame_b)
+
+
+class Pair(TwoFrames):
+    """Two arms in series, with two frames of their own at the tip."""
+
+    one, two = Arm(), Arm()
+    tip = Frame()
+
+    def equations(self):
+        yield connect(self.frame_a, self.one.frame_a)
+        yield connect(self.one.frame_b, self.two.frame_a)
+        yield connect(self.two.frame_b, self.frame_b)
+        yield connect(self.frame_b, self.tip)
+
+
+class Outside(Model):
+    """A five-bar linkage whose loop goes through frames of its parts, with a load at the tip."""
+
+    world = World()
+    left, right = Pair(), Pair()
+    join = Revolute(n=[0.0, -1.0, 0.0])
+    ground = FixedTranslation(r=[0.6, 0.0, 0.0])
+    load = PointMass(m=0.7)
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.left.frame_a)
+        yield connect(self.world.frame_b, self.ground.frame_a)
+        yield connect(self.ground.frame_b, self.right.frame_a)
+        yield connect(self.left.tip, self.join.frame_a)
+        yield connect(self.join.frame_b, self.right.frame_b)
+        yield connect(self.right.tip, self.load.frame_a)
+
+
+class FiveBar(TwoFrames):
+    """The same as a part with two frames; connections in another order, and to its own frames from inside."""
+
+    left, right = Pair(), Pair()
+    join = Revolute(n=[0.0, -1.0, 0.0])
+    ground = FixedTranslation(r=[0.6, 0.0, 0.0])
+
+    def equations(self):
+        yield connect(self.right.frame_b, self.frame_b)
+        yield connect(self.join.frame_b, self.right.tip)
+        yield connect(self.left.frame_b, self.join.frame_a)
+        yield connect(self.ground.frame_b, self.right.frame_a)
+        yield connect(self.left.frame_a, self.frame_a)
+        yield connect(self.frame_a, self.ground.frame_a)
+
+
+class Inside(Model):
+    """The five-bar as a part."""
+
+    world = World()
+    part = FiveBar()
+    load = PointMass(m=0.7)
+
+    def equations(self):
+        yield connect(self.part.frame_b, self.load.frame_a)
+        yield connect(self.world.frame_b, self.part.frame_a)
+
+
+def angles(one, two):
+    """Starts of the hinges of a pair."""
+    return dict(one=dict(hinge=dict(phi=Start(one))), two=dict(hinge=dict(phi=Start(two))))
+
+
+def test_loops_through_the_frames_of_parts():
+    parts = dict(left=angles(2.0, -1.0), right=angles(1.0, 1.0))
+    found = []
+    for model, before in ((Outside(**parts), ""), (Inside(part=parts), "part.")):
+        dae = translate(model)
+        assert dae.diagnosis.mobility == 2
+        assert len(dae.diagnosis.redundant) == 3
+        given = {"left.one.hinge.phi": 2.0, "right.one.hinge.phi": 1.2}
+        given |= {"left.one.hinge.w": 0.5, "right.one.hinge.w": -0.8}
+        at = dae.evaluate({before + name: value for name, value in given.items()})
+        gains = [f"der({before}{side}.{arm}.hinge.w)" for side in ("left", "right") for arm in ("one", "two")]
+        forces = [
+            "load.frame_a.f",
+            f"{before}left.frame_a.f",
+            f"{before}right.frame_a.f",
+            f"{before}join.frame_b.f",
+        ]
+        found.append((np.array([at[n] for n in gains]), np.array([at[n] for n in forces])))
+        # Newton for the whole: what the world carries is weight and inertia of all parts
+        total = at["load.frame_a.f"] + sum(
+            at[f"{before}{side}.{arm}.body.frame_a.f"] for side in ("left", "right") for arm in ("one", "two")
+        )
+        np.testing.assert_allclose(at["world.frame_b.f"], -total, atol=1e-10)
+        np.testing.assert_allclose(
+            at[f"{before}left.frame_a.f"] + at[f"{before}right.frame_a.f"], total, atol=1e-10
+        )
+    np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-9)
+    # across the plane only sums are determined
+    np.testing.assert_allclose(found[0][1][:, [0, 2]], found[1][1][:, [0, 2]], rtol=1e-8, atol=1e-9)
+
+
+def test_a_connection_stated_twice_says_nothing_new():
+    class Twice(Model):
+        world = World()
+        hinge = Revolute(n=[0.0, 1.0, 0.0])
+        body = Body(r_cm=[0.3, 0.0, 0.0])
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.hinge.frame_a)
+            yield connect(self.hinge.frame_a, self.world.frame_b)
+            yield connect(self.hinge.frame_b, self.body.frame_a)
+            yield connect(self.hinge.frame_b, self.body.frame_a)
+
+    dae = translate(Twice())
+    assert dae.diagnosis.redundant == ()
+    assert dae.evaluate()["der(hinge.w)"] == pytest.approx(9.81 * 0.3 / (0.1 + 0.09), rel=1e-13)

@@ -1,0 +1,202 @@
+"""Overconstrained linkages: by their count of joints they should not move, by their geometry they do."""
+
+import numpy as np
+import pytest
+
+from gantrytau import Array, Fixed, Model, Parameter, Start, connect, simulate, translate
+from gantrytau.mechanics.multibody import (
+    Body,
+    FixedRotation,
+    FixedTranslation,
+    PointMass,
+    Prismatic,
+    Revolute,
+    SphericalSpherical,
+    TwoFrames,
+    World,
+)
+
+
+def test_a_loop_of_slides():
+    class Wedge(Model):
+        """A wedge on the ground lifts a weight that slides in a vertical guide."""
+
+        world = World()
+        ground, slope, guide = (
+            Prismatic(n=[1.0, 0.0, 0.0]),
+            Prismatic(n=[-1.0, 0.0, 1.0]),
+            Prismatic(n=[0.0, 0.0, 1.0]),
+        )
+        wedge, weight = PointMass(m=2.0), PointMass(m=3.0)
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.ground.frame_a)
+            yield connect(self.ground.frame_b, self.wedge.frame_a)
+            yield connect(self.ground.frame_b, self.slope.frame_a)
+            yield connect(self.slope.frame_b, self.guide.frame_b)
+            yield connect(self.guide.frame_b, self.weight.frame_a)
+            yield connect(self.guide.frame_a, self.world.frame_b)
+
+    dae = translate(Wedge())
+    assert dae.diagnosis.mobility == 1
+    assert len(dae.diagnosis.redundant) == 4
+    at = dae.evaluate({"ground.s": 0.3})
+    assert at["guide.s"] == pytest.approx(0.3, rel=1e-13)
+    assert at["der(ground.v)"] == pytest.approx(-3.0 * 9.81 / 5.0, rel=1e-12)
+
+
+class Parallel(Model):
+    """A bar on four equal cranks and a rod, all parallel: two cranks would do."""
+
+    places = (0.0, 1.0, 0.4, 0.7, 0.2)
+    world = World()
+    bar = Body(m=2.0)
+    below = Array(FixedTranslation, [dict(r=[x, 0.0, 0.0]) for x in places])
+    above = Array(FixedTranslation, [dict(r=[x, 0.0, 0.0]) for x in places])
+    lower, upper = Array(Revolute, 4, n=[0.0, -1.0, 0.0]), Array(Revolute, 4, n=[0.0, -1.0, 0.0])
+    cranks = Array(FixedTranslation, 4, r=[0.5, 0.0, 0.0])
+    rod = SphericalSpherical(L=0.5)
+
+    def equations(self):
+        for below, above in zip(self.below, self.above, strict=True):
+            yield connect(self.world.frame_b, below.frame_a)
+            yield connect(above.frame_a, self.bar.frame_a)
+        for k, crank in enumerate(self.cranks):
+            yield connect(self.below[k].frame_b, self.lower[k].frame_a)
+            yield connect(self.lower[k].frame_b, crank.frame_a)
+            yield connect(crank.frame_b, self.upper[k].frame_a)
+            yield connect(self.upper[k].frame_b, self.above[k].frame_b)
+        yield connect(self.below[4].frame_b, self.rod.frame_a)
+        yield connect(self.rod.frame_b, self.above[4].frame_b)
+
+
+def test_parallel_cranks_and_rods_that_add_nothing_are_named():
+    dae = translate(Parallel(lower=dict(phi=Start(0.6)), upper=dict(phi=Start(-0.6))))
+    assert dae.diagnosis.mobility == 1
+    # the first loop leaves three of six out, the others four each, as a parallel crank only holds its own two hinges
+    assert len(dae.diagnosis.redundant) == 3 + 4 + 4 + 1
+    assert "rod (SphericalSpherical), equation 1" in dae.diagnosis.redundant
+    at = dae.evaluate({"lower[0].phi": 0.6, "lower[0].w": 1.5})
+    assert at["rod.tension"] == 0.0
+    # the bar moves on a circle without turning: a pendulum upside down
+    assert at["der(lower[0].w)"] == pytest.approx(-9.81 * np.cos(0.6) / 0.5, rel=1e-10)
+    np.testing.assert_allclose(at["bar.w"], 0.0, atol=1e-12)
+
+
+class Spatial(TwoFrames):
+    """A link after Denavit and Hartenberg: a hinge about z, then L along x and a twist about x."""
+
+    L = Parameter(1.0, unit="m", description="length")
+    twist = Parameter(0.0, unit="rad", description="twist", evaluate=True)
+    hinge = Revolute(n=[0.0, 0.0, 1.0])
+    body = Body(m=1.0, r_cm=[0.1, 0.05, 0.0], J=np.diag([0.01, 0.02, 0.03]))
+    bar = FixedTranslation(r=lambda self: [self.L, 0.0, 0.0])
+    end = FixedRotation(n=[1.0, 0.0, 0.0], phi=twist)
+
+    def equations(self):
+        yield connect(self.frame_a, self.hinge.frame_a)
+        yield connect(self.hinge.frame_b, self.body.frame_a)
+        yield connect(self.hinge.frame_b, self.bar.frame_a)
+        yield connect(self.bar.frame_b, self.end.frame_a)
+        yield connect(self.end.frame_b, self.frame_b)
+
+
+LENGTHS, TWIST = (0.4, 0.7), 0.6
+TWISTS = (TWIST, np.arcsin(LENGTHS[1] * np.sin(TWIST) / LENGTHS[0]))  # a / sin(alpha) = b / sin(beta)
+RATIO = np.sin(sum(TWISTS) / 2) / np.sin((TWISTS[1] - TWISTS[0]) / 2)
+
+
+class Bennett(Model):
+    """Bennett's linkage (1903): four skew hinges in a loop that Grübler says cannot move (-2)."""
+
+    world = World()
+    links = Array(Spatial, [dict(L=LENGTHS[k % 2], twist=TWISTS[k % 2]) for k in range(4)])
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.links[0].frame_a)
+        for k in range(3):
+            yield connect(self.links[k].frame_b, self.links[k + 1].frame_a)
+        yield connect(self.links[3].frame_b, self.world.frame_b)
+
+
+def bennett(first, w):
+    """The linkage with its first hinge at an angle and turning with w."""
+    second = 2 * np.arctan(RATIO / np.tan(first / 2))
+    starts = [Fixed(first), Start(second), Start(-first), Start(-second)]
+    hinges = [dict(phi=start) for start in starts]
+    hinges[0] |= dict(w=Fixed(w))
+    return Bennett(links=[dict(hinge=hinge) for hinge in hinges])
+
+
+def test_bennett_linkage_moves():
+    dae = translate(bennett(1.0, 2.0))
+    assert dae.diagnosis.mobility == 1
+    assert len(dae.diagnosis.redundant) == 3
+    motion = simulate(dae, stop=0.7, tolerance=1e-9, points=31)
+    phi = [motion[f"links[{k}].hinge.phi"] for k in range(4)]
+    assert np.ptp(phi[0]) > 0.5
+    # closure after Bennett, to a hundred times the tolerance of the projection
+    np.testing.assert_allclose(np.tan(phi[0] / 2) * np.tan(phi[1] / 2), RATIO, rtol=1e-9)
+    np.testing.assert_allclose([phi[2], phi[3]], [-phi[0], -phi[1]], atol=1e-10)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="of six constraints three are kept; at phi = 0 these let the linkage fall apart, all six would not",
+)
+@pytest.mark.parametrize("w", [2.0, 9.0])
+def test_bennett_linkage_stays_closed_through_its_flat_pose(w):
+    motion = simulate(bennett(1.0, w), stop=1.5, tolerance=1e-9, points=31)
+    phi = motion["links[0].hinge.phi"]
+    assert phi.min() < 0.0 or phi.max() > np.pi
+    # both ends of the loop are at the origin
+    assert np.abs(motion["links[3].end.frame_b.r"]).max() < 1e-9
+
+
+class Leg(TwoFrames):
+    """Three parallel hinges and two arms."""
+
+    n = Parameter(shape=3, unit="1", description="axis of the hinges", evaluate=True)
+    arm = Parameter(shape=3, unit="m", description="from one hinge to the next")
+    hinges = Array(Revolute, 3, n=n)
+    bars = Array(FixedTranslation, 2, r=arm)
+
+    def equations(self):
+        yield connect(self.frame_a, self.hinges[0].frame_a)
+        for k, bar in enumerate(self.bars):
+            yield connect(self.hinges[k].frame_b, bar.frame_a)
+            yield connect(bar.frame_b, self.hinges[k + 1].frame_a)
+        yield connect(self.hinges[2].frame_b, self.frame_b)
+
+
+class Sarrus(Model):
+    """Sarrus' linkage (1853): a plate on two legs with hinges along x and along y goes straight up."""
+
+    world = World()
+    plate = Body(m=2.0)
+    legs = Array(
+        Leg, [dict(n=[1.0, 0.0, 0.0], arm=[0.0, 0.5, 0.0]), dict(n=[0.0, 1.0, 0.0], arm=[0.5, 0.0, 0.0])]
+    )
+    feet = Array(FixedTranslation, [dict(r=[0.0, 0.2, 0.0]), dict(r=[0.2, 0.0, 0.0])])
+    tops = Array(FixedTranslation, [dict(r=[0.0, 0.2, 0.0]), dict(r=[0.2, 0.0, 0.0])])
+
+    def equations(self):
+        for leg, foot, top in zip(self.legs, self.feet, self.tops, strict=True):
+            yield connect(self.world.frame_b, foot.frame_a)
+            yield connect(foot.frame_b, leg.frame_a)
+            yield connect(leg.frame_b, top.frame_b)
+            yield connect(top.frame_a, self.plate.frame_a)
+
+
+def test_sarrus_linkage_goes_straight():
+    def leg(sign, kind):
+        found = [0.6, np.pi - 1.2, 0.6 - np.pi]
+        return dict(hinges=[dict(phi=(kind if k == 0 else Start)(sign * phi)) for k, phi in enumerate(found)])
+
+    dae = translate(Sarrus(legs=[leg(1, Fixed), leg(-1, Start)]))
+    assert dae.diagnosis.mobility == 1
+    assert len(dae.diagnosis.redundant) == 1
+    at = dae.evaluate()
+    np.testing.assert_allclose(at["plate.r"], [0.0, 0.0, 2 * 0.5 * np.sin(0.6)], atol=1e-12)
+    # massless legs: the plate falls freely
+    np.testing.assert_allclose(at["der(plate.v)"], [0.0, 0.0, -9.81], atol=1e-9)
