@@ -221,7 +221,7 @@ class _Run:
             if crossed or look.near[k + 1]:
                 self.done = first + k
                 point, distance, zero = self._approach(crossed=True)
-                if look.near[k + 1] or distance < CLOSE:
+                if look.near[k + 1] or distance < 5 * CLOSE:
                     raise self._singular_pose(point, zero)
                 self.done = last  # only the choice of coordinates fails there
 
@@ -277,12 +277,10 @@ class _Run:
             except (RuntimeError, SolveError):
                 continue
             new = self._look(near[None], far[None], np.array([t + step]), there[None])
-            if crossed and new.side[0] != look.side[0]:
+            if new.near[0] or (crossed and new.side[0] != look.side[0]):
                 continue
             t, x, z, inputs, look = t + step, near, far, there, new
             seen.append((t, float(look.distance[0])))
-            if look.near[0]:
-                break
         return (x, z, t, inputs), seen[-1][1], _zero(seen, longest)
 
     def _step(self, x: np.ndarray, z: np.ndarray, t: float, step: float, inputs: np.ndarray):
