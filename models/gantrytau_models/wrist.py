@@ -6,7 +6,7 @@ of it: all numbers here are assumed, of the size of a small spindle head.
 
 import numpy as np
 
-from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der
+from gantrytau import Array, Input, Model, ModelError, Parameter, Real, StateSelect, connect, der
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames
 from gantrytau.mechanics.rotational import Torque
 from gantrytau_models.f1 import F1GantryTau
@@ -84,10 +84,21 @@ class SerialWrist(TwoFrames):
 
 
 class WithWrist(Model):
-    """A wrist on the plate of any robot whose `tool` is a `Plate`: `class Mine(WithWrist, SixLinkGantryTau)`."""
+    """A wrist on the plate of any robot whose `tool` is a `Plate`: `class Mine(WithWrist, SixLinkGantryTau)`.
+
+    Stands before the robot, whose equations it adds to; ModelError if it stands behind.
+    """
 
     tool: Plate
     wrist = SerialWrist()
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        if WithWrist in cls.__bases__[1:]:
+            raise ModelError(
+                f"{cls.__name__}: found WithWrist behind {cls.__bases__[0].__name__}, which would leave the wrist "
+                f"unconnected; expected class {cls.__name__}(WithWrist, {cls.__bases__[0].__name__})"
+            )
 
     def equations(self):
         yield from super().equations()

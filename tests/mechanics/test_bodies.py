@@ -110,7 +110,6 @@ def test_a_free_body_has_six_degrees_of_freedom():
     assert dae.diagnosis.redundant == ()
 
 
-@pytest.mark.xfail(strict=True, reason="angular velocities among the states are counted as coordinates")
 def test_mobility_of_a_free_body_is_six():
     assert translate(thrown([0.0, 0.0, 1.0])).diagnosis.mobility == 6
 

@@ -11,8 +11,10 @@ from gantrytau.mechanics.multibody import (
     PointMass,
     Prismatic,
     Revolute,
+    Spherical,
     SphericalSpherical,
     TwoFrames,
+    Universal,
     World,
 )
 
@@ -200,3 +202,119 @@ def test_sarrus_linkage_goes_straight():
     np.testing.assert_allclose(at["plate.r"], [0.0, 0.0, 2 * 0.5 * np.sin(0.6)], atol=1e-12)
     # massless legs: the plate falls freely
     np.testing.assert_allclose(at["der(plate.v)"], [0.0, 0.0, -9.81], atol=1e-9)
+
+
+class SixBar(Model):
+    """A four-bar whose coupler drives a second loop over two more bars; the loops share crank and coupler."""
+
+    world = World()
+    hinges = Array(Revolute, 7, n=[0.0, -1.0, 0.0])
+    crank, coupler, rocker = (FixedTranslation(r=[x, 0.0, 0.0]) for x in (0.3, 0.8, 0.7))
+    branch, arm, last = (FixedTranslation(r=r) for r in ([0.4, 0.0, 0.4], [0.6, 0.0, 0.0], [0.6, 0.0, 0.0]))
+    ground, post = FixedTranslation(r=[1.0, 0.0, 0.0]), FixedTranslation(r=[0.5, 0.0, 1.3])
+    bodies = Array(Body, 5, m=1.0, r_cm=[0.2, 0.0, 0.05], J=np.diag([0.01, 0.02, 0.02]))
+
+    def equations(self):
+        h = self.hinges
+        ways = [
+            (self.world.frame_b, h[0], self.crank),
+            (self.crank.frame_b, h[1], self.coupler),
+            (self.ground.frame_b, h[2], self.rocker),
+            (self.post.frame_b, h[4], self.arm),
+            (self.arm.frame_b, h[5], self.last),
+        ]
+        for body, (before, hinge, bar) in zip(self.bodies, ways, strict=True):
+            yield connect(before, hinge.frame_a)
+            yield connect(hinge.frame_b, bar.frame_a)
+            yield connect(hinge.frame_b, body.frame_a)
+        for fixed in (self.ground, self.post):
+            yield connect(self.world.frame_b, fixed.frame_a)
+        yield connect(self.branch.frame_a, self.coupler.frame_a)
+        yield connect(self.rocker.frame_b, h[3].frame_a)
+        yield connect(h[3].frame_b, self.coupler.frame_b)
+        yield connect(self.last.frame_b, h[6].frame_a)
+        yield connect(h[6].frame_b, self.branch.frame_b)
+
+
+def test_two_loops_that_share_bodies_keep_their_energy():
+    phi = [Fixed(0.7), Start(-0.4), Start(1.8), Start(-1.4), Start(-2.5), Start(1.0), Start(0.0)]
+    hinges = [dict(phi=start) for start in phi]
+    hinges[0] |= dict(w=Fixed(3.0))
+    dae = translate(SixBar(hinges=hinges))
+    assert dae.diagnosis.mobility == 1
+    assert len(dae.diagnosis.redundant) == 6
+    motion = simulate(dae, stop=3.0, tolerance=1e-9, points=61)
+    energy = np.zeros(61)
+    for k in range(5):
+        R, w = motion[f"bodies[{k}].frame_a.R"], motion[f"bodies[{k}].w"]
+        arm = R @ [0.2, 0.0, 0.05]
+        r, v = motion[f"bodies[{k}].r"] + arm, motion[f"bodies[{k}].v"] + np.cross(w, arm)
+        energy += (v**2).sum(axis=1) / 2 + 0.02 * w[:, 1] ** 2 / 2 + 9.81 * r[:, 2]
+    assert np.ptp(motion["hinges[0].phi"]) > 3.0
+    assert np.ptp(energy) < 1e-6 * energy[0]  # a thousand times the integrator's tolerance
+    for loop in dae.flat.loops:
+        assert np.abs(motion[f"{loop.a}.r"] - motion[f"{loop.b}.r"]).max() < 1e-11
+
+
+class Rocker(Model):
+    """A crank about z drives a rocker about x; what joins their ends is put in as `rod`."""
+
+    world = World()
+    crank, rocker = Revolute(n=[0.0, 0.0, 1.0]), Revolute(n=[1.0, 0.0, 0.0])
+    one = Body(m=1.0, r_cm=[0.1, 0.0, 0.0], J=np.diag([0.01, 0.02, 0.02]))
+    two = Body(m=1.5, r_cm=[0.0, 0.25, 0.0], J=np.diag([0.03, 0.01, 0.03]))
+    near, far = FixedTranslation(r=[0.2, 0.0, 0.0]), FixedTranslation(r=[0.0, 0.5, 0.0])
+    ground = FixedTranslation(r=[1.0, 0.3, 0.2])
+    rod = SphericalSpherical(L=1.1)
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.ground.frame_a)
+        for before, hinge, bar, body in (
+            (self.world, self.crank, self.near, self.one),
+            (self.ground, self.rocker, self.far, self.two),
+        ):
+            yield connect(before.frame_b, hinge.frame_a)
+            yield connect(hinge.frame_b, bar.frame_a)
+            yield connect(hinge.frame_b, body.frame_a)
+        yield connect(self.near.frame_b, self.rod.frame_a)
+        yield connect(self.rod.frame_b, self.far.frame_b)
+
+
+class BallEnded(TwoFrames):
+    """A rod of next to no mass between two joints."""
+
+    first, last = Spherical(), Spherical()
+    bar = FixedTranslation(r=[1.1, 0.0, 0.0])
+    body = Body(m=1e-9, r_cm=[0.55, 0.0, 0.0], J=1e-10 * np.eye(3))
+
+    def equations(self):
+        yield connect(self.frame_a, self.first.frame_a)
+        yield connect(self.first.frame_b, self.bar.frame_a)
+        yield connect(self.first.frame_b, self.body.frame_a)
+        yield connect(self.bar.frame_b, self.last.frame_a)
+        yield connect(self.last.frame_b, self.frame_b)
+
+
+class Cardan(BallEnded):
+    """The same with a universal joint at one end, so that it cannot spin about itself."""
+
+    first = Universal(n_a=[0.0, 0.0, 1.0], n_b=[0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(("rod", "mobility"), [(BallEnded(), 2), (Cardan(), 1)])
+def test_a_rod_with_two_joints_is_the_rod_without_rotation(rod, mobility):
+    start = dict(crank=dict(phi=Fixed(0.5), w=Fixed(1.0)), rocker=dict(phi=Start(0.3)))
+    one, other = translate(Rocker(**start)), translate(Rocker(**start, rod=rod))
+    assert one.diagnosis.mobility == 1
+    assert other.diagnosis.mobility == mobility  # a rod between balls also spins about itself
+    assert other.diagnosis.redundant == ()
+    a, b = one.evaluate(), other.evaluate()
+    for name in ("rocker.phi", "rocker.w", "der(crank.w)", "der(rocker.w)"):
+        assert b[name] == pytest.approx(a[name], rel=1e-8)  # the mass of the rod, 1e-9 of the others'
+    # the length of the rod stays: its rate along itself is zero
+    line = a["far.frame_b.r"] - a["near.frame_b.r"]
+    assert line @ line == pytest.approx(1.1**2, rel=1e-13)
+    assert line @ (a["der(far.frame_b.r)"] - a["der(near.frame_b.r)"]) == pytest.approx(0.0, abs=1e-13)
+    # the force that the loop carries goes along the rod
+    np.testing.assert_allclose(np.cross(b["rod.frame_b.f"], line), 0.0, atol=1e-7)
+    np.testing.assert_allclose(b["rod.frame_b.f"], a["rod.frame_b.f"], atol=1e-7)

@@ -1,11 +1,21 @@
 """The serial wrist on the plates of the six-link robot and the F1, against rigid bodies in series by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from gantrytau import Dae, Model, connect, simulate, translate
+from gantrytau import Dae, Model, ModelError, connect, simulate, translate
 from gantrytau.mechanics.multibody import FixedRotation, World
-from gantrytau_models import F1WithWrist, SerialWrist, SixLinkWithWrist, prototypes
+from gantrytau_models import (
+    F1WithWrist,
+    GantryTau,
+    SerialWrist,
+    SixLinkGantryTau,
+    SixLinkWithWrist,
+    WithWrist,
+    prototypes,
+)
 from tests.references import f1, six_link
 from tests.references.rotations import turn
 
@@ -168,6 +178,18 @@ def test_wrist_is_modified_by_name():
         found["wrist.r"] - found["tool.r"], found["tool.R"] @ [0, 0, -0.52], atol=1e-14
     )
     assert found["wrist.joints[1].m"] == 3.0
+
+
+def test_wrong_mounts_are_refused():
+    with pytest.raises(
+        ModelError, match=r"Mine: found WithWrist behind SixLinkGantryTau.*Mine\(WithWrist, Six"
+    ):
+        type("Mine", (SixLinkGantryTau, WithWrist), {})
+    pointlike: Any = type("Mine", (WithWrist, GantryTau), {})
+    with pytest.raises(
+        ModelError, match=r"Tool has no 'frame_a'"
+    ):  # a plate that cannot turn, without a Plate
+        translate(pointlike(prototypes.L1))
 
 
 def reference_energy(name, motion, k):
