@@ -6,7 +6,7 @@ Stewart, A platform with six degrees of freedom, Proc. Inst. Mech. Eng. 180, 196
 that turn and slide; their forces are the inputs, and their lengths the driven coordinates.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
@@ -25,6 +25,8 @@ from gantrytau.mechanics.multibody import (
 from gantrytau.mechanics.multibody.rotations import of_quaternion
 from gantrytau.mechanics.translational import Force
 from gantrytau_models.six_link import Plate
+
+PAIRING = [5, 0, 1, 2, 3, 4]  # joint of the platform for each leg
 
 # the state of the robot is the pose of the platform, which gives the joints in closed form
 PASSIVE = dict(phi=dict(prefer=StateSelect.DEFAULT), w=dict(prefer=StateSelect.DEFAULT))
@@ -95,8 +97,8 @@ class StewartPlatform(Model):
     base_joints, platform_joints: (6, 3) in m, in axes of the base and of the platform; home: where the platform
     is, level, when the angles of all universal joints are zero, in m. Further keywords modify members.
     The pose of the platform is `platform.r` and the unit quaternion `platform.q`; their start values (at first
-    home) say where the robot starts, and the lengths `legs[i].s` follow. Raises ModelError for joints that are
-    not (6, 3), or a leg without length at home.
+    home) say where the robot starts, and the lengths `legs[i].s` follow. Fix the lengths, `legs=[dict(s=Fixed(0.9)),
+    ...]`, and they decide instead. Raises ModelError for joints that are not (6, 3), or a leg without length at home.
     """
 
     world = World()
@@ -116,18 +118,17 @@ class StewartPlatform(Model):
         base_joints: Any = None,
         platform_joints: Any = None,
         *,
-        home: Sequence[float] = (0.0, 0.0, 0.8),
+        home: Any = (0.0, 0.0, 0.8),
         **modifications: Any,
     ):
         model = type(self).__name__
         # the pairs on the platform stand between those on the base, and a leg goes to the nearer one
         below = pairs_of_joints(0.6, 0.2) if base_joints is None else base_joints
         above = pairs_of_joints(0.3, 0.2, np.pi / 3)[PAIRING] if platform_joints is None else platform_joints
-        below, above = _points(model, "base_joints", below), _points(model, "platform_joints", above)
-        legs = [
-            _leg(model, k, a, b, np.array(home) + b - a)
-            for k, (a, b) in enumerate(zip(below, above, strict=True))
-        ]
+        below = _numbers(model, "base_joints", below, (6, 3))
+        above = _numbers(model, "platform_joints", above, (6, 3))
+        home = _numbers(model, "home", home, (3,))
+        legs = [_leg(model, k, a, b, home + b - a) for k, (a, b) in enumerate(zip(below, above, strict=True))]
         r, R = _starting_pose(modifications.get("platform"), home)
         for leg, length in zip(legs, np.linalg.norm(r + above @ R.T - below, axis=1), strict=True):
             leg["s"] = dict(start=float(length))
@@ -137,9 +138,6 @@ class StewartPlatform(Model):
         for leg in self.legs:
             yield connect(self.world.frame_b, leg.frame_a)
             yield connect(leg.frame_b, self.platform.frame_a)
-
-
-PAIRING = [5, 0, 1, 2, 3, 4]
 
 
 def pairs_of_joints(radius: float, half: float, turn: float = 0.0) -> np.ndarray:
@@ -152,12 +150,13 @@ def pairs_of_joints(radius: float, half: float, turn: float = 0.0) -> np.ndarray
     return radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
 
 
-def _points(model: str, name: str, points: Any) -> np.ndarray:
-    found = np.array(points, dtype=float)
-    if found.shape != (6, 3):
-        raise ModelError(
-            f"{model}: {name} has shape {found.shape}, expected (6, 3): x, y, z of six joints in m"
-        )
+def _numbers(model: str, name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"{model}: {name} is {value!r}, expected numbers of shape {shape}, in m") from None
+    if found.shape != shape:
+        raise ModelError(f"{model}: {name} has shape {found.shape}, expected {shape}: x, y, z in m")
     return found
 
 
@@ -181,7 +180,7 @@ def _leg(model: str, number: int, below: np.ndarray, above: np.ndarray, way: np.
     )
 
 
-def _starting_pose(platform: Any, home: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+def _starting_pose(platform: Any, home: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) and orientation (3, 3) that modifications of the platform give as start, else home and level."""
     found = []
     for name, otherwise in (("r", home), ("q", [1.0, 0.0, 0.0, 0.0])):

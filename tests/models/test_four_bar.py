@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
-from gantrytau import InitializationError, ModelError, Start, simulate, translate
+from gantrytau import InitializationError, ModelError, SolveError, Start, simulate, translate
 from gantrytau_models.four_bar import FourBar
 from tests.references import four_bar
 from tests.references.rotations import random_rotation
@@ -35,7 +36,7 @@ def axes(n, e):
 def linkage(bars, n, e, **starts):
     """The model with the numbers of the reference; starts: of the angles, by bar."""
     parts = [
-        dict(length=length, m=m, r_cm=[*centre, 0.0], J=np.diag([0.3, 0.2, J]))
+        dict(length=length, m=m, r_cm=[*centre, 0.0], J=np.diag([0.4, 0.8, 1.0]) * J)
         for length, m, centre, J in zip(bars.lengths, bars.masses, bars.centres, bars.inertias, strict=True)
     ]
     for name, start in starts.items():
@@ -104,9 +105,13 @@ def test_energy_grows_by_the_work_of_the_torque():
     assert np.ptp(balance) < 1e-6 * np.ptp(energy)  # ten thousand times the integrator's tolerance
 
 
-def parallelogram(start):
+SWINGING = 2 * 2.0 * 0.25 / 3 + 1.0 * 0.25  # kg.m2, two slender bars and the coupler at their ends
+MOMENT = (2 * 2.0 / 2 + 1.0) * 0.5 * 9.81  # N.m, of their weight when they are level
+
+
+def parallelogram(start, **crank):
     """Crank and rocker alike, coupler like the ground; hangs down."""
-    return FourBar(0.8, dict(length=0.5, m=2.0, phi=Start(start)), 0.8, dict(length=0.5, m=2.0))
+    return FourBar(0.8, dict(length=0.5, m=2.0, phi=Start(start), **crank), 0.8, dict(length=0.5, m=2.0))
 
 
 def test_parallelogram_swings_as_a_pendulum():
@@ -115,14 +120,28 @@ def test_parallelogram_swings_as_a_pendulum():
     motion = simulate(dae, stop=5.0, tolerance=1e-10)
     np.testing.assert_allclose(motion["rocker.phi"], motion["crank.phi"], rtol=0, atol=1e-9)
     np.testing.assert_allclose(motion["coupler.phi"], 0.0, atol=1e-9)  # ten times the integrator's tolerance
-    inertia, moment = 2 * 2.0 * 0.25 / 3 + 1.0 * 0.25, (2 * 2.0 / 2 + 1.0) * 0.5 * 9.81
     swing = solve_ivp(
-        lambda t, y: [y[1], -moment * np.cos(y[0]) / inertia],
+        lambda t, y: [y[1], -MOMENT * np.cos(y[0]) / SWINGING],
         (0.0, 5.0), [-0.7, 0.0], method="DOP853", rtol=1e-12, atol=1e-12, t_eval=motion.time,
     )  # fmt: skip
     np.testing.assert_allclose(
         motion["crank.phi"], swing.y[0], atol=1e-6
     )  # tolerance times a growing phase error
+
+
+def test_flat_parallelogram_is_told_as_singular():
+    """Where all bars lie in one line the parallelogram may turn into its crossed form."""
+    kicked = parallelogram(-0.7, w=Start(8.0))
+    with pytest.raises(SolveError, match="FourBar: the motion meets a singular pose") as raised:
+        simulate(kicked, stop=1.0, tolerance=1e-9)
+    swing = solve_ivp(
+        lambda t, y: [y[1], -MOMENT * np.cos(y[0]) / SWINGING], (0.0, 1.0), [-0.7, 8.0],
+        rtol=1e-10, atol=1e-10, dense_output=True,
+    ).sol  # fmt: skip
+    flat = brentq(lambda t: swing(t)[0], 0.0, 0.2)  # the crank along the ground
+    assert raised.value.time == pytest.approx(flat, abs=1e-3)  # s; one step of the output, 2 ms, halved
+    before = raised.value.result
+    np.testing.assert_allclose(before["rocker.phi"], before["crank.phi"], rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("start", [-2.0, 0.3, 1.0, 2.9, 7.0])
@@ -176,7 +195,7 @@ def test_lengths_that_cannot_close_are_refused():
     with pytest.raises(ModelError, match=r"found ground = 3 m, expected less than 1.8 m"):
         FourBar(3.0, crank=dict(length=0.3))
     # parameters that change later are met by the loop itself
-    with pytest.raises(InitializationError, match=r"position x is off by .*is a length out of reach"):
+    with pytest.raises(InitializationError, match=r"the loop through rocker.rod, .* stays open"):
         simulate(FourBar(), stop=0.1, parameters={"rocker.length": 2.4})
 
 
