@@ -18,6 +18,8 @@ TOLERANCE = (
     1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
 )
 ITERATIONS = 100
+ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
+SPREAD = 0.3  # of the first of them
 NOISE = 1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
 LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 
@@ -34,6 +36,13 @@ class Level:
     def leaves(self) -> tuple[str, ...]:
         """Names of all symbols in the residuals."""
         return tuple(leaf.name() for leaf in ca.symvar(ca.vertcat(*self.residuals)))
+
+    def curved(self, moving: Sequence[str]) -> bool:
+        """Whether the residuals are not linear in what moves."""
+        wanted = set(moving)
+        residual = ca.vertcat(*self.residuals)
+        x = [leaf for leaf in ca.symvar(residual) if leaf.name() in wanted]
+        return bool(x) and ca.depends_on(ca.jacobian(residual, ca.vertcat(*x)), ca.vertcat(*x))
 
     @cached_property
     def function(self) -> ca.Function:
@@ -64,11 +73,34 @@ def solve_levels(
             try:  # starts that fit together are held
                 _solve(level, free, values, started, title)
             except InitializationError:
-                _solve(level, moving, values, started, title)
+                _solve_anyhow(level, moving, values, started, title)
     return values
 
 
-def _solve(level: Level, moving: Sequence[str], values: dict[str, float], started, title: str) -> None:
+def _solve_anyhow(level: Level, moving: Sequence[str], values: dict[str, float], started, title: str) -> None:
+    """From the given values, and if that fails from others around them: bars in one line know no way to bend."""
+    try:
+        return _solve(level, moving, values, started, title)
+    except InitializationError as error:
+        first = error
+    random = np.random.default_rng(0)
+    for attempt in range(ATTEMPTS if level.curved(moving) else 0):
+        size = SPREAD * (1 + attempt % 3)
+        other = dict(values)
+        for name in moving:
+            other[name] += size * (STIFFNESS if name in started else 1.0) * random.uniform(-1, 1)
+        try:
+            _solve(level, moving, other, started, title, propagate=False)
+        except InitializationError:
+            continue
+        values.update(other)
+        return None
+    raise first
+
+
+def _solve(
+    level: Level, moving: Sequence[str], values: dict[str, float], started, title: str, propagate: bool = True
+) -> None:
     place = {n: k for k, n in enumerate(level.leaves)}
     moving = [n for n in moving if n in place]
     columns = [place[n] for n in moving]
@@ -83,7 +115,7 @@ def _solve(level: Level, moving: Sequence[str], values: dict[str, float], starte
     pattern = level.function.sparsity_out(1)
     point = around[columns]
     missing = {column: k for k, column in enumerate(columns) if moving[k] not in started}
-    point = _propagated(at, point, pattern, missing)
+    point = _propagated(at, point, pattern, missing) if propagate else point
     point, f, jacobian = newton(at, point, weights)
     scale = _terms(jacobian, point)
     bad = ~(np.abs(f) <= 1e-9 * scale)
@@ -154,7 +186,15 @@ def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: Mapping[in
     while True:
         single = {next(iter(left)): i for i, left in rows.items() if len(left) == 1}
         if not single:
-            return point
+            counts: dict[int, int] = {}
+            for left in rows.values():
+                counts.update((j, counts.get(j, 0) + 1) for j in left)
+            if not counts:
+                return point
+            # the coordinate of a joint is in several rows, each with another unknown: it stays as it is
+            accepted = max(counts, key=lambda j: (counts[j], -j))
+            rows = {i: left - {accepted} for i, left in rows.items()}
+            continue
         f, jacobian = at(point)
         new = point.copy()
         for j, i in single.items():

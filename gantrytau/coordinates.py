@@ -21,6 +21,7 @@ from gantrytau.symbols import derivative_name, split_derivative, time
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
+OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
 
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, time, sampled inputs
@@ -50,6 +51,7 @@ class Coordinates:
     known: Mapping[str, ca.SX]
     definitions: tuple[tuple[ca.SX, ca.SX], ...]
     pivots: ca.SX
+    dropped: ca.Function
     conditioning: Conditioning
 
     @property
@@ -144,6 +146,16 @@ class Coordinates:
                 when = float(t[lost[0]])
                 raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when)
         return x
+
+    def opened(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> tuple[int, str] | None:
+        """The first point at which a constraint that was left out as redundant does not hold, and its name."""
+        if not self.dae.redundant:
+            return None
+        residual = np.array(self.dropped(x.T, t[None], t[None], w.T)).reshape(len(self.dae.redundant), len(x))
+        bad = np.flatnonzero(~(np.abs(residual).max(axis=0) <= OPEN))
+        if not bad.size:
+            return None
+        return int(bad[0]), self.dae.redundant[int(np.argmax(np.abs(residual[:, bad[0]])))].name
 
     def settle(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
         """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
@@ -253,7 +265,9 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         for b in blocks
         if len(b.unknowns) > 1 and b.tears
     ]
-    wanted = [ode, algebraic, ca.densify(pivots), *matrices, *invariants]
+    residual = dae.table.reduce(ca.vertcat(*(e.residual for e in dae.redundant)))
+    dropped = dae.reduced.written(residual) if dae.redundant else ca.SX(0, 1)
+    wanted = [ode, algebraic, ca.densify(pivots), *matrices, *invariants, dropped]
     _, found = ca.substitute_inplace(v, e, wanted, False)
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
     divisors = [found[2][row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
@@ -271,13 +285,14 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         t0=t0,
         ode=found[0],
         algebraic=found[1],
-        invariants=tuple(found[3 + len(matrices) :]),
+        invariants=tuple(found[3 + len(matrices) : -1]),
         rows=tuple(rows),
         known=known,
         definitions=tuple(definitions),
         pivots=found[2],
+        dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(found[-1])], {"cse": True}),
         conditioning=Conditioning(
-            *_constraints(dae, found[3 + len(matrices) :], states),
+            *_constraints(dae, found[3 + len(matrices) : -1], states),
             divisors,
             found[3 : 3 + len(matrices)],
             [x, z, time, t0, w],

@@ -95,12 +95,32 @@ def _complete(dae: Dae, values: dict[str, float], held: frozenset[str]) -> dict[
     derivatives = [n for n in values if split_derivative(n)[0] in dae.known]
     try:
         return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, held | set(derivatives))
-    except InitializationError:
+    except InitializationError as error:
         free = tuple(n for n in dae.known if n not in held)
-        if not free:
-            raise
         still = held | (set(derivatives) - set(free))
-        return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free)
+        try:
+            if not free:
+                raise error
+            return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free)
+        except InitializationError:
+            return _jointly(dae, guess, frozenset(still), free, error)
+
+
+def _jointly(
+    dae: Dae, guess: Guess, held: frozenset[str], free: tuple[str, ...], error: InitializationError
+) -> dict[str, float]:
+    """All levels at once: what is held may belong to a later level than the positions that it decides."""
+    parts = dae.indexed.levels
+    level = Level(
+        tuple(r for part in parts for r in part.residuals),
+        tuple(n for part in parts for n in part.names),
+        (*(n for part in parts for n in part.unknowns), *free),
+    )
+    try:
+        found = solve_levels([level], guess.values, held=held, started=guess.started | held, title=dae.name)
+    except InitializationError:
+        raise error from None
+    return found
 
 
 def given_scalars(dae: Dae, given: Mapping[str, Any]) -> dict[str, float]:
@@ -122,6 +142,8 @@ def named_values(dae: Dae, values: Mapping[str, float]) -> dict[str, Any]:
     chains = dae.indexed.orders
     names: list[str] = []
     groups: list[tuple[str, tuple[int, ...], list[str]]] = []
+    for quantity in dae.flat.propagated:
+        groups.append((quantity.name, quantity.shape, list(quantity.elements)))
     for variable in dae.flat.variables:
         for order in range(max(chains.values(), default=0) + 1):
             elements = [derivative_name(n, order) for n in variable.elements]

@@ -179,6 +179,13 @@ class _Builder:
         for instance, name, wanted, around in self.outers:
             for enclosing in reversed(around):
                 found = [x for x in vars(enclosing).values() if isinstance(x, wanted.component)]
+                if len(found) > 1:
+                    kind = wanted.component.__name__
+                    raise ModelError(
+                        f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found {len(found)} components of "
+                        f"{kind}, of which {self.paths[id(instance)]} cannot choose one; expected one {kind}, and Fixed "
+                        "for further frames that do not move"
+                    )
                 if found and found[0] is not instance:
                     instance.__dict__[name] = found[0]
                     break

@@ -14,7 +14,7 @@ import numpy as np
 
 from gantrytau.aliases import Reduced, eliminate_aliases
 from gantrytau.consistency import Level, solve_levels
-from gantrytau.errors import InitializationError
+from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flat_model import FlatModel
 from gantrytau.guess import Guess, starting_guess
 from gantrytau.parameters import ParameterTable
@@ -22,19 +22,26 @@ from gantrytau.statements import Equation
 from gantrytau.symbols import split_derivative
 
 RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
-POSES = 3  # besides the start
-STEP = 0.1  # of a move to another pose, in rad, or relative to the size of the coordinates
+CLOSED = 1e-12  # residual of a pose beyond which ranks seen there are not trusted
+POSES = 8  # besides the start
+STEP = 0.6  # of a move to the next pose, in rad, or relative to the size of the coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
     """What constrains positions: rows, of which those with a dual may be dropped, and unknowns.
 
-    equations: of the droppable rows, which come last.
+    equations: of the droppable rows, which come last; known: names of what is given as a function of time.
     """
 
     level: Level
     equations: tuple[Equation, ...]
+    known: frozenset[str]
+
+    @property
+    def moving(self) -> list[str]:
+        """The unknowns that occur."""
+        return [n for n in self.level.unknowns if n in set(self.level.leaves)]
 
     @property
     def firm(self) -> int:
@@ -68,8 +75,9 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     except InitializationError as error:
         raise _open_loops(flat, error) from None
     matrices = [_matrix(constraints, closed)]
-    matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, matrices[0], flat.name)]
+    matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, flat.name)]
     kept = _independent(matrices, constraints.firm)
+    _refuse_conflicts(flat, constraints, closed, kept)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
     return Settled(_with_zero_forces(flat, redundant), redundant, closed)
 
@@ -83,6 +91,10 @@ def _open_loops(flat: FlatModel, error: InitializationError) -> InitializationEr
             kind: np.linalg.norm([v for n, v in error.residuals.items() if n.startswith(place + kind)])
             for kind in ("position", "orientation")
         }
+        # least squares leave a share of the gap in every part of the loop
+        for member in loop.members:
+            shares = [v for n, v in error.residuals.items() if n.startswith(f"{member} (")]
+            gaps["position"] += np.linalg.norm(shares)
         if any(gaps.values()):
             # the residual of orientation is 2 tan(angle / 2)
             angle = np.degrees(2 * np.arctan(gaps["orientation"] / 2))
@@ -124,7 +136,7 @@ def _constraints(
         (*(reduced.equations[i].name for i in rows), *(e.name for e in duals)),
         tuple(n for n in reduced.unknowns if n in unknown),
     )
-    return Constraints(level, tuple(duals))
+    return Constraints(level, tuple(duals), reduced.known)
 
 
 def _unknowns(expression: ca.SX, reduced: Reduced) -> set[str]:
@@ -144,35 +156,44 @@ def _close(
     )
 
 
-def _matrix(constraints: Constraints, values: Mapping[str, float]) -> np.ndarray:
-    """Jacobian of the rows, each of length one; rows that are zero stay zero."""
+def _matrix(
+    constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()
+) -> np.ndarray:
+    """Jacobian of the rows by unknowns and `known`, each of length one; rows that are zero stay zero."""
     level = constraints.level
     _, jacobian = level.function(np.array([values[n] for n in level.leaves]))
     place = {n: k for k, n in enumerate(level.leaves)}
-    found = np.array(jacobian)[:, [place[n] for n in level.unknowns if n in place]]
+    found = np.array(jacobian)[:, [place[n] for n in (*constraints.moving, *known)]]
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
 
 def _poses(
-    constraints: Constraints, guess: Guess, closed: Mapping[str, float], matrix: np.ndarray, title: str
+    constraints: Constraints, guess: Guess, closed: Mapping[str, float], title: str
 ) -> list[dict[str, float]]:
-    """Other poses near the first, each reached along directions that the constraints leave free."""
-    _, sizes, right = np.linalg.svd(matrix)
-    free = right[np.count_nonzero(sizes > RANK) :]
+    """Other poses, on a walk in random directions that the constraints leave free."""
     found: list[dict[str, float]] = []
     random = np.random.default_rng(0)
-    names = [n for n in constraints.level.unknowns if n in set(constraints.level.leaves)]
-    here = np.array([closed[n] for n in names])
+    names = constraints.moving
     loose = replace(guess, fixed=frozenset(), started=frozenset())
-    for _ in range(POSES if len(free) else 0):
+    here = dict(closed)
+    for _ in range(POSES):
+        _, sizes, right = np.linalg.svd(_matrix(constraints, here))
+        free = right[np.count_nonzero(sizes > RANK) :]
+        if not len(free):
+            break
+        point = np.array([here[n] for n in names])
         move = random.standard_normal(len(free)) @ free
-        move *= STEP * max(1.0, float(np.abs(here).max())) / np.abs(move).max()
+        move *= STEP * max(1.0, float(np.abs(point).max())) / np.abs(move).max()
         try:
-            moved = {**closed, **dict(zip(names, (here + move).tolist(), strict=True))}
-            found.append(_close(constraints, loose, moved, title))
+            here = _close(
+                constraints, loose, {**here, **dict(zip(names, (point + move).tolist(), strict=True))}, title
+            )
         except InitializationError:
             continue
+        residual, _ = constraints.level.function(np.array([here[n] for n in constraints.level.leaves]))
+        if np.abs(np.array(residual)).max() < CLOSED:
+            found.append(here)
     return found
 
 
@@ -191,6 +212,26 @@ def _independent(matrices: Sequence[np.ndarray], firm: int) -> set[int]:
             direction = rest[best] / np.linalg.norm(rest[best])
             rest -= np.outer(rest @ direction, direction)
             rest[best] = 0.0
+
+
+def _refuse_conflicts(
+    flat: FlatModel, constraints: Constraints, closed: Mapping[str, float], kept: set[int]
+) -> None:
+    """StructureError where a constraint repeats others only as long as the inputs happen to agree."""
+    inputs = [n for n in constraints.level.leaves if n in constraints.known]
+    if not inputs:
+        return
+    matrix = _matrix(constraints, closed, inputs)
+    firm = constraints.firm
+    rows = [*range(firm), *(firm + k for k in sorted(kept))]
+    rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)
+    against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
+    if against:
+        raise StructureError(
+            f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
+            "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: "
+            "leave one drive out, or drive by a force"
+        )
 
 
 def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:

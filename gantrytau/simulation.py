@@ -29,6 +29,7 @@ from gantrytau.trajectories import result_of
 from gantrytau.translation import names, retranslate, translate
 
 CHUNK = 10  # output intervals between two projections onto the constraints
+MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
 WITHIN = 0.5  # relative distance of a singular pose above which none lies within one output interval
 HALVINGS = 14  # of the last step, to come near to where the integration stops
 REASONS = {
@@ -58,7 +59,8 @@ def simulate(
 
     start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,) or (n, k)),
     joined by straight lines; an input that is not named keeps its start value. parameters: name -> value;
-    outputs: names to keep (all); tolerance: relative and absolute, of the integrator; points: of the result.
+    outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the integrator gets
+    a tenth, and errors of long motions add up); points: of the result.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values.
     """
@@ -76,7 +78,7 @@ def simulate(
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)
     grid = np.linspace(start, stop, points)
-    run = _Run(coordinates, signals, grid, tolerance)
+    run = _Run(coordinates, signals, grid, MARGIN * tolerance)
     try:
         run.go()
     except SolveError as error:
@@ -207,6 +209,10 @@ class _Run:
         self.z[reached] = self.coordinates.settle(self.x[reached], z, self.mesh[reached], inputs)
         self.done = here + count
         self._watch(here, here + count)
+        opened = self.coordinates.opened(self.x[reached], self.mesh[reached], inputs)
+        if opened is not None:
+            self.done = here + opened[0]
+            raise self._opened(opened[1])
 
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places of the mesh; `done` is then the last before it."""
@@ -224,6 +230,16 @@ class _Run:
                 if look.near[k + 1] or distance < 5 * CLOSE:
                     raise self._singular_pose(point, zero)
                 self.done = last  # only the choice of coordinates fails there
+
+    def _opened(self, name: str) -> SolveError:
+        t = float(self.mesh[self.done])
+        return SolveError(
+            f"{self.coordinates.dae.name}: after t = {t:.6g} s the loop opens: {name} was left out because it repeated "
+            "other constraints at the start, and it does not any more. Start nearer to that pose, where another "
+            "choice is made; .result holds the motion up to there",
+            time=t,
+            equations=[name],
+        )
 
     def _look(self, x, z, t, inputs) -> Look:
         return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], inputs.T)

@@ -84,18 +84,19 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
     rest = matrix.copy()
     norms = np.linalg.norm(matrix, axis=0)
     chosen: list[int] = []
-    for least in (GOOD_PIVOT, LEAST_PIVOT):
-        for weight in sorted(groups):
-            candidates = [j for j in groups[weight] if j not in chosen]
-            while len(chosen) < len(rows) and candidates:
-                sizes = np.linalg.norm(rest[:, candidates], axis=0)
-                best = int(np.argmax(sizes))
-                if not sizes[best] > least * max(norms[candidates[best]], 1e-12):
-                    break
-                column = candidates.pop(best)
-                direction = rest[:, column] / np.linalg.norm(rest[:, column])
-                rest -= np.outer(direction, direction @ rest)
-                chosen.append(column)
+    rounds = [(GOOD_PIVOT, w) for w in sorted(groups) if w <= StateSelect.ALWAYS]
+    rounds += [(LEAST_PIVOT, w) for w in sorted(groups)]  # what is asked for is given up last
+    for least, weight in rounds:
+        candidates = [j for j in groups[weight] if j not in chosen]
+        while len(chosen) < len(rows) and candidates:
+            sizes = np.linalg.norm(rest[:, candidates], axis=0)
+            best = int(np.argmax(sizes))
+            if not sizes[best] > least * max(norms[candidates[best]], 1e-12):
+                break
+            column = candidates.pop(best)
+            direction = rest[:, column] / np.linalg.norm(rest[:, column])
+            rest -= np.outer(direction, direction @ rest)
+            chosen.append(column)
     if len(chosen) < len(rows):
         raise StructureError(_singular(reduced, rows, matrix, title))
     singular_values = np.linalg.svd(matrix[:, chosen], compute_uv=False)

@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.aliases import eliminate_aliases
+from gantrytau.aliases import Reduced, eliminate_aliases
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
 from gantrytau.determinacy import refuse_undetermined
@@ -18,7 +18,7 @@ from gantrytau.index_reduction import Indexed, reduce_index
 from gantrytau.guess import starting_guess
 from gantrytau.initialization import consistent_start
 from gantrytau.model import Model
-from gantrytau.parameters import parameter_table
+from gantrytau.parameters import ParameterTable, parameter_table
 from gantrytau.redundancy import Settled, without_redundant
 from gantrytau.solution import solve_blocks
 from gantrytau.statements import Equation
@@ -60,53 +60,70 @@ def translate_flat(
     given, find, states = (names(x) for x in (given, find, states or ()))
     settings = dict(given=given, find=find, states=states)
     flat = _with_wanted(flat, find)
+    table, known = _given(flat, given)
+    doubtful = any(e.dual for e in flat.equations)
+    settled = without_redundant(flat, table, frozenset(known)) if flat.loops else Settled(flat)
+    try:
+        return _translated(settled, flat, table, known, settings, start or {})
+    except StructureError:
+        # rods are rarely redundant, so they are only looked at if something is wrong
+        if flat.loops or not doubtful:
+            raise
+        settled = without_redundant(flat, table, frozenset(known))
+        if not settled.redundant:
+            raise
+    return _translated(settled, flat, table, known, settings, start or {})
+
+
+def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple[str, ...]]:
+    """The parameters, and which scalars are known as functions of time."""
     scalars = [n for name in given for n in expand(flat, name)]
     parameters = {n for p in flat.parameters for n in p.elements}
-    table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
-    known = tuple(n for n in scalars if n not in parameters) if given else flat.inputs
-    if given and not known:
-        known = flat.inputs
+    known = tuple(n for n in scalars if n not in parameters)
     for name in known:
         if name.startswith("der("):
             raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
-    settled = without_redundant(flat, table, frozenset(known)) if flat.loops else Settled(flat)
+    table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
+    return table, known or flat.inputs
+
+
+def _translated(
+    settled: Settled,
+    flat: FlatModel,
+    table: ParameterTable,
+    known: tuple[str, ...],
+    settings: Mapping[str, Any],
+    start: Mapping[str, float],
+) -> Dae:
+    """From the flat model without redundant constraints to the sorted system."""
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     indexed = reduce_index(reduced, flat)
-    symbols = all_symbols(indexed, reduced.known)
-    guess = starting_guess(flat, table, reduced, symbols)
+    guess = starting_guess(flat, table, reduced, all_symbols(indexed, reduced.known))
     asked = {n: guess.values[n] for n in guess.values if n in guess.started}
-    better = {**settled.guess, **(start or {})}
-    if better:
-        guess = replace(
-            guess, values={**guess.values, **{n: v for n, v in better.items() if n in guess.values}}
-        )
+    better = {n: v for n, v in {**settled.guess, **start}.items() if n in guess.values}
+    guess = replace(guess, values={**guess.values, **better})
     sample = consistent_start(flat, table, reduced, indexed, guess)
-    preference = {n: int(v.prefer) for v in flat.variables for n in v.elements}
-    for name, alias in reduced.aliases.items():
-        if alias.root is not None and alias.root != name:
-            preference[alias.root] = max(preference[alias.root], preference[name])
-    wanted = [_state_name(reduced.aliases, n) for name in states for n in expand(flat, name)]
-    choice = choose_states(indexed, reduced, sample, preference, wanted, flat.name)
+    wanted = [_state_name(reduced.aliases, n) for name in settings["states"] for n in expand(flat, name)]
+    choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), wanted, flat.name)
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.residuals, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
-    blocks = solve_blocks(
-        pattern.blocks, indexed.residuals, by_name, Guide(sample, table.values, choice.states)
-    )
+    guide = Guide(sample, table.values, choice.states)
+    blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
     refuse_undetermined(blocks, indexed, reduced, sample, flat)
-    settings |= dict(started=guess.started, fixed=guess.fixed, asked=asked)
+    more = dict(started=guess.started, fixed=guess.fixed, asked=asked)
     return Dae(
-        flat,
-        table,
-        reduced,
-        indexed,
-        choice,
-        tuple(blocks),
-        tuple(known),
-        sample,
-        settled.redundant,
-        settings,
+        flat, table, reduced, indexed, choice, blocks, known, sample, settled.redundant, {**settings, **more}
     )
+
+
+def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
+    """StateSelect by variable; a root is preferred as much as its aliases."""
+    found = {n: int(v.prefer) for v in flat.variables for n in v.elements}
+    for name, alias in reduced.aliases.items():
+        if alias.root is not None and alias.root != name:
+            found[alias.root] = max(found[alias.root], found[name])
+    return found
 
 
 def names(found: Sequence[str]) -> tuple[str, ...]:

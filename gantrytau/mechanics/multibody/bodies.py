@@ -59,7 +59,8 @@ class Body(Model):
             no_negative_eigenvalue(self.J), "expected a symmetric, positive definite inertia, or semidefinite for a rod"
         )
         yield require(
-            no_negative_eigenvalue(ca.trace(self.J) * ca.SX.eye(3) / 2 - self.J),
+            # printed inertias are rounded
+            no_negative_eigenvalue(ca.trace(self.J) * ca.SX.eye(3) / 2 - self.J, least=-1e-3),
             "expected principal moments of which none exceeds the sum of the other two; no body has such an inertia",
         )
         yield self.r == a.r
@@ -75,9 +76,9 @@ class Body(Model):
         return "the body has no mass or inertia against this motion" if variable in ("r", "q", "v") else ""
 
 
-def no_negative_eigenvalue(A: ca.SX) -> ca.SX:
-    """Whether a (3, 3) matrix is symmetric and all its principal minors are at least zero, up to rounding."""
+def no_negative_eigenvalue(A: ca.SX, least: float = -1e-12) -> ca.SX:
+    """Whether a (3, 3) matrix is symmetric and its principal minors, relative to its trace, exceed `least`."""
     B = A / (ca.fabs(ca.trace(A)) + 1e-300)
     pairs = [(0, 1), (0, 2), (1, 2)]
     minors = [B[i, i] for i in range(3)] + [B[i, i] * B[j, j] - B[i, j] ** 2 for i, j in pairs] + [ca.det(B)]
-    return ca.logic_and(ca.norm_fro(B - B.T) < 1e-9, ca.mmin(ca.vertcat(*minors)) > -1e-12)
+    return ca.logic_and(ca.norm_fro(B - B.T) < 1e-9, ca.mmin(ca.vertcat(*minors)) > least)
