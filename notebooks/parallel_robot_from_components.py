@@ -100,8 +100,8 @@ print(linkage)
 # %% [markdown]
 # Four revolutes in space are two too many: Grübler's formula counts a mobility of 6 * 3 - 5 * 4 = -2. The
 # diagnosis finds the three conditions that repeat others because the axes are parallel, and the one way to move
-# that is left. It also says that the crank's angle leaves two ways to join coupler and rocker. The start of
-# the rocker chose one; another start chooses the other.
+# that is left. It also says that the crank's angle, which the model asks for as a state, leaves two ways to join
+# coupler and rocker. The start of the rocker chose one; another start chooses the other.
 
 # %%
 assert linkage.mobility == 1
@@ -112,7 +112,7 @@ crossed_angle = assembly.others[0]["rocker.hinge.phi"]
 swing = simulate(FourBar(), stop=5.0, tolerance=1e-9)
 crossed = simulate(FourBar(rocker=dict(hinge=dict(phi=Start(crossed_angle)))), stop=5.0, tolerance=1e-9)
 for motion in (swing, crossed):
-    energy = sum(motion[f"{bar}.energy"] for bar in ("crank", "coupler", "rocker"))
+    energy = np.sum([motion[f"{bar}.energy"] for bar in ("crank", "coupler", "rocker")], axis=0)
     gap = np.abs(motion[f"{loop.a}.r"] - motion[f"{loop.b}.r"]).max()
     print(f"energy {energy[0]:.3f} J, off by {np.ptp(energy):.1e} J; the loop is open by {gap:.1e} m")
     assert np.ptp(energy) < 1e-5  # J: ten thousand times the integrator's tolerance, over five seconds
@@ -200,7 +200,8 @@ assert not tripod.diagnosis.moved
 
 # %% [markdown]
 # Six rods leave a plate no freedom against its carts, and three carts move: mobility three. Nobody said that the plate
-# stays level. It follows from the rods, and is found by iteration, in the blocks named above.
+# stays level. It follows from the rods, and is found by iteration, in the blocks named above. The states are a wish;
+# without it the compiler takes the carts.
 #
 # ### Kinematics in both directions
 #
@@ -221,14 +222,14 @@ for place in places:
     *q, R = (np.array(found) for found in inverse_kinematics(place))
     by_hand = place[2] + np.sqrt(0.5**2 - ((0.3 * outwards - place[:2]) ** 2).sum(axis=1))
     back = np.array(forward_kinematics(*q)).ravel()
-    errors = np.ravel(q) - by_hand, back - place, R.reshape(3, 3) - np.eye(3)
+    errors = np.ravel(q) - by_hand, back - place, R.reshape(3, 3, order="F") - np.eye(3)
     worst = np.maximum(worst, [np.abs(error).max() for error in errors])
 print("carts against the formula {:.1e} m, there and back {:.1e} m, plate turned by {:.1e}".format(*worst))
 assert worst.max() < 1e-11  # iterations stop at 1e-13
 
 # %%
 pose = tripod.evaluate({"plate.r": [0.08, 0.05, -0.05]})
-figure = plt.figure(figsize=(4.5, 4.5), layout="constrained")
+figure = plt.figure(figsize=(6, 4.5), layout="constrained")
 axes = figure.add_subplot(projection="3d")
 corners = []
 for leg in ("legs[0]", "legs[1]", "legs[2]"):
@@ -241,8 +242,7 @@ for leg in ("legs[0]", "legs[1]", "legs[2]"):
     corners += [pose[f"{leg}.rods[{k}].rod.frame_b.r"] for k in (1, 0)]
 axes.plot(*np.transpose([*corners, corners[0]]), color="C3", linewidth=2)
 axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="rails, carts, rods and plate")
-axes.set(xlim=(-0.45, 0.45), ylim=(-0.45, 0.45), zlim=(-0.2, 0.7))
-axes.set_box_aspect((1, 1, 1), zoom=0.85)
+axes.set(xlim=(-0.45, 0.45), ylim=(-0.45, 0.45), zlim=(-0.2, 0.7), box_aspect=(1, 1, 1))
 axes.locator_params(nbins=4)
 axes.view_init(elev=30, azim=-50)
 plt.show()
