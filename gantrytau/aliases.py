@@ -58,7 +58,11 @@ class Reduced:
             if alias is not None:
                 offset = alias.offset if order == 0 else ZERO
                 old.append(leaf)
-                new.append(alias_expression(Alias(alias.root, alias.order + order, alias.factor, offset), self.chains))
+                new.append(
+                    alias_expression(
+                        Alias(alias.root, alias.order + order, alias.factor, offset), self.chains
+                    )
+                )
         return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
 
 
@@ -115,9 +119,11 @@ class _Elimination:
         names = list(flat.definitions)
         defined = table.reduce(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
         self.defined = dict(zip(names, defined.elements(), strict=True))
-        self.rates = dict(
-            zip(flat.rates, table.reduce(ca.vertcat(*flat.rates.values())).elements(), strict=True)
-        ) if flat.rates else {}
+        self.rates = (
+            dict(zip(flat.rates, table.reduce(ca.vertcat(*flat.rates.values())).elements(), strict=True))
+            if flat.rates
+            else {}
+        )
         self.definition_symbols = {
             n: s for v in flat.propagated for n, s in zip(v.elements, v.symbol.elements(), strict=True)
         }
@@ -207,7 +213,9 @@ class _Elimination:
             self.rates = dict(zip(rates, found[count + len(names) :], strict=True))
 
     def _steady(self, expression: ca.SX) -> bool:
-        return expression.is_constant() or all(leaf.name() in self.parameters for leaf in ca.symvar(expression))
+        return expression.is_constant() or all(
+            leaf.name() in self.parameters for leaf in ca.symvar(expression)
+        )
 
     def resolve(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""

@@ -201,7 +201,9 @@ def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in
         known = ca.vertcat(qx, solved)
         if block.kind == "linear":
             matrix = ca.jacobian(f, y)
-            inputs = ca.Function("linear", [ca.vertcat(q, before)], [matrix, ca.substitute(f, y, 0 * y)], {"cse": True})
+            inputs = ca.Function(
+                "linear", [ca.vertcat(q, before)], [matrix, ca.substitute(f, y, 0 * y)], {"cse": True}
+            )
             a, b = inputs(known)
             found = ca.solve(a, -b, "qr")
         else:

@@ -50,7 +50,9 @@ def connection_equations(
                 faces.append((path, -1 if owners[path] == where else 1))
             _check_same(pair, faces, where)
             if id(pair) in closing:
-                carried += [(face, sign, closing[id(pair)]) for face, sign in zip(faces, (1, -1), strict=True)]
+                carried += [
+                    (face, sign, closing[id(pair)]) for face, sign in zip(faces, (1, -1), strict=True)
+                ]
             else:
                 parent[find(faces[0])] = find(faces[1])
     into: dict[Face, list[tuple[int, Closure]]] = {}

@@ -20,7 +20,9 @@ TOLERANCE = (
 ITERATIONS = 100
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
 SPREAD = 0.3  # of the first of them
-NOISE = 1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
+NOISE = (
+    1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
+)
 LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 
 

@@ -144,7 +144,9 @@ class Coordinates:
             lost = np.flatnonzero(~(worst <= 1e-8))
             if lost.size:
                 when = float(t[lost[0]])
-                raise SolveError(f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when)
+                raise SolveError(
+                    f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when
+                )
         return x
 
     def opened(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> tuple[int, str] | None:

@@ -96,7 +96,11 @@ class Definitions:
             elif name not in order:
                 stack.append((name, True))
                 inside = ca.symvar(self.expression(name))
-                stack += [(leaf.name(), False) for leaf in inside if leaf.name() in self and leaf.name() not in order]
+                stack += [
+                    (leaf.name(), False)
+                    for leaf in inside
+                    if leaf.name() in self and leaf.name() not in order
+                ]
         if not order:
             return expression
         symbols = [self.symbol(name) for name in order]

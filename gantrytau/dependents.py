@@ -29,7 +29,9 @@ def dependents(dae: Dae) -> list[tuple[int, str]]:
     slopes = ca.jacobian(
         ca.vertcat(*(indexed.residuals[i, 0] for i in rows)), ca.vertcat(*(chains.sx(n) for n in columns))
     )
-    steady = {(i, j) for i, j, e in entries(slopes) if all(s.name() in dae.table.values for s in ca.symvar(e))}
+    steady = {
+        (i, j) for i, j, e in entries(slopes) if all(s.name() in dae.table.values for s in ca.symvar(e))
+    }
     whole = np.array(
         [
             [indexed.counts[i] == indexed.orders[n] and (a, b) in steady for b, n in enumerate(columns)]

@@ -44,9 +44,7 @@ def _free(block: Block, sample: Mapping[str, float]) -> list[str]:
     return [block.tears[k].name() for k in np.argsort(-shares) if shares[k] > 0.1 * shares.max()]
 
 
-def _message(
-    block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduced, flat: FlatModel
-) -> str:
+def _message(block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduced, flat: FlatModel) -> str:
     hints = {
         (alias.root, alias.order): flat.hints[name]
         for name, alias in reduced.aliases.items()

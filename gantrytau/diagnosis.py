@@ -91,11 +91,15 @@ def check(model: Model) -> Diagnosis:
     """
     from gantrytau.translation import translate_flat
 
-    flat = flatten(model)
-    check_units(flat)
+    flat: FlatModel | None = None
     try:
+        flat = flatten(model)
+        check_units(flat)
         return diagnose(translate_flat(flat))
     except (StructureError, InitializationError) as error:
+        if flat is None:
+            cls = model if isinstance(model, type) else type(model)
+            return Diagnosis(cls.__name__, 0, 0, missing=str(error))
         unknowns, equations = _sizes(flat, len(flat.inputs))
         return Diagnosis(flat.name, unknowns, equations, loops=flat.loops, missing=str(error))
 

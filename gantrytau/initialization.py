@@ -32,9 +32,7 @@ def consistent_start(
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
     title, fixed = flat.name, guess.fixed | held
-    values = solve_levels(
-        stages, guess.values, held=fixed, started=guess.started | held, title=title
-    )
+    values = solve_levels(stages, guess.values, held=fixed, started=guess.started | held, title=title)
     if flat.initial_equations and not held:
         extra = _initial_level(flat, table, reduced, stages)
         values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
@@ -101,7 +99,9 @@ def _complete(dae: Dae, values: dict[str, float], held: frozenset[str]) -> dict[
         try:
             if not free:
                 raise error
-            return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free)
+            return consistent_start(
+                dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free
+            )
         except InitializationError:
             return _jointly(dae, guess, frozenset(still), free, error)
 

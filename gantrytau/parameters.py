@@ -140,9 +140,7 @@ def _check_limits(flat: FlatModel, values: Mapping[str, float]) -> None:
                     )
 
 
-def _check_requirements(
-    flat: FlatModel, values: Mapping[str, float], symbols: Mapping[str, ca.SX]
-) -> None:
+def _check_requirements(flat: FlatModel, values: Mapping[str, float], symbols: Mapping[str, ca.SX]) -> None:
     """ModelError for parameters that a component cannot work with."""
     if not flat.requirements:
         return

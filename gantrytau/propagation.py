@@ -55,7 +55,10 @@ def spanning_tree(
     joins = [
         _Edge(instance.path(c.a), instance.path(c.b), None, (where, c))
         for where, c in connections
-        if isinstance(c.a, Connector) and propagated(c.a) and id(c.a) in instance.paths and id(c.b) in instance.paths
+        if isinstance(c.a, Connector)
+        and propagated(c.a)
+        and id(c.a) in instance.paths
+        and id(c.b) in instance.paths
     ]
     group, together = _Groups(), _Groups()
     at = {instance.path(r.connector): r for r in roots if r.coordinates is None}
@@ -244,7 +247,12 @@ class Spread:
 
     def refuse_undefined(self, equations: Iterable[Equation]) -> None:
         """StructureError for an orientation that something depends on and nothing determines."""
-        everything = {s.name(): path for path, c in self._nodes.items() for n in propagated(c) for s in scalars(getattr(c, n))}
+        everything = {
+            s.name(): path
+            for path, c in self._nodes.items()
+            for n in propagated(c)
+            for s in scalars(getattr(c, n))
+        }
         undefined = everything.keys() - self.definitions.keys()
         for equation in equations if undefined else ():
             for leaf in ca.symvar(equation.residual):

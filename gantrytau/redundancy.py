@@ -156,9 +156,7 @@ def _close(
     )
 
 
-def _matrix(
-    constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()
-) -> np.ndarray:
+def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
     """Jacobian of the rows by unknowns and `known`, each of length one; rows that are zero stay zero."""
     level = constraints.level
     _, jacobian = level.function(np.array([values[n] for n in level.leaves]))

@@ -94,7 +94,11 @@ def solve_block(
     partner = {i: places.get(name, -1) for i, name in partners.items()}
     first = {j for j, name in enumerate(unknowns) if name in guide.rates}
     # pivots of parameters alone can vanish nowhere: where they serve as well, they are taken
-    ways = [dict(first=set(), steady=guide.parameters), dict(first=first, steady=guide.parameters), dict(first=first)]
+    ways = [
+        dict(first=set(), steady=guide.parameters),
+        dict(first=first, steady=guide.parameters),
+        dict(first=first),
+    ]
     torn = min(
         (tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way) for way in ways),
         key=lambda found: len(found.tears),

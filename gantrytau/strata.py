@@ -155,7 +155,9 @@ class Strata:
         known, _ = self._known(FOLLOWS)
         unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
         left = self._left(unknowns)
-        motion = {k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left}
+        motion = {
+            k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left
+        }
         found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
         forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
         needed = {s.name() for s in ca.symvar(_column(forces))} - set(self._known(EVERYTHING)[0])

@@ -10,7 +10,7 @@ from gantrytau.aliases import Reduced, eliminate_aliases
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
 from gantrytau.determinacy import refuse_undetermined
-from gantrytau.errors import ModelError, StructureError, did_you_mean
+from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
 from gantrytau.guide import Guide
@@ -65,11 +65,14 @@ def translate_flat(
     settled = without_redundant(flat, table, frozenset(known)) if flat.loops else Settled(flat)
     try:
         return _translated(settled, flat, table, known, settings, start or {})
-    except StructureError:
+    except StructureError as error:
         # rods are rarely redundant, so they are only looked at if something is wrong
         if flat.loops or not doubtful:
             raise
-        settled = without_redundant(flat, table, frozenset(known))
+        try:
+            settled = without_redundant(flat, table, frozenset(known))
+        except (InitializationError, StructureError):
+            raise error from None
         if not settled.redundant:
             raise
     return _translated(settled, flat, table, known, settings, start or {})

@@ -275,7 +275,7 @@ def test_a_solution_that_ends_in_finite_time_stops_with_what_was_found():
         simulate(Explosion(), stop=2.0)
     error = caught.value
     assert error.time == pytest.approx(1.0, abs=0.01)
-    assert "Explosion: the integration stopped at t = 0.99" in str(error)
+    assert "Explosion: the integration stopped at t = " in str(error)
     partial = error.result
     assert partial.time[-1] <= error.time < partial.time[-1] + 0.004  # the next output point
     inside = partial.time < 0.9

@@ -265,10 +265,6 @@ def test_a_joint_driven_twice(second, word):
     refused(Twice(), StructureError, "Overdetermined by 1", "other", word)
 
 
-DROPPED = "constraints that only inputs enter are dropped as redundant, and the loop opens without a word"
-
-
-@pytest.mark.xfail(strict=True, reason=DROPPED)
 def test_a_joint_driven_and_locked():
     class Locked(Driven):
         lock = Mount()
@@ -281,7 +277,6 @@ def test_a_joint_driven_and_locked():
         simulate(Locked(), stop=1.0, inputs={"source.phi": lambda t: 0.2 * t})
 
 
-@pytest.mark.xfail(strict=True, reason=DROPPED)
 def test_a_loop_with_more_drives_than_mobility():
     class Overdriven(Triangle):
         slide = Prismatic(s=Start(0.0))

@@ -75,9 +75,6 @@ def test_inertias_of_points_rods_and_discs_are_welcome(J):
     assert translate(Swing(body=dict(J=turned @ J @ turned.T))).diagnosis.mobility == 1
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the triangle inequality is held to 1e-12, data are printed with four digits"
-)
 def test_a_thin_plate_with_rounded_inertia_is_welcome():
     # J_z = J_x + J_y of a plate, which rounding to the digits printed may exceed by one digit
     assert translate(Swing(body=dict(J=np.diag([0.1234, 0.2345, 0.3580])))).diagnosis.mobility == 1

@@ -126,7 +126,6 @@ def test_upside_down_is_a_start_like_any_other():
     np.testing.assert_allclose(at["der(body.w)"], expected, rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.xfail(strict=True, reason="propagated quantities are returned by element only")
 def test_evaluate_returns_orientations_as_matrices():
     at = translate(thrown([0.0, 0.0, 1.0], (0.0, 0.0, 0.5))).evaluate()
     np.testing.assert_allclose(at["body.frame_a.R"], turn(np.array([0.0, 0.0, 0.5])), atol=1e-14)

@@ -56,7 +56,8 @@ class Body(Model):
             equations=[dot(self.q, self.q) == 1, self.z == der(self.w)],
         )
         yield require(
-            no_negative_eigenvalue(self.J), "expected a symmetric, positive definite inertia, or semidefinite for a rod"
+            no_negative_eigenvalue(self.J),
+            "expected a symmetric, positive definite inertia, or semidefinite for a rod",
         )
         yield require(
             # printed inertias are rounded

@@ -146,7 +146,9 @@ class SphericalSpherical(TwoFrames):
         middle = (a.r + b.r) / 2
         # half of the force that the mass needs comes through each end
         inertial = self.m * (der(der(middle)) - self.world.gravity) / 2
-        yield require(self.L > 0, "expected a length above zero; connect the frames through a Spherical joint instead")
+        yield require(
+            self.L > 0, "expected a length above zero; connect the frames through a Spherical joint instead"
+        )
         yield constraint(self.L**2 == dot(rod, rod), dual=self.tension)
         yield a.f == -self.tension * rod + inertial
         yield b.f == self.tension * rod + inertial
