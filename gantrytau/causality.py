@@ -8,6 +8,7 @@ import casadi as ca
 from gantrytau.blocks import block_pattern
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.guide import Guide
+from gantrytau.iteration import Implicit, solved_one_by_one
 from gantrytau.solution import Block, solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.translation import all_symbols, names, translate_flat
@@ -170,12 +171,10 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
         )
         for n, e in known.items()
     ]
-    implicit: list[Block] = []
+    implicit = [block for block in blocks if block.solution is None]
     for block in blocks:
-        if block.solution is None:
-            implicit.append(block)
         definitions += block.definitions
-    expressions = [*(r for b in implicit for r in b.residuals), *targets]
+    expressions = [*(ca.vertcat(*b.residuals) for b in implicit), *targets]
     symbols, values = [v for v, _ in definitions], [e for _, e in definitions]
     _, expressions = ca.substitute_inplace(symbols, values, expressions, False)
     arguments = [ca.vertcat(*column) for column in columns]
@@ -184,39 +183,23 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
     _refuse_time(expressions, dae)
     if not implicit:
         return ca.Function("f", arguments, expressions, names_in, names_out, {"cse": True})
-    return _with_iteration(dae, implicit, expressions, arguments, names_in, names_out)
+    parts = [
+        Implicit(block, residual, ca.DM([dae.start[y.name()] for y in block.tears]))
+        for block, residual in zip(implicit, expressions, strict=False)
+    ]
+    start = ca.DM(_start_of(dae, [n for name in given for n in dae.expand(name)]))
+    return solved_one_by_one("f", parts, expressions[len(parts) :], arguments, start, (names_in, names_out))
 
 
-def _with_iteration(dae, implicit: list[Block], expressions, arguments, names_in, names_out) -> ca.Function:
-    """Blocks without closed form are solved one after another: linear ones outright, others by Newton's method."""
-    q = ca.vertcat(*arguments)
-    x = [ca.MX.sym(name, a.shape[0]) for name, a in zip(names_in, arguments, strict=True)]
-    qx = ca.vertcat(*x)
-    before, solved = ca.SX(0, 1), ca.MX(0, 1)
-    place = 0
-    for number, block in enumerate(implicit):
-        y = ca.vertcat(*block.tears)
-        f = ca.vertcat(*expressions[place : place + len(block.tears)])
-        place += len(block.tears)
-        known = ca.vertcat(qx, solved)
-        if block.kind == "linear":
-            matrix = ca.jacobian(f, y)
-            inputs = ca.Function(
-                "linear", [ca.vertcat(q, before)], [matrix, ca.substitute(f, y, 0 * y)], {"cse": True}
-            )
-            a, b = inputs(known)
-            found = ca.solve(a, -b, "qr")
-        else:
-            residual = ca.Function("residual", [y, ca.vertcat(q, before)], [f], {"cse": True})
-            options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
-            newton = ca.rootfinder(f"newton{number}", "newton", residual, options)
-            found = newton(ca.DM([dae.start[s.name()] for s in block.tears]), known)
-        solved = ca.vertcat(solved, found)
-        before = ca.vertcat(before, y)
-    outside = ca.Function("rest", [q, before], list(expressions[place:]), {"cse": True})
-    found = outside(qx, solved)
-    found = list(found) if isinstance(found, (tuple, list)) else [found]
-    return ca.Function("f", x, found, names_in, names_out)
+def _start_of(dae: "Dae", scalars: Sequence[str]) -> list[float]:
+    """Numbers of arguments where the model starts; derivatives that do not occur there are zero."""
+    found = []
+    for name in scalars:
+        try:
+            found.append(float(dae.numbers([name], dae.start)[0]))
+        except KeyError:
+            found.append(dae.table.values.get(name, 0.0))
+    return found
 
 
 def _refuse_time(expressions, dae) -> None:

@@ -12,8 +12,8 @@ from gantrytau.conditioning import Conditioning
 from gantrytau.dae import Dae
 from gantrytau.dependents import definitions_of, dependents
 from gantrytau.errors import ModelError, SolveError
-from gantrytau.guide import Guide
 from gantrytau.guess import Guess
+from gantrytau.guide import Guide
 from gantrytau.initialization import consistent_start
 from gantrytau.signals import Samples, Signal
 from gantrytau.solution import solve_blocks

@@ -137,12 +137,13 @@ def _refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> 
 def _refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
     """Start values of coordinates that do not exist would be lost silently."""
     for placed in instance.quantities:
-        if placed.elements[0] in absent and "start" in placed.attributes:
-            if placed.attributes["start"].value is not placed.declaration.start:
-                raise ModelError(
-                    f"{placed.name}: found a start value, but it does not exist: {absent[placed.elements[0]]}; give start "
-                    "values to the coordinates of those joints"
-                )
+        start = placed.attributes.get("start")
+        changed = start is not None and start.value is not placed.declaration.start
+        if placed.elements[0] in absent and changed:
+            raise ModelError(
+                f"{placed.name}: found a start value, but it does not exist: {absent[placed.elements[0]]}; give start "
+                "values to the coordinates of those joints"
+            )
 
 
 def _is_parameter(placed: Placed) -> bool:

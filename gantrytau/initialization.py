@@ -17,6 +17,10 @@ from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
 
 
+STEP = 0.4  # m or rad between stops on the way to given positions
+MOST_STEPS = 8
+
+
 def consistent_start(
     flat: FlatModel,
     table: ParameterTable,
@@ -84,8 +88,26 @@ def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:
             )
         values[symbol] = value
         held.add(symbol)
+    for share in _shares(dae, values, held):
+        # on the way, so that mechanisms stay assembled as they are at the start
+        near = {n: dae.start.get(n, v) + share * (v - dae.start.get(n, v)) for n, v in values.items()}
+        try:
+            reached = _complete(dae, near, frozenset(held))
+        except InitializationError:
+            break  # the straight way leads out of reach; the end need not be
+        values |= {n: v for n, v in reached.items() if n not in held}
     found = _complete(dae, values, frozenset(held))
     return named_values(dae, found)
+
+
+def _shares(dae: Dae, values: Mapping[str, float], held: set[str]) -> list[float]:
+    """Where to stop on the way from the start to given positions: after each metre or radian of STEP."""
+    places = [n for n in held if dae.indexed.orders.get(n, 0) > 1]
+    free = sum(1 for n in dae.choice.states if dae.indexed.orders.get(n, 0) > 1)
+    far = max((abs(values[n] - dae.start[n]) for n in places), default=0.0)
+    # more positions than can be chosen are consistent at the end of the way only
+    count = min(int(far / STEP) + 1, MOST_STEPS) if len(places) <= free else 1
+    return [k / count for k in range(1, count)]
 
 
 def _complete(dae: Dae, values: dict[str, float], held: frozenset[str]) -> dict[str, float]:

@@ -164,7 +164,7 @@ def propagate(instance: Instance, tree: Tree) -> tuple[dict[str, ca.SX], dict[st
         connector = tree.nodes[path]
         given = _given(path, connector, edge, root, instance, tree)
         for name, declaration in propagated(connector).items():
-            value = ca.densify(ca.SX(given[name] if name in given else declaration.start))
+            value = ca.densify(ca.SX(given.get(name, declaration.start)))
             symbols = scalars(getattr(connector, name))
             if value.numel() != len(symbols):
                 raise ModelError(

@@ -19,7 +19,6 @@ from gantrytau.flat_model import FlatModel
 from gantrytau.guess import Guess, starting_guess
 from gantrytau.parameters import ParameterTable
 from gantrytau.statements import Equation
-from gantrytau.symbols import split_derivative
 
 RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
 CLOSED = 1e-12  # residual of a pose beyond which ranks seen there are not trusted

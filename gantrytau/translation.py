@@ -13,9 +13,9 @@ from gantrytau.determinacy import refuse_undetermined
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
+from gantrytau.guess import starting_guess
 from gantrytau.guide import Guide
 from gantrytau.index_reduction import Indexed, reduce_index
-from gantrytau.guess import starting_guess
 from gantrytau.initialization import consistent_start
 from gantrytau.model import Model
 from gantrytau.parameters import ParameterTable, parameter_table

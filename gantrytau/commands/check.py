@@ -1,11 +1,12 @@
 """`gantrytau check`: what translation finds out about a model."""
 
 from dataclasses import asdict
+
 import typer
 
 from gantrytau.commands.models import build, source_of
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings
-from gantrytau.commands.reporting import as_json, busy, reporting
+from gantrytau.commands.reporting import FAULT, as_json, busy, fail, reporting
 
 
 def check(
@@ -22,9 +23,11 @@ def check(
         chosen = build(model, prototype, set_ or ())
         with busy(f"translating {chosen.name}"):
             diagnosis = gantrytau.check(chosen.model)
-        if json:
+        if diagnosis.missing and json:
+            fail(diagnosis.missing, FAULT, json, **asdict(diagnosis), prototype=chosen.prototype)
+        elif diagnosis.missing:
+            fail(str(diagnosis), FAULT, json)
+        elif json:
             typer.echo(as_json({**asdict(diagnosis), "prototype": chosen.prototype}))
         else:
             typer.echo(str(diagnosis))
-    if diagnosis.missing:
-        raise typer.Exit(1)

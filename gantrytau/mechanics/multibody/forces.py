@@ -1,7 +1,5 @@
 """Forces and torques that act on frames."""
 
-import casadi as ca
-
 from gantrytau import Input, Model, Real, norm_2
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.multibody.frames import Frame, TwoFrames
