@@ -39,9 +39,18 @@ def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] 
     if file is not None:
         with replacing(file) as partial:
             figure.savefig(partial, dpi=150)
-    if file is not None or plt.get_backend().lower().endswith(("agg", "inline")):
+    if file is not None or not has_windows(plt.get_backend()):
         plt.close(figure)  # there is no window: the figure belongs to its caller alone
     return figure
+
+
+def has_windows(backend: str) -> bool:
+    """Whether figures of a Matplotlib backend stay open until their reader closes them: "TkAgg" yes, "agg" no."""
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    interactive = backend_registry.list_builtin(BackendFilter.INTERACTIVE)
+    # notebooks with living figures: `%matplotlib widget`
+    return backend.lower() in {*interactive, "widget", "ipympl", "module://ipympl.backend_nbagg"}
 
 
 def _lines(result: "Result", names: tuple[str, ...]) -> list[str]:
