@@ -29,6 +29,7 @@ from gantrytau.trajectories import result_of
 from gantrytau.translation import names, retranslate, translate
 
 CHUNK = 10  # output intervals between two projections onto the constraints
+FALLEN = 0.05  # relative distance of a singular pose from which its fall is extrapolated
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
 WITHIN = 0.5  # relative distance of a singular pose above which none lies within one output interval
 HALVINGS = 14  # of the last step, to come near to where the integration stops
@@ -147,6 +148,7 @@ class _Run:
         self.x = np.full((self.mesh.size, len(coordinates.states)), np.nan)
         self.z = np.full((self.mesh.size, len(coordinates.algebraics)), np.nan)
         self.done = 0
+        self.before = np.zeros(0)  # distance from a singular pose at the output point before the last
         self.integrators: dict[int, ca.Function] = {}
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -221,15 +223,21 @@ class _Run:
         inputs = np.array([self._inputs(k) for k in range(first, last + 1)])
         places = slice(first, last + 1)
         look = self._look(self.x[places], self.z[places], self.mesh[places], inputs)
+        distances = np.concatenate([self.before, look.distance])
+        self.before = look.distance[-2:-1]
+        shift = distances.size - look.distance.size
         for k in range(last - first):
-            within = min(look.distance[k], look.distance[k + 1]) < WITHIN
+            here, there = look.distance[k], look.distance[k + 1]
+            within = min(here, there) < WITHIN
             crossed = within and look.side[k] * look.side[k + 1] < 0
-            if crossed or look.near[k + 1]:
+            # a distance that falls straight to zero within the interval may have risen again behind it
+            falling = distances[k + shift - 1] - here if k + shift else 0.0
+            if crossed or look.near[k + 1] or (here < FALLEN and here - falling < CLOSE):
                 self.done = first + k
-                point, distance, zero = self._approach(crossed=True)
+                point, distance, zero = self._approach(crossed)
                 if look.near[k + 1] or distance < 5 * CLOSE:
                     raise self._singular_pose(point, zero)
-                self.done = last  # only the choice of coordinates fails there
+                self.done = last  # it is passed at a distance, or only the choice of coordinates fails there
 
     def _opened(self, name: str) -> SolveError:
         t = float(self.mesh[self.done])

@@ -104,9 +104,10 @@ class SixLinkGantryTau(Model):
     def __init__(
         self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
     ):
+        carts = driven_carts(prototype, friction, type(self).__name__)
         defaults = dict(
             arms=[_cluster(arm) for arm in prototype.arms],
-            carts=driven_carts(prototype, friction, type(self).__name__),
+            carts=carts,
             tool=dict(
                 m=prototype.plate_mass,
                 J=np.array(prototype.plate_inertia),
