@@ -47,11 +47,33 @@ class Level:
         return bool(x) and ca.depends_on(ca.jacobian(residual, ca.vertcat(*x)), ca.vertcat(*x))
 
     @cached_property
-    def function(self) -> ca.Function:
-        """From the numbers of the leaves to the residuals and their derivatives by the leaves."""
+    def _symbolic(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         residual = ca.vertcat(*self.residuals)
         x = ca.vertcat(*ca.symvar(residual))
-        return ca.Function("level", [x], [ca.densify(residual), ca.jacobian(residual, x)], {"cse": True})
+        return x, ca.densify(residual), ca.jacobian(residual, x)
+
+    @cached_property
+    def entries(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the derivatives that are not structurally zero."""
+        rows, columns = self._symbolic[2].sparsity().get_triplet()
+        return np.array(rows, dtype=int), np.array(columns, dtype=int)
+
+    @cached_property
+    def _function(self) -> ca.Function:
+        x, residual, jacobian = self._symbolic
+        entries = ca.vertcat(*jacobian.nonzeros()) if jacobian.nnz() else ca.SX(0, 1)
+        return ca.Function("level", [x], [residual, ca.densify(entries)])
+
+    def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals, and the entries of their derivatives by the leaves, at numbers of the leaves."""
+        residual, slopes = self._function(numbers)
+        return np.array(residual).ravel(), np.array(slopes).ravel()
+
+    def jacobian(self, slopes: np.ndarray) -> np.ndarray:
+        """The derivatives by the leaves as a dense matrix."""
+        found = np.zeros((len(self.residuals), len(self.leaves)))
+        found[self.entries] = slopes
+        return found
 
 
 def solve_levels(
@@ -111,13 +133,13 @@ def _solve(
 
     def at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         around[columns] = point
-        f, jacobian = level.function(around)
-        return np.array(f).ravel(), np.array(jacobian)[:, columns]
+        f, slopes = level.look(around)
+        return f, level.jacobian(slopes)[:, columns]
 
-    pattern = level.function.sparsity_out(1)
+    if propagate:
+        missing = {column for k, column in enumerate(columns) if moving[k] not in started}
+        around = _propagated(level, around, missing)
     point = around[columns]
-    missing = {column: k for k, column in enumerate(columns) if moving[k] not in started}
-    point = _propagated(at, point, pattern, missing) if propagate else point
     point, f, jacobian = newton(at, point, weights)
     scale = _terms(jacobian, point)
     bad = ~(np.abs(f) <= 1e-9 * scale)
@@ -179,36 +201,42 @@ def _longest(point: np.ndarray, step: np.ndarray) -> float:
     return float(np.min(reach / np.maximum(np.abs(step), 1e-300), initial=1.0))
 
 
-def _propagated(at, point: np.ndarray, pattern: ca.Sparsity, missing: Mapping[int, int]) -> np.ndarray:
-    """Values without a start computed from those with one, as far as single equations give them outright."""
+def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray:
+    """Values without a start computed from those with one, as far as single equations give them outright.
+
+    point: numbers of the leaves; missing: places of those without a start.
+    """
     rows: dict[int, set[int]] = {}
-    for i, j in zip(*pattern.get_triplet(), strict=True):
+    place: dict[tuple[int, int], int] = {}
+    for k, (i, j) in enumerate(zip(*level.entries, strict=True)):
+        place[int(i), int(j)] = k
         if j in missing:
-            rows.setdefault(i, set()).add(missing[j])
-    while True:
+            rows.setdefault(int(i), set()).add(int(j))
+    f, slopes = level.look(point)
+    while rows:
         single = {next(iter(left)): i for i, left in rows.items() if len(left) == 1}
         if not single:
             counts: dict[int, int] = {}
             for left in rows.values():
                 counts.update((j, counts.get(j, 0) + 1) for j in left)
-            if not counts:
-                return point
             # the coordinate of a joint is in several rows, each with another unknown: it stays as it is
-            accepted = max(counts, key=lambda j: (counts[j], -j))
-            rows = {i: left - {accepted} for i, left in rows.items()}
-            continue
-        f, jacobian = at(point)
+            single = {max(counts, key=lambda j: (counts[j], -j)): -1}
+        largest = np.zeros(len(f))
+        np.maximum.at(largest, level.entries[0], np.abs(slopes))
         new = point.copy()
         for j, i in single.items():
-            slope = jacobian[i, j]
-            if np.isfinite(f[i]) and abs(slope) > 1e-3 * np.abs(jacobian[i]).max() > 0:
+            slope = slopes[place[i, j]] if i >= 0 else 0.0
+            if i >= 0 and np.isfinite(f[i]) and abs(slope) > 1e-3 * largest[i] > 0:
                 new[j] -= f[i] / slope
-        after, _ = at(new)
-        for j, i in single.items():
-            if not abs(after[i]) <= 1e-9 * max(1.0, abs(f[i])):  # not linear in it
-                new[j] = point[j]
-        point = new
-        rows = {i: left - single.keys() for i, left in rows.items()}
+        if np.any(new != point):
+            after, slopes_after = level.look(new)
+            wrong = [j for j, i in single.items() if not abs(after[i]) <= 1e-9 * max(1.0, abs(f[i]))]
+            if wrong:  # not linear in these
+                new[wrong] = point[wrong]
+                after, slopes_after = level.look(new)
+            point, f, slopes = new, after, slopes_after
+        rows = {i: left - single.keys() for i, left in rows.items() if left - single.keys()}
+    return point
 
 
 def _failure(level: Level, f: np.ndarray, bad: np.ndarray, title: str) -> InitializationError:

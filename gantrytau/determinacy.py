@@ -11,7 +11,6 @@ import numpy as np
 from gantrytau.aliases import Reduced
 from gantrytau.errors import StructureError
 from gantrytau.flat_model import FlatModel
-from gantrytau.guide import sample_values
 from gantrytau.index_reduction import Indexed
 from gantrytau.solution import Block
 from gantrytau.symbols import split_derivative
@@ -23,21 +22,37 @@ def refuse_undetermined(
     blocks: Sequence[Block], indexed: Indexed, reduced: Reduced, sample: Mapping[str, float], flat: FlatModel
 ) -> None:
     """StructureError that names the unknowns which the equations leave free at the start, and why."""
-    for block in blocks:
-        if block.tears and block.kind in ("explicit", "linear"):
-            free = _free(block, sample)
-            if free:
-                raise StructureError(_message(block, free, indexed, reduced, flat))
+    watched = [b for b in blocks if b.tears and b.kind in ("explicit", "linear")]
+    if not watched:
+        return
+    residual = ca.vertcat(*(r for b in watched for r in b.residuals))
+    leaves = ca.symvar(residual)
+    jacobian = ca.jacobian(residual, ca.vertcat(*leaves))
+    function = ca.Function("terms", [ca.vertcat(*leaves)], [ca.densify(ca.vertcat(*jacobian.nonzeros()))])
+    entries = np.array(function([sample[leaf.name()] for leaf in leaves])).ravel()
+    rows, columns = (np.array(x, dtype=int) for x in jacobian.sparsity().get_triplet())
+    largest = np.zeros(residual.numel())
+    np.maximum.at(largest, rows, np.nan_to_num(np.abs(entries)))
+    place = {leaf.name(): j for j, leaf in enumerate(leaves)}
+    begin = 0
+    for block in watched:
+        count = len(block.tears)
+        own = {place[y.name()]: k for k, y in enumerate(block.tears) if y.name() in place}
+        matrix = np.zeros((count, count))
+        for k in np.flatnonzero((rows >= begin) & (rows < begin + count)):
+            if columns[k] in own:
+                matrix[rows[k] - begin, own[columns[k]]] = entries[k]
+        free = _free(block, matrix, largest[begin : begin + count, None])
+        begin += count
+        if free:
+            raise StructureError(_message(block, free, indexed, reduced, flat))
 
 
-def _free(block: Block, sample: Mapping[str, float]) -> list[str]:
-    residual = ca.vertcat(*block.residuals)
-    matrix = sample_values(ca.jacobian(residual, ca.vertcat(*block.tears)), sample)
+def _free(block: Block, matrix: np.ndarray, terms: np.ndarray) -> list[str]:
+    """Unknowns that a matrix leaves free; terms: the largest coefficient in each equation."""
     if not np.all(np.isfinite(matrix)):
         return []
-    terms = sample_values(ca.jacobian(residual, ca.vertcat(*ca.symvar(residual))), sample)
-    rows = np.maximum(np.nan_to_num(np.abs(terms)).max(axis=1, keepdims=True), 1e-300)
-    _, values, right = np.linalg.svd(matrix / rows)
+    _, values, right = np.linalg.svd(matrix / np.maximum(terms, 1e-300))
     if values[-1] > LEAST * max(values[0], 1e-3):
         return []
     shares = np.abs(right[-1])

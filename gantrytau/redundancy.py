@@ -158,9 +158,9 @@ def _close(
 def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
     """Jacobian of the rows by unknowns and `known`, each of length one; rows that are zero stay zero."""
     level = constraints.level
-    _, jacobian = level.function(np.array([values[n] for n in level.leaves]))
+    _, slopes = level.look(np.array([values[n] for n in level.leaves]))
     place = {n: k for k, n in enumerate(level.leaves)}
-    found = np.array(jacobian)[:, [place[n] for n in (*constraints.moving, *known)]]
+    found = level.jacobian(slopes)[:, [place[n] for n in (*constraints.moving, *known)]]
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
@@ -188,8 +188,8 @@ def _poses(
             )
         except InitializationError:
             continue
-        residual, _ = constraints.level.function(np.array([here[n] for n in constraints.level.leaves]))
-        if np.abs(np.array(residual)).max() < CLOSED:
+        residual, _ = constraints.level.look(np.array([here[n] for n in constraints.level.leaves]))
+        if np.abs(residual).max() < CLOSED:
             found.append(here)
     return found
 

@@ -5,6 +5,7 @@ Numbers guide the symbolic choices: pivots are accepted by their values at sampl
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -94,15 +95,17 @@ def solve_block(
     partner = {i: places.get(name, -1) for i, name in partners.items()}
     first = {j for j, name in enumerate(unknowns) if name in guide.rates}
     # pivots of parameters alone can vanish nowhere: where they serve as well, they are taken
-    ways = [
+    ways: list[dict[str, Any]] = [
         dict(first=set(), steady=guide.parameters),
         dict(first=first, steady=guide.parameters),
         dict(first=first),
     ]
-    torn = min(
-        (tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way) for way in ways),
-        key=lambda found: len(found.tears),
-    )
+    tried = []
+    for way in ways:
+        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way))
+        if len(tried[-1].tears) <= max(len(first), 1):
+            break
+    torn = min(tried, key=lambda one: len(one.tears))
     inner: list[tuple[ca.SX, ca.SX]] = []
     rows, columns = ca.vertsplit(f), ca.vertsplit(x)
     for i, j in torn.assignments:

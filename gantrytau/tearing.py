@@ -82,11 +82,22 @@ def _search(
 
 
 def _gain(open_rows, holders, solvable, candidate: int) -> int:
-    rows = {i: set(row) for i, row in open_rows.items()}
-    for i in holders[candidate]:
-        if i in rows:
-            rows[i].discard(candidate)
-    return len(_follow(rows, holders, solvable, [candidate]))
+    """How many equations can be solved at once when the candidate is torn."""
+    known, solved = {candidate}, set()
+    counts: dict[int, int] = {}
+    queue = [candidate]
+    for column in queue:
+        for i in holders[column]:
+            if i not in open_rows or i in solved or column not in open_rows[i]:
+                continue
+            counts[i] = counts.get(i, len(open_rows[i])) - 1
+            if counts[i] == 1:
+                j = next(iter(open_rows[i] - known), None)
+                if j is not None and (i, j) in solvable:
+                    solved.add(i)
+                    known.add(j)
+                    queue.append(j)
+    return len(solved)
 
 
 def _follow(open_rows, holders, solvable, changed: list[int]) -> list[tuple[int, int]]:
