@@ -147,6 +147,7 @@ def test_latex_has_balanced_braces_and_environments(dae):
 
 def test_an_independent_reader_of_formulas_accepts_the_latex(dae):
     parser = MathTextParser("path")
+    seen = set()
     for body in re.findall(
         r"\\begin\{align\*\}(.*?)\\end\{align\*\}", dae.equations("latex"), flags=re.DOTALL
     ):
@@ -154,6 +155,10 @@ def test_an_independent_reader_of_formulas_accepts_the_latex(dae):
             continue
         for row in body.strip().split(" \\\\\n"):
             assert row.count("&") == 1
+            shape = re.sub(r"\d+", "0", row)
+            if shape in seen:  # rows that differ in numbers only read alike
+                continue
+            seen.add(shape)
             parser.parse(f"${row.replace('&', '').replace(chr(92) + 'quad{}', '')}$")
 
 
