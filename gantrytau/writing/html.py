@@ -102,7 +102,7 @@ class _Page:
     def _component(self, heading: str, equations: list[Equation]) -> str:
         sides = [side for e in equations for side in (e.left, e.right)]
         text = written_at(heading, sides, self.syntax)
-        redundant = {id(e) for e in self.dae.reduced.redundant}
+        redundant = {id(e) for e in (*self.dae.redundant, *self.dae.reduced.redundant)}
         lines = [_row(equality(name, value)) for name, value in text.definitions]
         for number, equation in enumerate(equations):
             left, right = text.expressions[2 * number : 2 * number + 2]

@@ -3,9 +3,11 @@
 Names are quoted identifiers, `'carts[0].s'`, so that every name of the model is one name there. What is known
 of the Dae is `input`. Derivatives of higher order get variables of their own, `'der(x)' = der('x')`; so do
 propagated quantities and large subexpressions that occur more than once. The text has as many equations as
-unknowns. Modelica Language Specification 3.6, chapters 2, 3 and 8.
+unknowns, and none that follows from others: a constraint that would is replaced by `force = 0`. Modelica
+Language Specification 3.6, chapters 2, 3 and 8.
 """
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -27,6 +29,7 @@ SELECT = {
     StateSelect.NEVER: "never", StateSelect.AVOID: "avoid",
     StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
 }  # fmt: skip
+NO_FORCE = "no force for "  # begins the name of the equation that stands for a redundant constraint
 LEAST_SAVING = 40  # nodes; each name is one more unknown for the tool that reads the text
 
 
@@ -35,11 +38,27 @@ def modelica_text(dae: "Dae") -> str:
     return _Writer(dae).text()
 
 
+def independent_equations(dae: "Dae") -> list[Equation]:
+    """The equations of the flat model, as many as unknowns; those that repeat others are gone, their forces zero."""
+    # a redundant constraint leaves its force undetermined; what became 0 == 0 leaves nothing behind
+    idle = {id(e) for e in dae.redundant}
+    gone = {id(e) for e in dae.reduced.redundant}
+    symbols = {n: s for v in dae.flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
+    unforced = {e.dual for e in dae.reduced.redundant if e.label.startswith(NO_FORCE)}
+    found: list[Equation] = []
+    for equation in dae.flat.equations:
+        if id(equation) not in idle:
+            found += [] if id(equation) in gone else [equation]
+        elif equation.dual not in unforced:
+            label = f"{NO_FORCE}{equation.name}"
+            found.append(replace(equation, left=symbols[equation.dual], right=ca.SX(0), label=label))
+    return found
+
+
 class _Writer:
     def __init__(self, dae: "Dae"):
         self.dae, self.flat, self.graph = dae, dae.flat, Graph()
-        redundant = {id(e) for e in dae.reduced.redundant}
-        self.equations = [e for e in self.flat.equations if id(e) not in redundant]
+        self.equations = independent_equations(dae)
         self.auxiliaries: list[str] = []
         self.orders = self._orders()
         self.syntax = ModelicaSyntax({n for n, order in self.orders.items() if order > 1})

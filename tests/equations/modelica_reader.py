@@ -1,7 +1,12 @@
-"""Reads flat Modelica with pymoca, an independent parser, and evaluates its equations at given numbers."""
+"""Reads flat Modelica with pymoca, an independent parser, and evaluates its equations at given numbers.
+
+A robot has thousands of lines that differ in nothing but quoted names and strings. Each of these is one token,
+whatever it says, so lines that are alike otherwise are parsed once, and the names put back into copies.
+"""
 
 import math
 import operator
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -56,11 +61,67 @@ def plain(name: str) -> str:
 
 
 def read_modelica(text: str) -> ModelicaClass:
-    """The one class in `text`; an error of syntax fails the test."""
-    tree = parser.parse(text)
+    """The one class in `text`, parsed as a whole; an error of syntax fails the test."""
+    # pymoca's cache would outlive the test in the home folder
+    tree = parser.parse(text, bypass_cache=True)
     assert tree is not None, "pymoca found an error of syntax"
     (found,) = (c for c in tree.classes.values() if c.type == "model")  # the others are Modelica's own types
     return ModelicaClass(found)
+
+
+NAMES = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"")  # quoted identifiers and strings
+SECTIONS = ("initial equation", "equation")
+
+
+def read_by_lines(text: str) -> ModelicaClass:
+    """Like `read_modelica`, but fast, from a long text with one declaration or equation on each line."""
+    heading, *body, end = [line for line in text.splitlines() if not line.lstrip().startswith("//")]
+    alike: dict[tuple[str, str], int] = {}  # number of a line without its names, by its section
+    lines: list[tuple[str, int, list[str]]] = []
+    section = ""
+    for line in body:
+        if line in SECTIONS:
+            section = line
+            continue
+        own = list(dict.fromkeys(NAMES.findall(line)))
+        bare = NAMES.sub(lambda found, own=own: _quoted_like(found[0], f"{own.index(found[0])}"), line)
+        lines.append((section, alike.setdefault((section, bare), len(alike)), own))
+    short = [heading]
+    for section in ("", *SECTIONS):
+        rows = [(number, bare) for (place, bare), number in alike.items() if place == section]
+        short += [section] if section and rows else []
+        short += [NAMES.sub(lambda x, n=n: _quoted_like(x[0], f"{n}.{x[0][1:-1]}"), row) for n, row in rows]
+    tree = read_modelica("\n".join([*short, end])).tree
+    first = [*tree.symbols.values(), *tree.initial_equations, *tree.equations]
+    copies: dict[str, list[Any]] = {section: [] for section in ("", *SECTIONS)}
+    for section, number, own in lines:
+        copies[section].append(_renamed(first[number], _names(number, own)))
+    declared, tree.initial_equations, tree.equations = copies.values()
+    tree.symbols = {symbol.name: symbol for symbol in declared}
+    return ModelicaClass(tree)
+
+
+def _quoted_like(example: str, content: str) -> str:
+    return f"{example[0]}{content}{example[0]}"
+
+
+def _names(number: int, own: list[str]) -> dict[str, str]:
+    """What stands for the stand-ins of one line; pymoca keeps the quotes of identifiers, not those of strings."""
+    found = {f"{number}.{k}": name[1:-1] for k, name in enumerate(own)}
+    return found | {f"'{stand_in}'": f"'{name}'" for stand_in, name in found.items()}
+
+
+def _renamed(node: Any, names: Mapping[str, str]) -> Any:
+    """A copy of a syntax tree with other names."""
+    if isinstance(node, str):
+        return names.get(node, node)
+    if isinstance(node, list):
+        return [_renamed(x, names) for x in node]
+    if isinstance(node, ast.Class) or not isinstance(node, ast.Node):
+        return node
+    new = object.__new__(type(node))
+    vars(new).update({key: _renamed(value, names) for key, value in vars(node).items()})
+    return new
 
 
 @dataclass

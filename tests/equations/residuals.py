@@ -5,31 +5,32 @@ import numpy as np
 
 from gantrytau import Dae, Model, translate
 from gantrytau.symbols import derivative_name, split_derivative
-from tests.equations.modelica_reader import Evaluator, ModelicaClass, plain, read_modelica
+from gantrytau.writing.modelica import independent_equations
+from tests.equations.modelica_reader import Evaluator, ModelicaClass, plain, read_by_lines
 
-POINTS = 3
 
-
-def assert_same_residuals(model: Model | Dae, *, seed: int = 1, lowest: float = -2.0) -> ModelicaClass:
+def assert_same_residuals(
+    model: Model | Dae, *, seed: int = 1, lowest: float = -2.0, points: int = 2
+) -> ModelicaClass:
     """The text is balanced and its equations have the residuals of the flat model at random points.
 
-    lowest: the least of the random values, which reach to 2; positive for models with roots or logarithms.
+    lowest: the least of the random values, which reach to 2; positive for models with roots or logarithms; points:
+    one tells smooth equations apart, more are for the branches of `if`.
     """
     dae = model if isinstance(model, Dae) else translate(model)
-    read = read_modelica(dae.equations("modelica"))
+    read = read_by_lines(dae.equations("modelica"))
     assert len(read.unknowns) == len(read.tree.equations)
     assert set(read.named("input")) == set(dae.known)
     assert set(read.named("parameter")) == set(dae.parameters)
     generator = np.random.default_rng(seed)
-    for _ in range(POINTS):
+    for _ in range(points):
         _assert_same_at(dae, read, generator, lowest)
     return read
 
 
 def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generator, lowest: float) -> None:
     flat = dae.flat
-    redundant = {id(e) for e in dae.reduced.redundant}
-    kept = [e for e in flat.equations if id(e) not in redundant]
+    kept = independent_equations(dae)
     written = (*kept, *flat.initial_equations)
     sides = ca.SX(ca.vertcat(*(side for e in written for side in (e.left, e.right))))
     symbols = ca.symvar(ca.SX(ca.vertcat(sides, *flat.definitions.values(), *flat.derivatives.values())))

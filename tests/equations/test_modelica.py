@@ -74,31 +74,6 @@ class Swing(Model):
         yield connect(self.ball.frame_b, self.body.frame_a)
 
 
-class FourBars(Model):
-    """A planar loop in space, three of whose closing constraints repeat others."""
-
-    world = multibody.World()
-    joints = Array(multibody.Revolute, 4, n=[0.0, 1.0, 0.0])
-    crank = multibody.FixedTranslation(r=[0.0, 0.0, 1.0])
-    coupler = multibody.FixedTranslation(r=[2.0, 0.0, 0.5])
-    rocker = multibody.FixedTranslation(r=[0.0, 0.0, 1.5])
-    ground = multibody.FixedTranslation(r=[2.0, 0.0, 0.0])
-    body = multibody.Body(m=1.0, r_cm=[1.0, 0.0, 0.0])
-
-    def equations(self):
-        a, b, c, d = self.joints
-        yield connect(self.world.frame_b, a.frame_a)
-        yield connect(a.frame_b, self.crank.frame_a)
-        yield connect(self.crank.frame_b, b.frame_a)
-        yield connect(b.frame_b, self.coupler.frame_a)
-        yield connect(b.frame_b, self.body.frame_a)
-        yield connect(self.coupler.frame_b, c.frame_a)
-        yield connect(self.world.frame_b, self.ground.frame_a)
-        yield connect(self.ground.frame_b, d.frame_a)
-        yield connect(d.frame_b, self.rocker.frame_a)
-        yield connect(self.rocker.frame_b, c.frame_b)
-
-
 class Started(Model):
     """Attributes of every kind, an initial equation, an output, a third derivative."""
 
@@ -119,15 +94,11 @@ class Started(Model):
 
 
 MODELS = [
-    pytest.param(Pendulum(), id="pendulum"),
-    pytest.param(GantryTau(prototypes.L1), id="robot"),
     pytest.param(GantryTau(prototypes.L1, friction=LinearFriction), id="robot with linear friction"),
-    pytest.param(GantryTau(prototypes.GT_A, friction=None), id="robot without friction"),
     pytest.param(Oscillator(), id="oscillator"),
     pytest.param(Shaft(), id="shaft"),
     pytest.param(Slide(), id="slide"),
     pytest.param(Swing(), id="swing"),
-    pytest.param(FourBars(), id="four bars"),
     pytest.param(Started(), id="started"),
 ]
 

@@ -53,6 +53,11 @@ def dae(request):
     return translate(models[request.param](), units=request.param != "names")
 
 
+@pytest.fixture(scope="module")
+def html(dae):
+    return dae.equations("html")
+
+
 class Page(HTMLParser):
     """Collects texts, links and anchors; asserts that tags are closed in order."""
 
@@ -98,18 +103,17 @@ def test_every_block_is_in_every_format(dae):
     assert latex.count(r"\begin{align*}") == len(dae.blocks)
 
 
-def test_the_page_is_closed_in_itself_and_its_links_arrive(dae):
-    text = dae.equations("html")
-    page = read_page(text)
+def test_the_page_is_closed_in_itself_and_its_links_arrive(html):
+    page = read_page(html)
     anchors = page.values("id")
     assert len(anchors) == len(set(anchors))
     assert {link.removeprefix("#") for link in page.values("href")} <= set(anchors)
-    assert "http" not in text
+    assert "http" not in html
     assert not page.values("src")
 
 
-def test_the_page_has_every_equation_variable_and_value(dae):
-    page = read_page(dae.equations("html"))
+def test_the_page_has_every_equation_variable_and_value(dae, html):
+    page = read_page(html)
     texts = set(page.texts)
     assert {e.name for e in dae.flat.equations} <= {
         t.removesuffix(" (follows from the others)") for t in texts
@@ -119,8 +123,8 @@ def test_the_page_has_every_equation_variable_and_value(dae):
     assert descriptions <= texts
 
 
-def test_formulas_of_the_page_are_well_formed(dae):
-    formulas = re.findall(r"<math.*?</math>", dae.equations("html"), flags=re.DOTALL)
+def test_formulas_of_the_page_are_well_formed(dae, html):
+    formulas = re.findall(r"<math.*?</math>", html, flags=re.DOTALL)
     assert len(formulas) >= len(dae.flat.equations) + len(dae.blocks)
     for formula in formulas:
         for fraction in ElementTree.fromstring(formula).iter():
@@ -147,6 +151,7 @@ def test_latex_has_balanced_braces_and_environments(dae):
 
 def test_an_independent_reader_of_formulas_accepts_the_latex(dae):
     parser = MathTextParser("path")
+    seen = set()
     for body in re.findall(
         r"\\begin\{align\*\}(.*?)\\end\{align\*\}", dae.equations("latex"), flags=re.DOTALL
     ):
@@ -154,6 +159,10 @@ def test_an_independent_reader_of_formulas_accepts_the_latex(dae):
             continue
         for row in body.strip().split(" \\\\\n"):
             assert row.count("&") == 1
+            shape = re.sub(r"\d+", "0", row)
+            if shape in seen:  # rows that differ in numbers only read alike
+                continue
+            seen.add(shape)
             parser.parse(f"${row.replace('&', '').replace(chr(92) + 'quad{}', '')}$")
 
 
