@@ -5,7 +5,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from tests.benchmarks import engine, motion
+from tests.benchmarks import engine, mechanisms, motion
 
 
 def main() -> int:
@@ -16,7 +16,7 @@ def main() -> int:
     missed = False
     screen = Console()
     with screen.status("measuring") as status:
-        for part in (engine.rows(), motion.rows()):
+        for part in (engine.rows(), mechanisms.rows(), motion.rows()):
             for row in part:
                 status.update(f"measured {row.figure}")
                 verdict = "" if row.met is None else "yes" if row.met else "NO"

@@ -23,6 +23,11 @@ def at_most(figure: str, value: float, limit: float, unit: str = "") -> Row:
     return Row(figure, f"{value:.4g}{space}", f"<= {limit:g}{space}", value <= limit)
 
 
+def at_least(figure: str, value: float, limit: float) -> Row:
+    """A row whose figure must reach a limit."""
+    return Row(figure, f"{value:g}", f">= {limit:g}", value >= limit)
+
+
 def shown(figure: str, value: str) -> Row:
     """A row without a target."""
     return Row(figure, value, "", None)
