@@ -75,7 +75,7 @@ class Coordinates:
             t, h, begin = p[0] + p[1] * tau, p[1], p[0]
         old = ca.vertcat(time, self.t0, self.w)
         new = ca.vertcat(t, begin, w)
-        ode, algebraic = ca.substitute([h * self.ode, self.algebraic], [old], [new])
+        ode, algebraic = ca.cse(ca.substitute([h * self.ode, self.algebraic], [old], [new]))
         # an integrator needs a state: a model without one gets a constant
         x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
         problem = {"t": tau, "x": x, "p": p, "u": u, "ode": ode}
@@ -88,6 +88,7 @@ class Coordinates:
         }
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
+            options["linear_solver"] = "csparse"
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
