@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gantrytau import InitializationError, Start, simulate, translate
+from gantrytau import Fixed, InitializationError, Start, simulate, translate
 from gantrytau_models.delta import DeltaRobot
 from tests.references import delta
 
@@ -108,7 +108,10 @@ def test_energy_is_kept():
 
 
 def test_a_place_out_of_reach_is_refused(robot):
+    inverse, lowest = robot.function(["tool.r"], ANGLES), delta.position(PEER, np.full(3, np.pi / 2))
+    assert np.all(np.isfinite([float(x) for x in inverse([0.0, 0.0, -1.0])]))
+    assert np.all(np.isnan([float(x) for x in inverse(lowest - [0.0, 0.0, 0.1])]))
     with pytest.raises(InitializationError, match=r"DeltaRobot: no consistent start found.*rod"):
-        robot.evaluate({"tool.r": [0.0, 0.0, -1.2]})
+        translate(DeltaRobot(tool=dict(r=Fixed([0.0, 0.0, -1.2]))))
     with pytest.raises(InitializationError, match="is a length out of reach"):
         translate(DeltaRobot(rod_length=0.1))
