@@ -15,6 +15,7 @@ from gantrytau.dae import Dae
 from gantrytau.errors import StructureError
 from gantrytau.guide import Guide
 from gantrytau.index_reduction import Key
+from gantrytau.iteration import Implicit, solved_one_by_one
 from gantrytau.solution import Block, solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative
 from gantrytau.translation import all_symbols
@@ -48,52 +49,48 @@ class Cut:
     left: tuple[Key, ...]
     twins: tuple[ca.SX, ...]
 
-    def function(self, name: str, expressions: Sequence[ca.SX]) -> ca.Function:
-        """Expressions as a function of the known quantities, one vector each, and of the parameters p."""
-        dae, strata = self.strata.dae, self.strata
-        implicit = [b for b in self.blocks if b.solution is None]
+    @property
+    def implicit(self) -> tuple[Block, ...]:
+        """The blocks without closed form."""
+        return tuple(b for b in self.blocks if b.solution is None)
+
+    def resolved(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """The residuals of blocks without closed form, then the expressions, in what is known and what these blocks find."""
+        dae = self.strata.dae
         definitions = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
         definitions += [d for block in self.blocks for d in block.definitions]
-        found = [*(r for b in implicit for r in b.residuals), _column(expressions)]
+        found = [*(r for b in self.implicit for r in b.residuals), *expressions]
         if definitions:
             symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
-            _, found = ca.substitute_inplace(symbols, values, found, False)
+            _, found = ca.substitute_inplace(symbols, values, [_column(found)], False)
+            found = ca.densify(found[0]).elements()
         if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
             raise StructureError(
                 f"{dae.name}: its equations depend on time explicitly, expected a mechanism whose equations do not; make "
                 "what varies an Input, which keeps its start value here"
             )
+        return list(found)
+
+    def function(self, name: str, expressions: Sequence[ca.SX]) -> ca.Function:
+        """Expressions as a function of the known quantities, one vector each, and of the parameters p.
+
+        Where there is no solution its results are NaN.
+        """
+        strata, found = self.strata, self.resolved(expressions)
         arguments = [*(strata.columns[k] for k in self.kinds), strata.p]
         inside = [*self.kinds, "p"]
-        if not implicit:
-            return ca.Function(name, arguments, [found[-1]], inside, ["value"], {"cse": True})
-        return _iterated(name, implicit, list(found), arguments, inside, dae)
-
-
-def _iterated(
-    name, implicit: Sequence[Block], found: list[ca.SX], arguments, inside, dae: Dae
-) -> ca.Function:
-    """Blocks without closed form are solved one after another: linear ones outright, others by Newton's method."""
-    x = [ca.MX.sym(k, a.shape[0]) for k, a in zip(inside, arguments, strict=True)]
-    a, before, solved, place = ca.vertcat(*arguments), ca.SX(0, 1), ca.MX(0, 1), 0
-    options = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
-    for number, block in enumerate(implicit):
-        y, count = ca.vertcat(*block.tears), len(block.tears)
-        f, known = ca.vertcat(*found[place : place + count]), ca.vertcat(a, before)
-        place += count
-        if block.kind == "linear":
-            parts = [ca.jacobian(f, y), ca.substitute(f, y, ca.SX.zeros(count))]
-            matrix, right = ca.Function("linear", [known], parts, {"cse": True})(ca.vertcat(*x, solved))
-            value = ca.solve(matrix, -right, "qr")
-        else:
-            residual = ca.Function("residual", [y, known], [f], {"cse": True})
-            guess = ca.DM([dae.start[s.name()] for s in block.tears])
-            value = ca.rootfinder(f"newton{number}", "newton", residual, options)(
-                guess, ca.vertcat(*x, solved)
-            )
-        solved, before = ca.vertcat(solved, value), ca.vertcat(before, y)
-    outside = ca.Function("rest", [a, before], [found[-1]], {"cse": True})
-    return ca.Function(name, x, [outside(ca.vertcat(*x), solved)], inside, ["value"])
+        value = _column(found[len(found) - len(expressions) :])
+        if not self.implicit:
+            return ca.Function(name, arguments, [value], inside, ["value"], {"cse": True})
+        implicit: list[Implicit] = []
+        for block in self.implicit:
+            count, place = len(block.tears), sum(len(i.block.tears) for i in implicit)
+            begin = ca.DM([strata.dae.start[s.name()] for s in block.tears])
+            implicit.append(Implicit(block, ca.vertcat(*found[place : place + count]), begin))
+        start = ca.DM(
+            np.concatenate([*(strata.start(k) for k in self.kinds), np.array(strata.numbers).ravel()])
+        )
+        return solved_one_by_one(name, implicit, [value], arguments, start, (inside, ["value"]))
 
 
 class Strata:

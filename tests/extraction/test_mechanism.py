@@ -11,6 +11,7 @@ along dT and ds = W dT gives
 """
 
 import dataclasses
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -26,13 +27,21 @@ FORCES = [f"carts[{i}].f" for i in range(3)]
 LINKS = {"light": (0.0, 0.0, 0.0), "heavy links": (1.0, 2.0, 3.0)}
 
 
+@cache
 def robot(name, links):
     """A robot with other links; L1 and D1 have guideways that are neither parallel nor of unit length."""
     return dataclasses.replace(getattr(prototypes, name), link_masses=LINKS[links])
 
 
-def mechanism_of(prototype, **options):
-    return extract_mechanism(GantryTau(prototype, **options), tool="tool.r", joints=CARTS, forces=FORCES)
+@cache
+def dae_of(name, links, friction="default"):
+    options = {} if friction == "default" else {"friction": friction}
+    return translate(GantryTau(robot(name, links), **options))
+
+
+@cache
+def mechanism_of(name, links, friction="default"):
+    return extract_mechanism(dae_of(name, links, friction), tool="tool.r", joints=CARTS, forces=FORCES)
 
 
 def arrays(prototype):
@@ -86,8 +95,7 @@ def numbers(function, *arguments):
 @pytest.mark.parametrize("links", LINKS)
 @pytest.mark.parametrize("name", ["L1", "D1", "GT_A"])
 def test_jacobian_masses_and_gravity_equal_the_derivation_by_hand(name, links):
-    prototype = robot(name, links)
-    mechanism = mechanism_of(prototype)
+    prototype, mechanism = robot(name, links), mechanism_of(name, links)
     for T in poses(prototype):
         q = carts_behind(prototype, T)
         expected = by_hand(prototype, T, q)
@@ -100,8 +108,7 @@ def test_jacobian_masses_and_gravity_equal_the_derivation_by_hand(name, links):
 
 @pytest.mark.parametrize("links", LINKS)
 def test_masses_equal_the_closed_form_of_the_benchmark(links):
-    prototype = robot("GT_A", links)
-    mechanism = mechanism_of(prototype)
+    prototype, mechanism = robot("GT_A", links), mechanism_of("GT_A", links)
     peer = dataclasses.replace(closed_form.GT_A, link_masses=LINKS[links])
     for T in poses(prototype, seed=1):
         q = carts_behind(prototype, T)
@@ -120,8 +127,7 @@ def test_masses_equal_the_closed_form_of_the_benchmark(links):
 
 @pytest.mark.parametrize("name", ["L1", "D1", "GT_A"])
 def test_constraints_are_squared_lengths_less_squared_distances(name):
-    prototype = robot(name, "light")
-    mechanism = mechanism_of(prototype)
+    prototype, mechanism = robot(name, "light"), mechanism_of(name, "light")
     offset, e, length = arrays(prototype)
     random = np.random.default_rng(2)
     for T in poses(prototype, count=20):
@@ -135,8 +141,7 @@ def test_constraints_are_squared_lengths_less_squared_distances(name):
 
 @pytest.mark.parametrize("name", ["L1", "D1", "GT_A"])
 def test_accelerations_equal_equation_6_6(name):
-    prototype = robot(name, "light")
-    mechanism = mechanism_of(prototype)
+    prototype, mechanism = robot(name, "light"), mechanism_of(name, "light")
     offset, e, _ = arrays(prototype)
     random = np.random.default_rng(3)
     for T in poses(prototype):
@@ -153,10 +158,8 @@ def test_accelerations_equal_equation_6_6(name):
 @pytest.mark.parametrize("friction", ["default", None])
 @pytest.mark.parametrize("name", ["L1", "D1", "GT_A"])
 def test_balance_holds_along_any_motion(name, friction):
-    prototype = robot(name, "heavy links")
-    options = {} if friction == "default" else {"friction": friction}
-    mechanism = mechanism_of(prototype, **options)
-    inverse = translate(GantryTau(prototype, **options)).function(
+    prototype, mechanism = robot(name, "heavy links"), mechanism_of(name, "heavy links", friction)
+    inverse = dae_of(name, "heavy links", friction).function(
         ["tool.r", "tool.v", "der(tool.v)"],
         [*CARTS, *(f"carts[{i}].v" for i in range(3)), *(f"der(carts[{i}].v)" for i in range(3)), *FORCES],
     )
@@ -179,8 +182,7 @@ def test_balance_holds_along_any_motion(name, friction):
 
 
 def test_bias_is_friction_seen_from_the_tool_and_zero_at_rest():
-    prototype = robot("L1", "heavy links")
-    mechanism = mechanism_of(prototype)
+    prototype, mechanism = robot("L1", "heavy links"), mechanism_of("L1", "heavy links")
     T = np.array([0.5, 3.0, -0.6])
     q, dT = carts_behind(prototype, T), np.array([0.3, -0.2, 0.1])
     W = numbers(mechanism.velocity_jacobian, T, q)
@@ -193,7 +195,10 @@ def test_bias_is_friction_seen_from_the_tool_and_zero_at_rest():
 def test_net_forces_instead_of_actuator_forces_leave_no_friction():
     prototype = robot("L1", "heavy links")
     net = extract_mechanism(
-        GantryTau(prototype), tool="tool.r", joints=CARTS, forces=[f"arms[{i}].rail.f" for i in range(3)]
+        dae_of("L1", "heavy links"),
+        tool="tool.r",
+        joints=CARTS,
+        forces=[f"arms[{i}].rail.f" for i in range(3)],
     )
     T = np.array([0.5, 3.0, -0.6])
     q = carts_behind(prototype, T)
@@ -202,7 +207,7 @@ def test_net_forces_instead_of_actuator_forces_leave_no_friction():
 
 
 def test_equations_are_printed_with_the_names_of_the_model():
-    mechanism = mechanism_of(robot("GT_A", "light"))
+    mechanism = mechanism_of("GT_A", "light")
     text = str(mechanism)
     assert mechanism.tool == ("tool.r[0]", "tool.r[1]", "tool.r[2]")
     for part in (

@@ -23,6 +23,16 @@ def uneven():
     return dataclasses.replace(prototypes.L1, arms=(first, dataclasses.replace(second, links=links), third))
 
 
+@pytest.fixture(scope="module")
+def tilting():
+    return translate(SixLinkGantryTau(uneven()))
+
+
+@pytest.fixture(scope="module")
+def mechanism(tilting):
+    return extract_mechanism(tilting, **CHOSEN)
+
+
 def numbers(function, *arguments):
     return np.array(function(*arguments)).squeeze()
 
@@ -45,13 +55,11 @@ def test_parallel_links_are_the_three_link_robot():
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_balance_holds_for_a_plate_that_tilts(pose):
-    dae = translate(SixLinkGantryTau(uneven()))
-    mechanism = extract_mechanism(dae, **CHOSEN)
+def test_balance_holds_for_a_plate_that_tilts(tilting, mechanism, pose):
     random = np.random.default_rng(6)
     dT, ddT = random.normal(size=3), random.normal(size=3)
     names = [*CARTS, *SPEEDS, *(f"der({n})" for n in SPEEDS), *FORCES]
-    motion = dae.function(["tool.r", "tool.v", "der(tool.v)"], names)(pose, dT, ddT)
+    motion = tilting.function(["tool.r", "tool.v", "der(tool.v)"], names)(pose, dT, ddT)
     q, dq, ddq, f = np.squeeze(np.array(motion)).reshape(4, 3)
     assert np.abs(numbers(mechanism.constraints, pose, q)).max() < 1e-11
     W = numbers(mechanism.velocity_jacobian, pose, q)
@@ -63,10 +71,15 @@ def test_balance_holds_for_a_plate_that_tilts(pose):
     np.testing.assert_allclose(found, ddT, rtol=0, atol=1e-9)
 
 
-def test_linear_system_of_the_plate_against_finite_differences():
-    dae = translate(SixLinkGantryTau(uneven()))
-    linear = linearize(dae, at={"tool.r": POSES[0], "tool.v": [0.3, -0.2, 0.1]}, outputs=["tool.w"])
-    function = dae.function(["tool.r", "tool.v", *FORCES], ["der(tool.v)", "tool.w"])
+def test_poses_out_of_reach_have_no_numbers(mechanism, capfd):
+    for name in ("constraints", "velocity_jacobian", "M1", "G"):
+        assert np.all(np.isnan(numbers(getattr(mechanism, name), [0.5, 30.0, -0.6], [0.1, 0.0, 0.0])))
+    assert capfd.readouterr() == ("", "")  # and nothing is told on the screen
+
+
+def test_linear_system_of_the_plate_against_finite_differences(tilting):
+    linear = linearize(tilting, at={"tool.r": POSES[0], "tool.v": [0.3, -0.2, 0.1]}, outputs=["tool.w"])
+    function = tilting.function(["tool.r", "tool.v", *FORCES], ["der(tool.v)", "tool.w"])
     centre = np.array([*linear.point["tool.r"], *linear.point["tool.v"], *(linear.point[n] for n in FORCES)])
 
     def value(x):

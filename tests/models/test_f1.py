@@ -64,7 +64,7 @@ def test_starts_with_its_links_uncrossed_below_the_carts(robots, name):
 
 def test_joints_are_where_the_printed_equations_put_them(robots, name):
     record = getattr(prototypes, name)
-    for state in f1.consistent_states(record, 5, seed=1):
+    for state in f1.consistent_states(record, 3, seed=1):
         found = robots[name].evaluate(dict(zip(POSE, pose_coordinates(state), strict=True)))
         q = np.array([found[name] for name in POSITIONS])
         here = f1.State(state.T, state.R, q, np.zeros(12))
@@ -141,9 +141,9 @@ def test_inverse_dynamics_give_the_forces_back(robots, name):
         )  # N: rounding times accelerations and condition
 
 
-def test_without_friction_it_falls_as_one():
+def test_without_friction_it_falls_as_one(robots):
     """Where all guideways are vertical nothing but gravity acts along them."""
-    fall = simulate(F1GantryTau(prototypes.F1, friction=None), stop=0.2, tolerance=1e-10)
+    fall = simulate(robots["F1"], stop=0.2, tolerance=1e-10)
     down = -9.81 / 2 * fall.time**2
     drop = fall["tool.r"] - fall["tool.r"][0]
     # m: a thousand times the tolerance, as the first steps of the integrator are of low order
@@ -179,7 +179,7 @@ def guess_off_by_a_fifth(record, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return f1.HOME + 0.2 * SIZE * away / np.linalg.norm(away), quaternion(turned)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("name", "seed"), list(zip(NAMES, range(2), strict=True)))
 def test_starts_from_a_guess_off_by_a_fifth_of_its_size(name, seed):
     record = getattr(prototypes, name)
     T, q = guess_off_by_a_fifth(record, seed)
@@ -193,7 +193,7 @@ def test_starts_from_a_guess_off_by_a_fifth_of_its_size(name, seed):
     np.testing.assert_allclose(found["tool.R"], R, atol=1e-9, rtol=0)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("name", "seed"), list(zip(NAMES, range(2), strict=True)))
 def test_fixed_pose_is_held(name, seed):
     record = getattr(prototypes, name)
     T, q = guess_off_by_a_fifth(record, seed)
