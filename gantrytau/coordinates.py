@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,8 +60,8 @@ class Coordinates:
         """Whether there are constraints to hold."""
         return any(level.numel() for level in self.invariants)
 
-    def integrator(self, count: int, tolerance: float) -> ca.Function:
-        """An integrator over `count` intervals in the scaled time 0..count.
+    def integrator(self, count: int, tolerance: float, *, compiled: bool = False) -> ca.Function:
+        """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
 
         p = (start, interval) in s without samples; with samples, per interval u = (start, length, number,
         values, slopes): the intervals may differ then.
@@ -79,13 +80,15 @@ class Coordinates:
         # an integrator needs a state: a model without one gets a constant
         x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
         problem = {"t": tau, "x": x, "p": p, "u": u, "ode": ode}
-        options = {
+        options: dict[str, Any] = {
             "abstol": tolerance,
             "reltol": tolerance,
             "max_num_steps": 100_000,
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
         }
+        if compiled:
+            options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
             options["linear_solver"] = "csparse"

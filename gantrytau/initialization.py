@@ -16,7 +16,6 @@ from gantrytau.index_reduction import Indexed
 from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
 
-
 STEP = 0.4  # m or rad between stops on the way to given positions
 MOST_STEPS = 8
 

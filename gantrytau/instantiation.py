@@ -182,9 +182,10 @@ class _Builder:
                 if len(found) > 1:
                     kind = wanted.component.__name__
                     raise ModelError(
-                        f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found {len(found)} components of "
-                        f"{kind}, of which {self.paths[id(instance)]} cannot choose one; expected one {kind}, and Fixed "
-                        "for further frames that do not move"
+                        f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found "
+                        f"{' and '.join(self.paths[id(x)] for x in found)}, each a {kind}, of which "
+                        f"{self.paths[id(instance)]} cannot choose one; expected one {kind}; for other frames that do not "
+                        "move take Fixed"
                     )
                 if found and found[0] is not instance:
                     instance.__dict__[name] = found[0]

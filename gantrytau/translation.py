@@ -9,6 +9,7 @@ import casadi as ca
 from gantrytau.aliases import Reduced, eliminate_aliases
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
+from gantrytau.declarations import StateSelect
 from gantrytau.determinacy import refuse_undetermined
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
@@ -121,8 +122,12 @@ def _translated(
 
 
 def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
-    """StateSelect by variable; a root is preferred as much as its aliases."""
-    found = {n: int(v.prefer) for v in flat.variables for n in v.elements}
+    """StateSelect by variable, a fixed start being as good as any; a root is preferred as much as its aliases."""
+    found = {
+        n: int(StateSelect.ALWAYS if v.fixed and v.prefer >= StateSelect.DEFAULT else v.prefer)
+        for v in flat.variables
+        for n in v.elements
+    }
     for name, alias in reduced.aliases.items():
         if alias.root is not None and alias.root != name:
             found[alias.root] = max(found[alias.root], found[name])

@@ -139,7 +139,6 @@ def test_fixed_places_that_agree_are_welcome():
     assert len(translate(Agreed()).diagnosis.redundant) == 6
 
 
-@pytest.mark.xfail(strict=True, reason="the first World is taken without a word")
 def test_two_worlds_with_different_gravity_are_refused():
     class Worlds(Thrown):
         moon = World(g=1.62)
