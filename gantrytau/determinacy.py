@@ -77,3 +77,24 @@ def _message(block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduc
         f"coefficients in {shown} leave it free. Expected mass, inertia or a drive for every motion: give it one, hold "
         "the motion, or start from another pose"
     )
+
+
+def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureError | None:
+    """What a failed start may come from: a balance of forces that would have to determine positions.
+
+    It does where a motion has no inertia, such as the rotation of a massless bar about itself; equations with
+    flows are then differentiated like constraints.
+    """
+    flows = {n for v in flat.variables if v.kind == "flow" for n in v.elements}
+    roots = {reduced.aliases[n].root for n in flows}
+    for i, count in enumerate(indexed.counts):
+        names = [leaf.name() for leaf in ca.symvar(reduced.residuals[i])]
+        if count and any(n in roots for n in names):
+            hints = {n: flat.hints[n] for n in names if n in flat.hints}
+            words = [f"{n} ({hint})" for n, hint in hints.items()]
+            return StructureError(
+                f"{flat.name}: {', '.join(words[:4]) or 'a position'} would have to follow from a balance of forces, "
+                f"{indexed.names[i]}, because a motion has neither mass nor inertia. Expected a mass or an inertia for "
+                "every motion: put a Body there, or hold the motion"
+            )
+    return None

@@ -10,7 +10,7 @@ from gantrytau.aliases import Reduced, eliminate_aliases
 from gantrytau.blocks import block_pattern
 from gantrytau.dae import Dae
 from gantrytau.declarations import StateSelect
-from gantrytau.determinacy import refuse_undetermined
+from gantrytau.determinacy import massless, refuse_undetermined
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
@@ -106,7 +106,10 @@ def _translated(
     asked = {n: guess.values[n] for n in guess.values if n in guess.started}
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in guess.values}
     guess = replace(guess, values={**guess.values, **better})
-    sample = consistent_start(flat, table, reduced, indexed, guess)
+    try:
+        sample = consistent_start(flat, table, reduced, indexed, guess)
+    except InitializationError as error:
+        raise massless(indexed, reduced, flat) or error from None
     wanted = [_state_name(reduced.aliases, n) for name in settings["states"] for n in expand(flat, name)]
     choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), wanted, flat.name)
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
