@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from gantrytau.simulation import _Run
+from gantrytau.integration import Run
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 
@@ -219,13 +219,13 @@ def test_a_solution_without_end_leaves_what_was_found(fails, run, robots, tmp_pa
 
 def press_ctrl_c(monkeypatch):
     """Let Ctrl-C be pressed after the first stretch of a simulation."""
-    advance = _Run._advance
+    advance = Run._advance
 
     def pressed(run, count):
         advance(run, count)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(_Run, "_advance", pressed)
+    monkeypatch.setattr(Run, "_advance", pressed)
 
 
 def test_ctrl_c_leaves_what_was_found(fails, run, tmp_path, monkeypatch):
