@@ -185,12 +185,11 @@ class Coordinates:
 
         The constraints are asked first: where they are sound, all equations of the accelerations are.
         """
-        found = [
-            _dependent(*(np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start)), names)
-            for _, level, names in self._levels
-        ]
-        if any(found):
-            return next(names for names in found if names)
+        for _, level, names in self._levels:
+            here, before = (np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start))
+            found = _dependent(here, before, names)
+            if found:
+                return found
         if self.pivots.numel() == 0:
             return []
         function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])

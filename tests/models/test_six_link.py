@@ -1,6 +1,7 @@
 """The six-link robot against Lagrange's equations with multipliers, and what its plate and its singular pose do."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -154,7 +155,7 @@ def test_starts_that_are_a_fifth_of_the_robot_away(what):
     random = np.random.default_rng(11)
     wanted = 0
     for _ in range(6):
-        changes = dict(tool=dict(r=Start(list(POSE + random.uniform(-0.4, 0.4, 3)))))
+        changes: dict[str, Any] = dict(tool=dict(r=Start(list(POSE + random.uniform(-0.4, 0.4, 3)))))
         if what != "place":
             changes["tool"]["q"] = Start(list(np.array([1.0, 0, 0, 0]) + random.uniform(-0.1, 0.1, 4)))
             changes["carts"] = [dict(s=Start(s + random.uniform(-0.4, 0.4))) for s in (0.86, 0.8, 0.75)]
