@@ -218,4 +218,4 @@ def _dependent(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> li
     if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
         return []
     shares = np.abs(left[:, len(values) - 1])
-    return [names[i] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]
+    return [names[int(i)] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]

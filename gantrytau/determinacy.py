@@ -80,21 +80,20 @@ def _message(block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduc
 
 
 def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureError | None:
-    """What a failed start may come from: a balance of forces that would have to determine positions.
+    """What a failed start may come from: a motion without inertia, such as that of a bar about itself.
 
-    It does where a motion has no inertia, such as the rotation of a massless bar about itself; equations with
-    flows are then differentiated like constraints.
+    Nothing accelerates its coordinate, so it would have to follow from a balance of forces.
     """
     flows = {n for v in flat.variables if v.kind == "flow" for n in v.elements}
     roots = {reduced.aliases[n].root for n in flows}
-    for i, count in enumerate(indexed.counts):
-        names = [leaf.name() for leaf in ca.symvar(reduced.residuals[i])]
-        if count and any(n in roots for n in names):
-            hints = {n: flat.hints[n] for n in names if n in flat.hints}
-            words = [f"{n} ({hint})" for n, hint in hints.items()]
+    for i, residual in enumerate(reduced.residuals):
+        names = [leaf.name() for leaf in ca.symvar(residual)]
+        slow = [n for n in names if indexed.orders.get(n) == 1 and n in flat.hints]
+        if slow and any(n in roots for n in names):
+            words = ", ".join(f"{n} ({flat.hints[n]})" for n in slow[:4])
             return StructureError(
-                f"{flat.name}: {', '.join(words[:4]) or 'a position'} would have to follow from a balance of forces, "
-                f"{indexed.names[i]}, because a motion has neither mass nor inertia. Expected a mass or an inertia for "
-                "every motion: put a Body there, or hold the motion"
+                f"{flat.name}: {words} would have to follow from a balance of forces, {indexed.names[i]}, because this "
+                "motion has neither mass nor inertia. Expected a mass or an inertia for every motion: put a Body "
+                "there, or hold the motion"
             )
     return None
