@@ -28,8 +28,9 @@ from gantrytau.model import Model
 from gantrytau.strata import EVERYTHING, FOLLOWS, Strata
 from gantrytau.symbols import derivative_name
 from gantrytau.translation import names, translate, translate_flat
+from gantrytau.writing.collecting import collected, moving_part, without_factor
 from gantrytau.writing.graph import Graph
-from gantrytau.writing.sharing import written
+from gantrytau.writing.sharing import Text, written
 from gantrytau.writing.text import PlainSyntax
 
 SAME = 1e-9  # relative difference below which numbers at all sample points count as one constant
@@ -67,7 +68,7 @@ class Mechanism:
         lines = [f"{self.model}"]
         lines += [f"{role}: {', '.join(getattr(self, attribute))}" for role, attribute in ROLES.items()]
         for title, rows in self.written:
-            lines += ["", title, *(f"  {row}" for row in rows)]
+            lines += ["", title, *(f"  {row}" for row in rows)] if rows else []
         return "\n".join(lines) + "\n"
 
     def __str__(self) -> str:
@@ -94,7 +95,7 @@ TITLES = {
     "M1": "balance of forces: M1 T'' + M2 q'' + G + bias = J^-T f (6.7)",
     "M2": "inertia that moves with the joints",
     "G": "gravity and other forces of position",
-    "bias": "with friction and products of velocities",
+    "bias": "friction and products of velocities",
 }
 
 
@@ -295,24 +296,61 @@ def _require_regular(strata: Strata, inverse: np.ndarray, S: np.ndarray, inertia
             )
 
 
+NO_FORM = "found by iteration, not in closed form"
+
+
 def _written(strata: Strata, functions: Mapping[str, ca.Function], weights: ca.DM | None) -> Sections:
     """Titles and rows of text; what occurs more than once is written once, in front."""
     if not _written_out(functions):
-        return tuple((title, ("found by iteration, not in closed form",)) for title in TITLES.values())
+        return _written_by_residuals(strata)
     systems = _systems(functions, {**strata.columns, "p": strata.p}, weights)
     systems["bias"] = systems["G"] + systems["bias"]
     systems["accelerations"] = _call(functions["relations"], {**strata.columns, "p": strata.p})
-    values = {name: ca.SX(systems[name]) for name in TITLES}
-    elements = [element for value in values.values() for element in ca.densify(value).elements()]
-    text = written(Graph().read(elements), PlainSyntax())
+    shapes = {name: systems[name].shape for name in TITLES}
+    text = _text(strata, {name: ca.SX(systems[name]) for name in TITLES})
     right = iter(text.expressions)
     sections = [("abbreviations", tuple(f"{name} = {value}" for name, value in text.definitions))]
-    for name, value in values.items():
-        head = {"velocity_jacobian": "J^-1", "bias": "(G + bias)"}.get(name, name)
+    for name, shape in shapes.items():
+        head = {"velocity_jacobian": "J^-1"}.get(name, name)
         rows = {}
-        for j, i in np.ndindex(value.shape[1], value.shape[0]):
-            left = f"{head}[{i},{j}]" if value.shape[1] > 1 else f"{head}[{i}]"
-            rows[i, j] = f"{'0' if name in RELATIONS else left} = {next(right).text}"
-        shown = [rows[at] for at in sorted(rows) if name in RELATIONS or not value[at].is_zero()]
+        for j, i in np.ndindex(shape[1], shape[0]):
+            left = f"{head}[{i},{j}]" if shape[1] > 1 else f"{head}[{i}]"
+            rows[i, j] = ("0" if name in RELATIONS else left, next(right).text)
+        shown = [f"{left} = {value}" for _, (left, value) in sorted(rows.items()) if value != "0"]
         sections.append((TITLES[name], tuple(shown) or ("all zero",)))
     return tuple(sections)
+
+
+def _written_by_residuals(strata: Strata) -> Sections:
+    """The constraints as equations of tool, joints and what is found from them by iteration."""
+    positions = strata.cut(("T", "q"))
+    rest = [*(strata.dae.indexed.residuals[k] for k in positions.left), *positions.twins]
+    text = _text(strata, {"constraints": ca.vertcat(*positions.resolved(rest))})
+    rows = [f"0 = {value.text}" for value in text.expressions]
+    found = ", ".join(s.name() for block in positions.implicit for s in block.tears)
+    words = NO_FORM + (f"; {found} follow from the constraints" if found else "")
+    shared = tuple(f"{name} = {value}" for name, value in text.definitions)
+    return (
+        ("abbreviations", shared),
+        (TITLES["constraints"], tuple(rows)),
+        ("speeds, accelerations and forces (6.5 to 6.7)", (words,)),
+    )
+
+
+def _text(strata: Strata, values: Mapping[str, ca.SX]) -> Text:
+    """Expressions by system, their sums collected; of the bias, what the rates add."""
+    symbols, numbers = strata.structural_zeros()
+    elements = [e for value in values.values() for e in ca.densify(value).elements()]
+    kinds = [name for name, value in values.items() for _ in range(value.numel())]
+    if numbers.numel():
+        elements = ca.densify(ca.substitute(ca.vertcat(*elements), symbols, numbers)).elements()
+    graph = Graph()
+    nodes = graph.read(elements)
+    rates = {*strata.names("dT"), *strata.names("dq")}
+    bias = moving_part(graph, [n for n, kind in zip(nodes, kinds, strict=True) if kind == "bias"], rates)
+    nodes = collected(graph, [n for n, kind in zip(nodes, kinds, strict=True) if kind != "bias"] + bias)
+    # of an equation that says zero, any multiple says the same
+    relations = [kind in ("accelerations",) for kind in kinds]
+    return written(
+        [without_factor(n) if r else n for n, r in zip(nodes, relations, strict=True)], PlainSyntax()
+    )

@@ -123,6 +123,18 @@ class Strata:
         """Values of a kind at the consistent start, (n,)."""
         return self.dae.numbers(self.names(kind), self.dae.start)
 
+    def structural_zeros(self) -> tuple[ca.SX, ca.SX]:
+        """Parameters that are zero by the way their vector follows from others, as gravity in x; and zeros for them."""
+        table = self.dae.table
+        found = [
+            table.symbols[name]
+            for vector in self.dae.flat.parameters
+            if not all(value.is_constant() for value in vector.value)
+            for name, value in zip(vector.elements, vector.value, strict=True)
+            if name in table.independent and value.is_zero()
+        ]
+        return _column(found), ca.SX.zeros(len(found))
+
     def cut(self, kinds: Sequence[str], find: str = "", why: str = "") -> Cut:
         """The blocks from `kinds` to `find`, or to the equations left over; `why`: opens the error if there is no way."""
         known, twins = self._known(kinds)

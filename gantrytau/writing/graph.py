@@ -211,8 +211,10 @@ class Graph:
             return product if a.negative and b.negative else self.negate(product)
         if b.operation == "number" and a.operation != "number":
             a, b = b, a
-        if a.is_number(1.0):
+        if a.is_number(1.0) or b.is_number(0.0):
             return b
+        if a.is_number(0.0):
+            return a
         if b.operation == "mul" and b.arguments[0].operation == "number" and a.operation != "number":
             return self.node("mul", b.arguments[0], self.multiply(a, b.arguments[1]))
         return self.node("pow", a, self.number(2.0)) if a is b else self.node("mul", a, b)
@@ -228,4 +230,4 @@ class Graph:
                 return rest
             if b.operation == "mul" and factor is b.arguments[0]:
                 return self.divide(rest, b.arguments[1])
-        return a if b.is_number(1.0) else self.node("div", a, b)
+        return a if b.is_number(1.0) or a.is_number(0.0) else self.node("div", a, b)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, der, if_else, time, translate
+from gantrytau.writing.collecting import collected, moving_part
 from gantrytau.writing.graph import Graph
 from gantrytau.writing.modelica_syntax import ModelicaSyntax
 from gantrytau.writing.sharing import written
@@ -22,9 +23,16 @@ def text_of(expression: ca.SX) -> str:
     return written(Graph().read([expression]), PlainSyntax()).expressions[0].text
 
 
-def value_of(expression: ca.SX, values: dict[str, float]) -> float:
+def collected_text(*expressions: ca.SX) -> list[str]:
+    graph = Graph()
+    nodes = collected(graph, graph.read(expressions))
+    return [one.text for one in written(nodes, PlainSyntax()).expressions]
+
+
+def value_of(expression: ca.SX, values: dict[str, float], rewrite=lambda _, nodes: nodes) -> float:
     """The value of the Modelica text of an expression, as pymoca reads it."""
-    text = written(Graph().read([expression]), ModelicaSyntax())
+    graph = Graph()
+    text = written(rewrite(graph, graph.read([expression])), ModelicaSyntax())
     equations = [*text.definitions, ("'result'", text.expressions[0].text)]
     lines = "\n".join(f"{left} = {right};" for left, right in equations)
     read = read_modelica(
@@ -46,24 +54,88 @@ BINARY = [
 ]  # fmt: skip
 
 
-@settings(max_examples=120, deadline=None, derandomize=True)
-@given(
-    st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40), st.integers(0, 40)), min_size=1, max_size=14)
-)
-def test_any_expression_keeps_its_value(steps):
+STEPS = st.lists(st.tuples(*[st.integers(0, 40)] * 3), min_size=1, max_size=14)
+POINT = {"a": 0.7, "b": -1.3, "c": 2.1}
+
+
+def random_expression(steps) -> tuple[ca.SX, float, float]:
+    """An expression, its value at POINT, and the largest number on the way there."""
     nodes = [A, B, C, ca.SX(-1.5), ca.SX(0.25)]
     for operation, first, second in steps:
         x, y = nodes[-1 - first % len(nodes)], nodes[-1 - second % len(nodes)]
         k = operation % (len(UNARY) + len(BINARY))
         nodes.append(UNARY[k](x) if k < len(UNARY) else BINARY[k - len(UNARY)](x, y))
-    point = {"a": 0.7, "b": -1.3, "c": 2.1}
     with np.errstate(all="ignore"):
-        expected = float(ca.Function("f", SYMBOLS, [nodes[-1]])(*point.values()))
-        sizes = np.abs(np.array(ca.Function("g", SYMBOLS, [ca.vertcat(*nodes)])(*point.values())))
-    if not np.all(sizes < 1e6):  # numbers beyond it say nothing about the text
+        values = np.array(ca.Function("f", SYMBOLS, [ca.vertcat(*nodes)])(*POINT.values())).ravel()
+    return nodes[-1], values[-1], np.abs(values).max()
+
+
+@settings(max_examples=120, deadline=None, derandomize=True)
+@given(STEPS)
+def test_any_expression_keeps_its_value(steps):
+    expression, expected, largest = random_expression(steps)
+    if not largest < 1e6:  # numbers beyond it say nothing about the text
         return
     # rounding of reordered sums grows with the numbers in between, at most once per step
-    assert value_of(nodes[-1], point) == pytest.approx(expected, rel=1e-12, abs=1e-13 * max(sizes.max(), 1.0))
+    assert value_of(expression, POINT) == pytest.approx(expected, rel=1e-12, abs=1e-13 * max(largest, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        (0.25 * A + B + 0.25 * A, "0.5*a + b"),
+        (A - (B - C) - A, "c - b"),
+        (A - A + B * 0, "0"),
+        (2 * A + 2 * B, "2*(a + b)"),
+        (-0.5 * A - 0.5 * B, "-0.5*(a + b)"),
+        (-3 * A / (6 * B), "-0.5*a/b"),
+        ((A - 2 * B) / (4 * B - 2 * A), "-0.5"),
+        (A * B + B * A, "2*a*b"),
+        (0.9994 * (0.25 * A + 0.9994 * B) + 0.0293 * (0.0293 * B), "0.24985*a + 0.99965885*b"),
+        (0.1 * A + 0.2 * A - 0.3 * A + B, "b"),  # 5e-17 is left of a
+        (A - (B - ca.sin(A + C - A)), "a - b + sin(c)"),
+        (ca.if_else(A + A > 0, B + B, C), "if 2*a > 0 then 2*b else c"),
+        ((2 * A) ** 2, "4*a^2"),
+        (-A - 2 * B, "-(a + 2*b)"),
+    ],
+)
+def test_equal_terms_are_collected(expression, text):
+    assert collected_text(expression) == [text]
+
+
+def test_shared_sums_stay_shared_unless_their_terms_meet_their_like():
+    long = A + 2 * B + 3 * C + ca.sin(A)
+    assert collected_text(long, long * B, ca.cos(long) + C) == ["#1", "#1*b", "cos(#1) + c"]
+    short = A + 0.25 * B
+    assert collected_text(short / C, short + 0.25 * B) == ["(a + 0.25*b)/c", "0.5*b + a"]
+
+
+@settings(max_examples=120, deadline=None, derandomize=True)
+@given(STEPS)
+def test_collected_expressions_keep_their_value(steps):
+    expression, expected, largest = random_expression(steps)
+    if not largest < 1e4:  # of larger numbers, the digits that are left say nothing
+        return
+    # numbers are collected to 14 digits
+    assert value_of(expression, POINT, collected) == pytest.approx(
+        expected, rel=1e-10, abs=1e-11 * max(largest, 1.0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        (A + B * C, "b*c"),
+        ((A + ca.tanh(C / B) + C**2) / A, "(tanh(c/b) + c^2)/a"),
+        (B * (A - C * A), "-b*c*a"),
+        (ca.cos(C) + A, "cos(c) - cos(0)"),
+        (A * B, "0"),
+    ],
+)
+def test_what_the_rates_add_is_found_without_differences(expression, text):
+    graph = Graph()
+    nodes = moving_part(graph, graph.read([expression]), {"c"})
+    assert written(nodes, PlainSyntax()).expressions[0].text == text
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ along dT and ds = W dT gives
 """
 
 import dataclasses
+import re
 from functools import cache
 
 import casadi as ca
@@ -19,6 +20,8 @@ import pytest
 
 from gantrytau import translate
 from gantrytau.extraction import extract_mechanism
+from gantrytau.mechanics.translational import TanhFriction
+from gantrytau.symbols import derivative_name
 from gantrytau_models import GantryTau, prototypes
 from tests.benchmarks import closed_form
 
@@ -34,13 +37,12 @@ def robot(name, links):
 
 
 @cache
-def dae_of(name, links, friction="default"):
-    options = {} if friction == "default" else {"friction": friction}
-    return translate(GantryTau(robot(name, links), **options))
+def dae_of(name, links, friction=TanhFriction):
+    return translate(GantryTau(robot(name, links), friction=friction))
 
 
 @cache
-def mechanism_of(name, links, friction="default"):
+def mechanism_of(name, links, friction=TanhFriction):
     return extract_mechanism(dae_of(name, links, friction), tool="tool.r", joints=CARTS, forces=FORCES)
 
 
@@ -155,7 +157,7 @@ def test_accelerations_equal_equation_6_6(name):
         assert np.abs(found - expected).max() < 1e-14 * np.linalg.cond(D) ** 2 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("friction", ["default", None])
+@pytest.mark.parametrize("friction", [TanhFriction, None])
 @pytest.mark.parametrize("name", ["L1", "D1", "GT_A"])
 def test_balance_holds_along_any_motion(name, friction):
     prototype, mechanism = robot(name, "heavy links"), mechanism_of(name, "heavy links", friction)
@@ -222,3 +224,48 @@ def test_equations_are_printed_with_the_names_of_the_model():
     ):
         assert part in text
     assert "M1[0,1]" not in text  # zero for parallel guideways along x
+    for part in ("world.gravity", "(G + bias)", "G[0]", "G[1]"):
+        assert part not in text  # gravity pulls along z
+    assert "M2[0,0] = 0.5*arms[0].link_mass + carts[0].m" in text
+    assert "bias[0] = #" in text
+
+
+def read_back(text, values):
+    """Numbers of the left sides of a printed mechanism by Python's own arithmetic; "0" has those of all `0 = ...`."""
+    numbers_of, zeros = dict(values), []
+    name = re.compile("|".join([r"#\d+", *(re.escape(n) for n in sorted(values, key=len, reverse=True))]))
+    for line in text.splitlines():
+        left, equals, right = line.strip().partition(" = ")
+        if line.startswith("  ") and equals:
+            inserted = name.sub(lambda found: f"({float(numbers_of[found[0]])!r})", right)
+            value = eval(inserted.replace("^", "**"), {"tanh": np.tanh})
+            zeros += [value] if left == "0" else []
+            numbers_of[left] = value
+    return {**numbers_of, "0": zeros}
+
+
+@pytest.mark.parametrize("name", ["L1", "GT_A"])
+def test_printed_equations_have_the_values_of_the_functions(name):
+    dae, mechanism = dae_of(name, "heavy links"), mechanism_of(name, "heavy links")
+    random = np.random.default_rng(7)
+    T, q = np.array([0.5, 3.0, -0.6]), random.uniform(-0.2, 0.2, 3)
+    dT, dq = random.normal(size=3), random.normal(size=3)
+    ddT, ddq = random.normal(size=3), random.normal(size=3)
+    values = dict(dae.table.values)
+    for columns, variables in (((T, dT, ddT), mechanism.tool), ((q, dq, ddq), mechanism.joints)):
+        for order, column in enumerate(columns):
+            values |= {derivative_name(n, order): x for n, x in zip(variables, column, strict=True)}
+    found = read_back(str(mechanism), values)
+    for head in ("J^-1", "M1", "M2", "G", "bias"):
+        function = getattr(mechanism, {"J^-1": "velocity_jacobian"}.get(head, head))
+        expected = numbers(function, *((T, q, dT, dq) if head == "bias" else (T, q)))
+        for at in np.ndindex(expected.shape):
+            place = f"{head}[{','.join(str(k) for k in at)}]"
+            # the text has 14 digits of numbers that arise from others
+            assert abs(found.get(place, 0.0) - expected[at]) < 1e-11 * np.abs(expected).max(), place
+    constraints, relations = np.reshape(found["0"], (2, 3))
+    np.testing.assert_allclose(constraints, numbers(mechanism.constraints, T, q), rtol=1e-12)
+    offset, e, _ = arrays(robot(name, "heavy links"))
+    D = T - offset - q[:, None] * e
+    by_hand = (D * (ddT - ddq[:, None] * e)).sum(axis=1) + ((dT - dq[:, None] * e) ** 2).sum(axis=1)
+    np.testing.assert_allclose(relations, by_hand, rtol=1e-12)  # (6.6)

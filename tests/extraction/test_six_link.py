@@ -77,6 +77,15 @@ def test_poses_out_of_reach_have_no_numbers(mechanism, capfd):
     assert capfd.readouterr() == ("", "")  # and nothing is told on the screen
 
 
+def test_constraints_are_printed_where_the_rest_has_no_closed_form(mechanism):
+    text = str(mechanism)
+    assert text.count("by iteration") == 1
+    for i, count in enumerate((1, 2, 3)):
+        for j in range(count):
+            assert f"arms[{i}].links[{j}].length^2" in text
+    assert "0 = tool.q[0]^2 + tool.q[1]^2 + tool.q[2]^2 + tool.q[3]^2 - 1" in text
+
+
 def test_linear_system_of_the_plate_against_finite_differences(tilting):
     linear = linearize(tilting, at={"tool.r": POSES[0], "tool.v": [0.3, -0.2, 0.1]}, outputs=["tool.w"])
     function = tilting.function(["tool.r", "tool.v", *FORCES], ["der(tool.v)", "tool.w"])
