@@ -133,6 +133,10 @@ class Run:
             if crossed or look.near[k + 1] or (here < FALLEN and here - falling < CLOSE):
                 self.done = first + k
                 point, distance, zero = self._approach(crossed)
+                if crossed and min(here, there) < FALLEN:
+                    # near by on both sides: the distance is as good as linear in time and zero between
+                    t, h = self.mesh[first + k], self.mesh[first + k + 1] - self.mesh[first + k]
+                    raise self._singular_pose(point, float(t + h * here / (here + there)))
                 if look.near[k + 1] or distance < 5 * CLOSE:
                     raise self._singular_pose(point, zero)
                 self.done = last  # it is passed at a distance, or only the choice of coordinates fails there
@@ -188,11 +192,11 @@ class Run:
         t, x, z = float(self.mesh[self.done]), self.x[self.done], self.z[self.done]
         inputs = self._inputs(self.done)
         step = longest = float(self.mesh[min(self.done + 1, self.mesh.size - 1)]) - t
-        if crossed and 1 not in self.integrators:
+        if 1 not in self.integrators:
             self.integrators[1] = self.coordinates.integrator(1, self.tolerance)
         look = self._look(x[None], z[None], np.array([t]), inputs[None])
         seen = [(t, float(look.distance[0]))]
-        for _ in range(HALVINGS if 1 in self.integrators else 0):
+        for _ in range(HALVINGS):
             step /= 2
             try:
                 near, far, there = self._step(x, z, t, step, inputs)
