@@ -328,7 +328,7 @@ def _written_by_residuals(strata: Strata) -> Sections:
     text = _text(strata, {"constraints": ca.vertcat(*positions.resolved(rest))})
     rows = [f"0 = {value.text}" for value in text.expressions]
     found = ", ".join(s.name() for block in positions.implicit for s in block.tears)
-    words = NO_FORM + (f"; {found} follow from the constraints" if found else "")
+    words = NO_FORM + (f", beginning with the constraints: {found}" if found else "")
     shared = tuple(f"{name} = {value}" for name, value in text.definitions)
     return (
         ("abbreviations", shared),
