@@ -222,7 +222,7 @@ def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarra
             # the coordinate of a joint is in several rows, each with another unknown: it stays as it is
             single = {max(counts, key=lambda j: (counts[j], -j)): -1}
         largest = np.zeros(len(f))
-        np.maximum.at(largest, level.entries[0], np.abs(slopes))
+        np.maximum.at(largest, level.entries[0], np.nan_to_num(np.abs(slopes)))
         new = point.copy()
         for j, i in single.items():
             slope = slopes[place[i, j]] if i >= 0 else 0.0

@@ -18,7 +18,9 @@ def rehearse(to: str) -> None:
     if to == WINDOW:
         import matplotlib.pyplot as plt
 
-        if not _has_windows(plt.get_backend()):
+        from gantrytau.result_figures import has_windows
+
+        if not has_windows(plt.get_backend()):
             raise CommandError(
                 f"--to window: no window can be opened here (Matplotlib draws with '{plt.get_backend()}'). "
                 "Write a picture with --to picture.png, or work where there is a display (ssh -X) "
@@ -49,11 +51,3 @@ def draw(result: "Result", names: tuple[str, ...], to: str) -> list[str]:
     result.plot(*names)
     plt.show()
     return []
-
-
-def _has_windows(backend: str) -> bool:
-    from matplotlib.backends.registry import BackendFilter, backend_registry
-
-    return backend.lower() in {
-        name.lower() for name in backend_registry.list_builtin(BackendFilter.INTERACTIVE)
-    }
