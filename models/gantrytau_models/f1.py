@@ -11,13 +11,14 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
 from gantrytau.errors import ModelError
-from gantrytau.mechanics.multibody import Body, FixedTranslation, Frame, Prismatic, Revolute, TwoFrames, World
+from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World
 from gantrytau.mechanics.multibody.rotations import of_quaternion
 from gantrytau.mechanics.rotational import Torque
-from gantrytau.mechanics.translational import Flange, Friction, Frictionless, TanhFriction
-from gantrytau_models.gantry_tau import Cart
+from gantrytau.mechanics.translational import Friction, TanhFriction
+from gantrytau_models.clusters import Arm, ThreeLinks, TwoLinks
+from gantrytau_models.gantry_tau import Cart, driven_carts
 from gantrytau_models.prototypes import RotatingArm, RotatingPrototype
-from gantrytau_models.six_link import Link, Plate, quaternion
+from gantrytau_models.six_link import Plate, quaternion
 
 STRUCTURE = ((0, 1), (1, 2), (2, 3))  # turntables and links of each arm
 # m, carts at the start, turntables at 0: with the tool below them the plate then turns by 30 deg about both axes of
@@ -75,49 +76,6 @@ class Turntable(TwoFrames):
         yield self.w == self.joint.w
 
 
-class Arm(Model):
-    """Guideway and links of one arm; subclasses say how many links there are.
-
-    The links hang on frame_links, which is frame_cart itself or the frame of a turntable on it.
-    """
-
-    offset = Parameter(shape=3, unit="m", description="cart at s = 0, A_i of (4.20)")
-    direction = Parameter(
-        shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
-    )
-    frame_a = Frame()
-    frame_cart = Frame()
-    frame_links = Frame()
-    frame_b = Frame()
-    base = FixedTranslation(r=offset)
-    rail = Prismatic(
-        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
-    )
-    links = Array(Link, 1)
-    axis = Flange()
-
-    def equations(self):
-        yield connect(self.frame_a, self.base.frame_a)
-        yield connect(self.base.frame_b, self.rail.frame_a)
-        yield connect(self.rail.frame_b, self.frame_cart)
-        yield connect(self.rail.axis, self.axis)
-        for link in self.links:
-            yield connect(self.frame_links, link.frame_cart)
-            yield connect(link.frame_plate, self.frame_b)
-
-
-class TwoLinks(Arm):
-    """An arm of two links."""
-
-    links = Array(Link, 2)
-
-
-class ThreeLinks(Arm):
-    """An arm of three links."""
-
-    links = Array(Link, 3)
-
-
 class F1GantryTau(Model):
     """The F1, driven by the actuator forces `carts[i].f` and the torques `turntables[k].tau`.
 
@@ -143,10 +101,13 @@ class F1GantryTau(Model):
     ):
         name = type(self).__name__
         _check_prototype(prototype, name)
+        carts = driven_carts(prototype, friction, name, RotatingPrototype)
+        for cart, s in zip(carts, START, strict=True):
+            cart["s"] = dict(start=s)
         defaults = dict(
             arms=[_arm(arm) for arm in prototype.arms],
             turntables=[_turntable(turntable) for arm in prototype.arms for turntable in arm.turntables],
-            carts=_carts(prototype, friction, name),
+            carts=carts,
             tool=dict(
                 m=prototype.plate_mass,
                 J=np.array(prototype.plate_inertia),
@@ -193,21 +154,6 @@ def _check_prototype(prototype: RotatingPrototype, robot: str) -> None:
                     f"{robot}: found {prototype.name}.arms[{i}].turntables[{k}].orientation of length {norm:.6g}, "
                     "expected a unit quaternion, as a turntable is rigid; take prototypes.F1, or normalise it"
                 )
-
-
-def _carts(prototype: RotatingPrototype, friction: type[Friction] | None, robot: str) -> list[dict]:
-    if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
-        raise TypeError(
-            f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"
-        )
-    laws = [
-        Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
-        for coulomb, viscous in zip(prototype.coulomb, prototype.viscous, strict=True)
-    ]
-    return [
-        dict(m=mass, law=law, s=dict(start=s))
-        for mass, law, s in zip(prototype.cart_masses, laws, START, strict=True)
-    ]
 
 
 def _turntable(turntable) -> dict:

@@ -17,7 +17,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.translational import Flange, Force, Friction, Frictionless, TanhFriction
-from gantrytau_models.prototypes import Prototype
+from gantrytau_models.prototypes import Prototype, RotatingPrototype
 
 
 class Arm(Model):
@@ -141,9 +141,14 @@ def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Fri
     return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
 
 
-def driven_carts(prototype: Prototype, friction: type[Friction] | None, robot: str) -> list[dict]:
-    """Modifications of the carts of a robot; TypeError for what is no prototype or no friction."""
-    if not isinstance(prototype, Prototype):
+def driven_carts(
+    prototype: Prototype | RotatingPrototype,
+    friction: type[Friction] | None,
+    robot: str,
+    record: type = Prototype,
+) -> list[dict]:
+    """Modifications of the carts of a robot; TypeError for what is no such record or no friction."""
+    if not isinstance(prototype, record):
         raise TypeError(f"{robot}: found {prototype!r}, expected a prototype record such as prototypes.L1")
     if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
         raise TypeError(

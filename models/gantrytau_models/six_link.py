@@ -6,76 +6,14 @@ keeps its orientation; offsets and lengths of their own make this the kinematic 
 
 import numpy as np
 
-from gantrytau import Array, Model, Parameter, Real, StateSelect, connect
-from gantrytau.mechanics.multibody import (
-    Body,
-    FixedTranslation,
-    Frame,
-    Prismatic,
-    SphericalSpherical,
-    World,
-)
-from gantrytau.mechanics.translational import Flange, Friction, TanhFriction
+from gantrytau import Array, Model, Real, StateSelect, connect
+from gantrytau.errors import ModelError
+from gantrytau.mechanics.multibody import Body, World
+from gantrytau.mechanics.translational import Friction, TanhFriction
+from gantrytau_models.clusters import Arm, ThreeLinks, TwoLinks
 from gantrytau_models.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
+from gantrytau_models.prototypes import Arm as Record
 from gantrytau_models.prototypes import Prototype
-
-
-class Link(Model):
-    """One link from a cart to the plate, with its joints on both."""
-
-    length = Parameter(unit="m", min=0.0, description="length between the ball joints")
-    offset = Parameter(shape=3, unit="m", description="joint on the cart where s = 0, A_ij of (4.14)")
-    plate_offset = Parameter(
-        shape=3, unit="m", description="joint on the plate, in plate axes, B_ij of (4.14)"
-    )
-    mass = Parameter(0.0, unit="kg", min=0.0, description="mass, in the middle of the link")
-    frame_cart = Frame()
-    frame_plate = Frame()
-    on_cart = FixedTranslation(r=offset)
-    rod = SphericalSpherical(L=length, m=mass)
-    on_plate = FixedTranslation(r=plate_offset)
-
-    def equations(self):
-        yield connect(self.frame_cart, self.on_cart.frame_a)
-        yield connect(self.on_cart.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.on_plate.frame_b)
-        yield connect(self.on_plate.frame_a, self.frame_plate)
-
-
-class Cluster(Model):
-    """Guideway and links of one arm; subclasses say how many links there are."""
-
-    direction = Parameter(
-        shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
-    )
-    frame_a = Frame()
-    frame_cart = Frame()
-    frame_b = Frame()
-    rail = Prismatic(
-        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
-    )
-    links = Array(Link, 1)
-    axis = Flange()
-
-    def equations(self):
-        yield connect(self.frame_a, self.rail.frame_a)
-        yield connect(self.rail.frame_b, self.frame_cart)
-        yield connect(self.rail.axis, self.axis)
-        for link in self.links:
-            yield connect(self.frame_cart, link.frame_cart)
-            yield connect(link.frame_plate, self.frame_b)
-
-
-class TwoLinks(Cluster):
-    """A cluster of two links."""
-
-    links = Array(Link, 2)
-
-
-class ThreeLinks(Cluster):
-    """A cluster of three links."""
-
-    links = Array(Link, 3)
 
 
 class Plate(Body):
@@ -97,16 +35,23 @@ class SixLinkGantryTau(Model):
     """
 
     world = World()
-    arms = Array(Cluster, 3)
+    arms = Array(Arm, [Arm(), TwoLinks(), ThreeLinks()])
     carts = Array(Cart, 3)
     tool = Plate(r=dict(prefer=StateSelect.PREFER), v=dict(prefer=StateSelect.PREFER))
 
     def __init__(
         self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
     ):
-        carts = driven_carts(prototype, friction, type(self).__name__)
+        name = type(self).__name__
+        carts = driven_carts(prototype, friction, name)
+        found = tuple(len(arm.links) for arm in prototype.arms)
+        if found != (1, 2, 3):
+            raise ModelError(
+                f"{name}: found {prototype.name} with {found} links on its arms, expected (1, 2, 3); write another "
+                "structure as a Model of its own, of Arm and Link"
+            )
         defaults = dict(
-            arms=[_cluster(arm) for arm in prototype.arms],
+            arms=[_arm(arm) for arm in prototype.arms],
             carts=carts,
             tool=dict(
                 m=prototype.plate_mass,
@@ -123,12 +68,12 @@ class SixLinkGantryTau(Model):
         for arm, cart in zip(self.arms, self.carts, strict=True):
             yield connect(self.world.frame_b, arm.frame_a)
             yield connect(arm.frame_cart, cart.frame)
+            yield connect(arm.frame_cart, arm.frame_links)
             yield connect(arm.axis, cart.axis)
             yield connect(arm.frame_b, self.tool.frame_a)
 
 
-def _cluster(arm) -> Cluster:
-    kinds = {1: Cluster, 2: TwoLinks, 3: ThreeLinks}
+def _arm(arm: Record) -> dict:
     links = [
         dict(
             length=link.length,
@@ -138,7 +83,7 @@ def _cluster(arm) -> Cluster:
         )
         for link in arm.links
     ]
-    return kinds[len(links)](direction=list(arm.direction), links=links)
+    return dict(direction=list(arm.direction), links=links)
 
 
 def quaternion(R: np.ndarray) -> list[float]:
