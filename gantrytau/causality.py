@@ -16,6 +16,9 @@ from gantrytau.translation import all_symbols, names, translate_flat
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
 
+DROPPED = "constraints that were left out"
+OPEN = 1e-6  # m or rad by which they may be violated
+
 
 def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Function:
     """See Dae.function."""
@@ -28,11 +31,34 @@ def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Functi
         dae = translated
         known = _known(dae, given, columns)
         targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
+        dropped = _dropped(dae, given)
+        blocks = _blocks(dae, known, [*targets, dropped], find) if dropped.numel() else None
+        if blocks is not None:
+            whole = _compose(dae, blocks, known, [*targets, dropped], given, [*find, DROPPED], columns)
+            return _closed(whole)
         blocks = _blocks(dae, known, targets, find)
         if blocks is not None:
             return _compose(dae, blocks, known, targets, given, find, columns)
         inputs = _sufficient_inputs(dae, known, targets) if inputs is None else inputs
     raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
+
+
+def _dropped(dae: "Dae", given: Sequence[str]) -> ca.SX:
+    """What must be zero where given parameters could open a loop: the constraints left out as redundant."""
+    parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
+    if not parameters or not dae.redundant:
+        return ca.SX(0, 1)
+    return dae.reduced.written(dae.table.reduce(ca.vertcat(*(e.residual for e in dae.redundant))))
+
+
+def _closed(function: ca.Function) -> ca.Function:
+    """A function whose last result must be zero: without it, and NaN where it is not."""
+    names = function.name_in()
+    x = [ca.MX.sym(n, *function.size_in(n)) for n in names]
+    *results, gap = function.call(x)
+    holds = ca.norm_inf(gap) <= OPEN
+    found = [ca.if_else(holds, r, ca.MX.nan(*r.shape)) for r in results]
+    return ca.Function("f", x, found, names, function.name_out()[:-1])
 
 
 def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iterator["Dae"]:

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
+SOUND = 0.01  # smallest singular value of a scaled matrix that is taken as a measure at least
 LEAST = 1e-6  # the same of the equations of accelerations and forces
 
 
@@ -94,7 +95,8 @@ def _scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     if matrix.size == 0:
         return rows, columns, 1.0
     least = np.linalg.svd(matrix / rows / columns, compute_uv=False)[-1]
-    return rows, columns, max(float(least), 1e-300)
+    # a start near a singular pose is no measure
+    return rows, columns, max(float(least), SOUND)
 
 
 def _least(matrices: np.ndarray, scale: tuple[np.ndarray, np.ndarray, float]) -> np.ndarray:

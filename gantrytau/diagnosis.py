@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import casadi as ca
+
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flat_model import FlatModel, Loop
 from gantrytau.flattening import flatten
@@ -131,8 +133,14 @@ def _sizes(flat: FlatModel, known: int) -> tuple[int, int]:
 
 
 def _moved(dae: "Dae") -> tuple[Moved, ...]:
-    found = []
-    for symbol, asked in dae.settings.get("asked", {}).items():
-        if abs(dae.start[symbol] - asked) > FAR * max(1.0, abs(asked)):
-            found.append(Moved(dae.spoken(symbol), asked, dae.start[symbol]))
-    return tuple(sorted(found, key=lambda m: -abs(m.found - m.asked)))
+    """Start values that the start does not have, of aliases too."""
+    started = [v for v in dae.flat.variables if v.start is not None]
+    names = [n for v in started for n in v.elements]
+    asked = [x for v in started for x in dae.table.number(ca.vertcat(*(v.start or ()))).tolist()]
+    found = dae.numbers(names, dae.start).tolist() if names else []
+    moved = [
+        Moved(n, a, f)
+        for n, a, f in zip(names, asked, found, strict=True)
+        if abs(f - a) > FAR * max(1.0, abs(a)) and dae.reduced.aliases[n].root not in dae.known
+    ]
+    return tuple(sorted(moved, key=lambda m: -abs(m.found - m.asked)))

@@ -52,6 +52,15 @@ class Indexed:
             found.append(Level(tuple(self.residuals[k] for k in keys), tuple(words), tuple(unknowns)))
         return tuple(found)
 
+    @cached_property
+    def whole(self) -> Level:
+        """All levels as one."""
+        return Level(
+            tuple(r for level in self.levels for r in level.residuals),
+            tuple(n for level in self.levels for n in level.names),
+            tuple(n for level in self.levels for n in level.unknowns),
+        )
+
     def unknown_symbols(self) -> list[str]:
         """Every unknown with all its derivatives up to the highest, by name."""
         return [derivative_name(n, k) for n, top in self.orders.items() for k in range(top + 1)]

@@ -16,8 +16,8 @@ from gantrytau.index_reduction import Indexed
 from gantrytau.parameters import ParameterTable, with_values
 from gantrytau.symbols import derivative_name, split_derivative
 
-STEP = 0.4  # m or rad between stops on the way to given positions
-MOST_STEPS = 8
+STEP = 0.3  # m or rad between stops on the way to given positions
+MOST_STEPS = 40
 
 
 def consistent_start(
@@ -35,7 +35,17 @@ def consistent_start(
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
     title, fixed = flat.name, guess.fixed | held
-    values = solve_levels(stages, guess.values, held=fixed, started=guess.started | held, title=title)
+    settings = dict(held=fixed, started=guess.started | held, title=title)
+    try:
+        values = solve_levels(stages, guess.values, **settings)
+    except InitializationError as error:
+        if held or not guess.fixed:
+            raise
+        # a fixed start may belong to a later level than the states that have to follow it
+        try:
+            values = solve_levels([indexed.whole], guess.values, **settings)
+        except InitializationError:
+            raise error from None
     if flat.initial_equations and not held:
         extra = _initial_level(flat, table, reduced, stages)
         values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
@@ -131,12 +141,8 @@ def _jointly(
     dae: Dae, guess: Guess, held: frozenset[str], free: tuple[str, ...], error: InitializationError
 ) -> dict[str, float]:
     """All levels at once: what is held may belong to a later level than the positions that it decides."""
-    parts = dae.indexed.levels
-    level = Level(
-        tuple(r for part in parts for r in part.residuals),
-        tuple(n for part in parts for n in part.names),
-        (*(n for part in parts for n in part.unknowns), *free),
-    )
+    whole = dae.indexed.whole
+    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free))
     try:
         found = solve_levels([level], guess.values, held=held, started=guess.started | held, title=dae.name)
     except InitializationError:

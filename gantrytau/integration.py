@@ -16,6 +16,8 @@ from gantrytau.progress import Progress
 from gantrytau.signals import Samples, Signal
 
 CHUNK = 10  # output intervals between two projections onto the constraints
+STRAIGHT = 1.3  # sum of the distances on both sides of a singular pose, relative to a step of the distance
+LEAST_STEPS = 500  # of the mesh on which singular poses are looked for, however few points are asked for
 HALVINGS = 14  # of the last step, to come near to where the integration stops
 WITHIN = 0.5  # relative distance of a singular pose above which none lies within one output interval
 FALLEN = 0.05  # relative distance of a singular pose from which its fall is extrapolated
@@ -41,7 +43,10 @@ class Run:
         self.samples = [samples[n] for n in coordinates.sampled]
         knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
         knots = knots[(knots > grid[0]) & (knots < grid[-1])]
-        self.mesh = np.unique(np.concatenate([grid, knots]))
+        parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
+        fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
+        fine[::parts] = grid
+        self.mesh = np.unique(np.concatenate([fine if coordinates.conditioning.needed else grid, knots]))
         self.kept = np.searchsorted(self.mesh, grid)
         self.x = np.full((self.mesh.size, len(coordinates.states)), np.nan)
         self.z = np.full((self.mesh.size, len(coordinates.algebraics)), np.nan)
@@ -130,11 +135,12 @@ class Run:
             crossed = within and look.side[k] * look.side[k + 1] < 0
             # a distance that falls straight to zero within the interval may have risen again behind it
             falling = distances[k + shift - 1] - here if k + shift else 0.0
-            if crossed or look.near[k + 1] or (here < FALLEN and here - falling < CLOSE):
+            if crossed or look.near[k + 1] or (here < WITHIN and here - falling < CLOSE):
                 self.done = first + k
                 point, distance, zero = self._approach(crossed)
-                if crossed and min(here, there) < FALLEN:
-                    # near by on both sides: the distance is as good as linear in time and zero between
+                rising = look.distance[k + 2] - there if k + 2 < look.distance.size else 0.0
+                if crossed and (min(here, there) < FALLEN or here + there < STRAIGHT * max(falling, rising)):
+                    # the distance falls straight to zero between the two and rises again
                     t, h = self.mesh[first + k], self.mesh[first + k + 1] - self.mesh[first + k]
                     raise self._singular_pose(point, float(t + h * here / (here + there)))
                 if look.near[k + 1] or distance < 5 * CLOSE:
@@ -157,10 +163,17 @@ class Run:
     def _singular_pose(self, point: Point, t: float) -> SolveError:
         """What to say of a singular pose at time t, just behind a point."""
         weakest = self._weakest(point)
+        redundant = self.coordinates.dae.redundant
+        doubt = (
+            f" (constraints were left out as redundant at the start: {redundant[0].name}{', ...' if redundant[1:] else ''}; "
+            "if the mechanism is sound at that pose, start nearer to it, so that others are kept)"
+            if redundant
+            else ""
+        )
         return SolveError(
             f"{self.coordinates.dae.name}: the motion meets a singular pose at t = {t:.6g} s, where forces or "
             f"accelerations are not determined. The equations that degenerate there: {'; '.join(weakest)}. .result "
-            "holds the motion up to there: keep away from that pose, or change the geometry",
+            f"holds the motion up to there: keep away from that pose, or change the geometry{doubt}",
             time=t,
             equations=weakest,
         )

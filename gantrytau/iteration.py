@@ -13,7 +13,7 @@ import casadi as ca
 from gantrytau.solution import Block
 from gantrytau.symbols import split_derivative
 
-STEPS = 6  # from the start to the arguments
+STEPS = 16  # from the start to the arguments
 SOLVED = 1e-8  # residual above which an iteration found nothing
 NEWTON = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 50, "error_on_fail": False}
 

@@ -90,7 +90,12 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
     for name in reversed(order):  # what decides a folded value is folded too
         if name in folded:
             folded.update(needs[name])
-    folded -= keep
+    # what follows from a parameter that stays a symbol is no number either
+    loose = set(keep) | {n for p in flat.parameters if p.free for n in p.elements}
+    for name in order:
+        if name in loose or any(other in loose for other in needs[name]):
+            loose.add(name)
+    folded -= loose
     values: dict[str, float] = {}
     expressions: dict[str, ca.SX] = {}
     independent: list[str] = []

@@ -103,7 +103,6 @@ def _translated(
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     indexed = reduce_index(reduced, flat)
     guess = starting_guess(flat, table, reduced, all_symbols(indexed, reduced.known))
-    asked = {n: guess.values[n] for n in guess.values if n in guess.started}
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in guess.values}
     guess = replace(guess, values={**guess.values, **better})
     try:
@@ -118,7 +117,7 @@ def _translated(
     guide = Guide(sample, table.values, choice.states)
     blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
     refuse_undetermined(blocks, indexed, reduced, sample, flat)
-    more = dict(started=guess.started, fixed=guess.fixed, asked=asked)
+    more = dict(started=guess.started, fixed=guess.fixed)
     return Dae(
         flat, table, reduced, indexed, choice, blocks, known, sample, settled.redundant, {**settings, **more}
     )

@@ -192,7 +192,8 @@ def _closed(lengths: Sequence[float], starts: Sequence[float | None]) -> list[fl
     distance = np.hypot(*across)
     cosine = (b**2 + distance**2 - c**2) / (2 * b * distance)
     # out of reach: not quite straight, so that it is clear to which side
-    bend = np.arccos(cosine if abs(cosine) < 1 else np.sign(cosine) * 0.99)
+    flat = 1 <= abs(cosine) < 1 + 1e-9  # straight, up to rounding
+    bend = np.arccos(cosine if abs(cosine) < 1 else np.sign(cosine) * (1.0 if flat else 0.99))
     poses = []
     for side in (1.0, -1.0):
         phi = np.arctan2(across[1], across[0]) + side * bend
