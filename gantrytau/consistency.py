@@ -83,11 +83,12 @@ def solve_levels(
     held: frozenset[str],
     started: frozenset[str],
     title: str,
+    thorough: bool = False,
 ) -> dict[str, float]:
     """Values that satisfy all levels, nearest to the given ones.
 
     values: a number for every symbol that occurs; held: names that must not move; started: names whose
-    number somebody gave. Raises InitializationError with the worst residuals by name.
+    number somebody gave; thorough: if they do not lead to a solution, try others around them. Raises InitializationError with the worst residuals by name.
     """
     values = dict(values)
     for level in levels:
@@ -97,7 +98,7 @@ def solve_levels(
             try:  # starts that fit together are held
                 _solve(level, free, values, started, title)
             except InitializationError:
-                _solve_anyhow(level, moving, values, started, title)
+                (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
     return values
 
 

@@ -35,15 +35,17 @@ def consistent_start(
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
     title, fixed = flat.name, guess.fixed | held
-    settings = dict(held=fixed, started=guess.started | held, title=title)
+    started, thorough = guess.started | held, not held
     try:
-        values = solve_levels(stages, guess.values, **settings)
+        values = solve_levels(
+            stages, guess.values, held=fixed, started=started, title=title, thorough=thorough
+        )
     except InitializationError as error:
         if held or not guess.fixed:
             raise
         # a fixed start may belong to a later level than the states that have to follow it
         try:
-            values = solve_levels([indexed.whole], guess.values, **settings)
+            values = solve_levels([indexed.whole], guess.values, held=fixed, started=started, title=title)
         except InitializationError:
             raise error from None
     if flat.initial_equations and not held:
@@ -141,6 +143,10 @@ def _jointly(
     dae: Dae, guess: Guess, held: frozenset[str], free: tuple[str, ...], error: InitializationError
 ) -> dict[str, float]:
     """All levels at once: what is held may belong to a later level than the positions that it decides."""
+    orders = dae.indexed.orders
+    late = [n for n in held if orders.get(n, 0) < max(orders.values(), default=0) and n in orders]
+    if not late:
+        raise error  # all that is held are positions, which have been tried
     whole = dae.indexed.whole
     level = Level(whole.residuals, whole.names, (*whole.unknowns, *free))
     try:

@@ -152,6 +152,7 @@ def _close(
         held=guess.fixed,
         started=guess.started,
         title=title,
+        thorough=True,
     )
 
 
