@@ -56,7 +56,7 @@ def _closed(function: ca.Function) -> ca.Function:
     names = function.name_in()
     x = [ca.MX.sym(n, *function.size_in(n)) for n in names]
     *results, gap = function.call(x)
-    holds = ca.norm_inf(gap) <= OPEN
+    holds = ca.sumsqr(gap) <= OPEN**2
     found = [ca.if_else(holds, r, ca.MX.nan(*r.shape)) for r in results]
     return ca.Function("f", x, found, names, function.name_out()[:-1])
 

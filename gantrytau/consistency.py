@@ -88,7 +88,8 @@ def solve_levels(
     """Values that satisfy all levels, nearest to the given ones.
 
     values: a number for every symbol that occurs; held: names that must not move; started: names whose
-    number somebody gave; thorough: if they do not lead to a solution, try others around them. Raises InitializationError with the worst residuals by name.
+    number somebody gave; thorough: if they do not lead to a solution, try others around them. Raises
+    InitializationError with the worst residuals by name.
     """
     values = dict(values)
     for level in levels:

@@ -40,6 +40,11 @@ def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, sym
 def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:
     alias = reduced.aliases[name]
     if alias.root is None:
+        constant = float(table.number(alias.offset)[0])
+        if variable.fixed and abs(number - constant) > 1e-9 * max(1.0, abs(constant)):
+            raise InitializationError(
+                f"{name}: found the fixed start {number:g}, but it is constant and equal to {constant:g}; leave it out"
+            )
         return
     symbol = derivative_name(alias.root, alias.order)
     value = (number - float(table.number(alias.offset)[0])) / alias.factor

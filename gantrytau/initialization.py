@@ -161,7 +161,10 @@ def given_scalars(dae: Dae, given: Mapping[str, Any]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, value in given.items():
         elements = dae.expand(name)
-        numbers = np.asarray(value, dtype=float).ravel(order="F")
+        try:
+            numbers = np.asarray(value, dtype=float).ravel(order="F")
+        except (TypeError, ValueError):
+            raise ModelError(f"{name}: found {value!r}, expected a number or an array of numbers") from None
         if numbers.size != len(elements):
             raise ModelError(f"{name}: found {numbers.size} values, expected {len(elements)}")
         if not np.all(np.isfinite(numbers)):

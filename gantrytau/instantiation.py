@@ -166,7 +166,13 @@ class _Builder:
             }
             declaration = new
         elif modification is not None:
-            attributes |= _attributes(modification, full)
+            changes = _attributes(modification, full)
+            if isinstance(declaration, Parameter) and changes.keys() & {"start", "fixed"}:
+                raise ModelError(
+                    f"{full}: found a start value, but it is a parameter, which has one value; write "
+                    f"{name}=... with the number"
+                )
+            attributes |= changes
         shape = _shape(declaration, attributes, instance, full)
         names = element_names(full, shape)
         kind = declaration.kind
@@ -246,6 +252,8 @@ def _wrap(modifications: Mapping[str, Any], scope: Any) -> dict[Any, Any]:
 
 
 def _wrap_value(value: Any, scope: Any) -> Any:
+    if isinstance(value, (Start, Bounds)):  # attributes, so that one does not erase the other
+        return {key: Leaf(x, scope) for key, x in value.attributes().items() if x is not None}
     if isinstance(value, Mapping):
         return _wrap(value, scope)
     if isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value):

@@ -68,8 +68,9 @@ def _linear(f: ca.SX, y: ca.SX, known: ca.SX, values: ca.MX) -> ca.MX:
     matrix, right = ca.Function("linear", [known], parts, {"cse": True})(values)
     found = ca.solve(matrix, -right, "qr")
     # a singular matrix leaves numbers of rounding, which do not satisfy the equations
-    left = ca.norm_inf(ca.mtimes(matrix, found) + right)
-    return ca.if_else(left <= 1e-6 * ca.fmax(1, ca.norm_inf(right)), found, ca.MX.nan(*y.shape))
+    # (sums of squares, as the largest of NaN and a number is the number)
+    left = ca.sumsqr(ca.mtimes(matrix, found) + right)
+    return ca.if_else(left <= 1e-12 * (1 + ca.sumsqr(right)), found, ca.MX.nan(*y.shape))
 
 
 def _newton(name: str, part: Implicit, y: ca.SX, known: ca.SX, way: tuple[ca.DM, ca.MX], steps: int) -> ca.MX:
@@ -81,5 +82,5 @@ def _newton(name: str, part: Implicit, y: ca.SX, known: ca.SX, way: tuple[ca.DM,
         share = step / steps
         values = end if step == steps else ca.MX(begin) + share * (end - begin)
         found = solve(found, values)
-    left = ca.norm_inf(residual(found, end))
-    return ca.if_else(left <= SOLVED, found, ca.MX.nan(*y.shape))
+    left = ca.sumsqr(residual(found, end))
+    return ca.if_else(left <= SOLVED**2, found, ca.MX.nan(*y.shape))

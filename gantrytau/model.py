@@ -7,7 +7,7 @@ import functools
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeGuard
 
-from gantrytau.declarations import Array, Quantity
+from gantrytau.declarations import Array, Bounds, Quantity, Start
 from gantrytau.errors import ModelError, did_you_mean
 
 
@@ -35,12 +35,24 @@ class Declared(_Part):
         super().__init_subclass__(**keywords)
         for name, value in vars(cls).items():
             refuse_container(f"{cls.__name__}.{name}", value)
+            own = getattr(value, "__qualname__", "").startswith(f"{cls.__qualname__}.")
+            if isinstance(value, type) and issubclass(value, Declared) and not own:
+                raise ModelError(
+                    f"{cls.__name__}.{name} is the class {value.__name__}, expected a component; write "
+                    f"{name} = {value.__name__}()"
+                )
 
     def __init__(self, defaults: Mapping[str, Any] | None = None, /, **modifications: Any):
         """Modify members by name; `defaults` are modifications that the keywords may override.
 
         Raises ModelError for a name that is not declared.
         """
+        if defaults is not None and not isinstance(defaults, Mapping):
+            names = [n for n, m in type(self).members().items() if isinstance(m, Quantity)]
+            example = f"{type(self).__name__}({names[0] if names else 'name'}=...)"
+            raise ModelError(
+                f"{type(self).__name__}: found {defaults!r} without a name, expected keywords, as {example}"
+            )
         self._modifications = merge(dict(defaults or {}), modifications)
         for name in self._modifications:
             check_member(type(self), name, type(self).__name__)
@@ -126,7 +138,7 @@ def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """Modifications `above` laid over those `below`; nested ones merge, all else replaces."""
     merged = dict(below)
     for name, value in above.items():
-        old = merged.get(name)
+        old, value = _attributes(merged.get(name)), _attributes(value)
         if isinstance(old, Mapping) and isinstance(value, Mapping):
             value = merge(dict(old), value)
         elif _elementwise(old) and _elementwise(value) and len(old) == len(value):
@@ -138,6 +150,13 @@ def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
             value = [merge(dict(a), value) if isinstance(a, Mapping) else value for a in old]
         merged[name] = value
     return merged
+
+
+def _attributes(value: Any) -> Any:
+    """Start, Fixed and Bounds as the attributes that they set, so that one does not erase the other."""
+    if isinstance(value, (Start, Bounds)):
+        return {key: x for key, x in value.attributes().items() if x is not None}
+    return value
 
 
 def _elementwise(value: Any) -> TypeGuard[list[Any]]:
