@@ -101,7 +101,8 @@ def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:
         held.add(symbol)
     for share in _shares(dae, values, held):
         # on the way, so that mechanisms stay assembled as they are at the start
-        near = {n: dae.start.get(n, v) + share * (v - dae.start.get(n, v)) for n, v in values.items()}
+        way = {n: dae.start.get(n, values[n]) for n in held}
+        near = {**values, **{n: begin + share * (values[n] - begin) for n, begin in way.items()}}
         try:
             reached = _complete(dae, near, frozenset(held))
         except InitializationError:

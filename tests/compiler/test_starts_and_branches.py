@@ -1,0 +1,128 @@
+"""What is given, fixed or started is what comes out, on the branch of the start, or is told that it cannot be."""
+
+import numpy as np
+import pytest
+
+from gantrytau import (
+    Bounds,
+    Fixed,
+    InitializationError,
+    Model,
+    ModelError,
+    Parameter,
+    Real,
+    Start,
+    connect,
+    der,
+    translate,
+)
+from gantrytau.mechanics import multibody, translational
+from gantrytau_models import FourBar
+
+
+class Slide(Model):
+    """A mass on a rail that is tilted by a parameter, on which the folded parameter of a rotation depends."""
+
+    tilt = Parameter(0.0, unit="rad", description="tilt of the rail")
+    world = multibody.World()
+    turn = multibody.FixedRotation(n=[0.0, 1.0, 0.0], phi=tilt)
+    rail = multibody.Prismatic(n=[1.0, 0.0, 0.0])
+    mass = multibody.PointMass(m=2.0)
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.turn.frame_a)
+        yield connect(self.turn.frame_b, self.rail.frame_a)
+        yield connect(self.rail.frame_b, self.mass.frame_a)
+
+
+class Swing(Model):
+    """A body on a hinge."""
+
+    world = multibody.World()
+    hinge = multibody.Revolute(n=[0.0, 1.0, 0.0], phi=Start(0.5))
+    body = multibody.Body(m=2.0, r_cm=[0.0, 0.0, -0.7])
+
+    def equations(self):
+        yield connect(self.world.frame_b, self.hinge.frame_a)
+        yield connect(self.hinge.frame_b, self.body.frame_a)
+
+
+class Decay(Model):
+    """y follows from the state by a nonlinear equation, z is its alias up to factor and offset."""
+
+    x = Real(unit="m", start=1.0)
+    y = Real(unit="1")
+    z = Real(unit="m", start=-1.0)
+
+    def equations(self):
+        yield der(self.x) == -self.x
+        yield self.y == self.x**2 + self.x
+        yield self.z == -2 * self.x + 3
+
+
+def test_given_parameters_act_through_those_that_are_folded():
+    dae = translate(Slide())
+    for tilt in (0.5, -0.2):
+        expected = 9.81 * np.sin(tilt)
+        assert float(dae.function(["tilt"], ["der(rail.v)"])(tilt)) == pytest.approx(expected, rel=1e-14)
+        assert dae.evaluate({"tilt": tilt})["der(rail.v)"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_functions_and_evaluate_keep_to_their_branch_over_a_turn():
+    dae = translate(FourBar())
+    function = dae.function(["crank.phi"], ["rocker.phi"])
+    start = dae.evaluate()
+    for turn in (-2 * np.pi, 2 * np.pi):
+        angle = start["crank.phi"] + turn
+        for found in (float(function(angle)), dae.evaluate({"crank.phi": angle})["rocker.phi"]):
+            # a whole turn of the crank brings the rocker back
+            assert np.remainder(found - start["rocker.phi"] + 1, 2 * np.pi) == pytest.approx(1, abs=1e-9)
+
+
+def test_what_no_pose_satisfies_is_nan():
+    dae = translate(FourBar())
+    assert np.isnan(float(dae.function(["rocker.phi"], ["crank.phi"])(0.0)))
+    opened = dae.function(["crank.phi", "base.r"], ["rocker.phi"])
+    assert np.isfinite(float(opened(1.3, [1.0, 0.0, 0.0])))
+    assert np.isnan(float(opened(1.3, [1.0, 0.0, 0.2])))  # the second pivot lies beside the plane
+
+
+def test_a_fixed_start_of_what_follows_from_a_state_moves_the_state():
+    at = translate(Decay(y=Fixed(6.0)), units=False).evaluate()
+    assert at["x"] == pytest.approx(2.0, abs=1e-12)
+
+
+def test_a_fixed_start_of_a_constant_is_refused():
+    with pytest.raises(
+        InitializationError, match=r"body\.r\[2\]: found the fixed start 1, but it is constant"
+    ):
+        translate(Swing(body=dict(r=Fixed([0.0, 0.0, 1.0]))))
+
+
+def test_a_start_that_loses_against_an_alias_is_told():
+    moved = {m.name: (m.asked, m.found) for m in translate(Decay(), units=False).diagnosis.moved}
+    assert moved == {"z": (-1.0, 1.0)}
+
+
+def test_bounds_do_not_erase_a_start():
+    assert translate(Swing(hinge=dict(phi=Bounds(0.1, 2.0)))).evaluate()["hinge.phi"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (
+            lambda: translate(translational.Mass(m=Start(5.0))),
+            "m: found a start value, but it is a parameter",
+        ),
+        (lambda: translational.Mass(2.0), r"Mass: found 2\.0 without a name, expected keywords, as Mass\(m="),
+        (
+            lambda: translate(FourBar()).evaluate({"crank.phi": "a"}),
+            "crank.phi: found 'a', expected a number",
+        ),
+        (lambda: type("Bare", (Model,), dict(mass=translational.Mass)), r"Bare\.mass is the class Mass"),
+    ],
+)
+def test_what_would_be_lost_is_refused(build, words):
+    with pytest.raises(ModelError, match=words):
+        build()
