@@ -1,5 +1,7 @@
 """What is given, fixed or started is what comes out, on the branch of the start, or is told that it cannot be."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,8 @@ from gantrytau import (
 )
 from gantrytau.mechanics import multibody, translational
 from gantrytau_models import FourBar
+
+MASS: Any = 2.0  # kg
 
 
 class Slide(Model):
@@ -115,7 +119,10 @@ def test_bounds_do_not_erase_a_start():
             lambda: translate(translational.Mass(m=Start(5.0))),
             "m: found a start value, but it is a parameter",
         ),
-        (lambda: translational.Mass(*[2.0]), r"Mass: found 2\.0 without a name, expected keywords, as Mass\(m="),
+        (
+            lambda: translational.Mass(MASS),
+            r"Mass: found 2\.0 without a name, expected keywords, as Mass\(m=",
+        ),
         (
             lambda: translate(FourBar()).evaluate({"crank.phi": "a"}),
             "crank.phi: found 'a', expected a number",
