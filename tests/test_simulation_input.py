@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+import gantrytau.integration
 from gantrytau import Input, Model, ModelError, Real, SolveError, der, simulate, sin
 from gantrytau_models import GantryTau, prototypes
 from tests.test_simulation import Circuit, Oscillator
@@ -81,9 +82,13 @@ def test_wrong_policy(keywords, words):
     assert words in str(caught.value)
 
 
-def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed():
-    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
-    timer.start()
+def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed(monkeypatch):
+    class Begun(gantrytau.integration.Progress):
+        def __enter__(self):
+            threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
+            return super().__enter__()
+
+    monkeypatch.setattr(gantrytau.integration, "Progress", Begun)
     with pytest.raises(SolveError, match=r"simulation interrupted at t = ") as raised:
         simulate(
             GantryTau(prototypes.L1),
