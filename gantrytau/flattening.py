@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -32,35 +32,48 @@ def flatten(model: Model) -> FlatModel:
     return write_out(instantiate(model))
 
 
+@dataclass
+class _Stated:
+    """What the components of a model yield, by kind."""
+
+    equations: list[Equation] = field(default_factory=list)
+    initial: list[Equation] = field(default_factory=list)
+    connections: list[tuple[str, Connection]] = field(default_factory=list)
+    ways: list[tuple[str, str, int, Branch | Root]] = field(default_factory=list)
+    requirements: list[Requirement] = field(default_factory=list)
+
+
+def _stated(instance: Instance) -> _Stated:
+    found = _Stated()
+    for path, component in instance.components:
+        name = type(component).__name__
+        for number, statement in _statements(component.equations, path, name):
+            if isinstance(statement, Connection):
+                found.connections.append((path, statement))
+            elif isinstance(statement, Requirement):
+                found.requirements.append(replace(statement, path=path, model=name))
+            elif isinstance(statement, (Branch, Root)):
+                found.ways.append((path, name, number, statement))
+            else:
+                found.equations += equality(statement, path, name, number)
+        for number, statement in _statements(component.initial_equations, path, name):
+            found.initial += equality(statement, path, name, number)
+    return found
+
+
 def write_out(instance: Instance) -> FlatModel:
     """The flat record of an instantiated model."""
-    equations: list[Equation] = []
-    initial: list[Equation] = []
-    connections: list[tuple[str, Connection]] = []
-    ways: list[tuple[str, str, int, Branch | Root]] = []
-    requirements: list[Requirement] = []
     with writing(instance.symbols):
-        for path, component in instance.components:
-            name = type(component).__name__
-            for number, statement in _statements(component.equations, path, name):
-                if isinstance(statement, Connection):
-                    connections.append((path, statement))
-                elif isinstance(statement, Requirement):
-                    requirements.append(replace(statement, path=path, model=name))
-                elif isinstance(statement, (Branch, Root)):
-                    ways.append((path, name, number, statement))
-                else:
-                    equations += equality(statement, path, name, number)
-            for number, statement in _statements(component.initial_equations, path, name):
-                initial += equality(statement, path, name, number)
-        statements = [way for *_, way in ways]
+        stated = _stated(instance)
+        equations, connections = stated.equations, stated.connections
+        statements = [way for *_, way in stated.ways]
         tree = spanning_tree(
             instance,
             connections,
             [way for way in statements if isinstance(way, Branch)],
             [way for way in statements if isinstance(way, Root)],
         )
-        equations += _of_the_ways(ways, tree)
+        equations += _of_the_ways(stated.ways, tree)
         equations += _bindings(instance)
         joined = [c for c in connections if id(c[1]) not in tree.repeated]
         closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
@@ -68,7 +81,7 @@ def write_out(instance: Instance) -> FlatModel:
         equations += [e for closure in closures for e in closure.equations]
         spread = Spread(instance, tree)
         written = spread.substituted(equations)
-        written_initial = spread.substituted(initial)
+        written_initial = spread.substituted(stated.initial)
         _refuse_nan((*written, *written_initial))
         spread.refuse_undefined((*written, *written_initial))
         absent = _absent(statements, tree)
@@ -94,7 +107,7 @@ def write_out(instance: Instance) -> FlatModel:
         inputs=_free_inputs(instance, equations),
         hints=_hints(instance),
         absent=absent,
-        requirements=tuple(requirements),
+        requirements=tuple(stated.requirements),
     )
 
 

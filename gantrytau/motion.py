@@ -1,6 +1,6 @@
 """The equations of motion in all coordinates of a model, made of its translated equations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
@@ -11,8 +11,9 @@ from gantrytau.dae import Dae
 from gantrytau.dependents import definitions_of, dependents
 from gantrytau.errors import ModelError
 from gantrytau.guide import Guide
+from gantrytau.index_reduction import Key
 from gantrytau.signals import Samples, Signal
-from gantrytau.solution import solve_blocks
+from gantrytau.solution import Block, solve_blocks
 from gantrytau.symbols import derivative_name, split_derivative, time
 
 
@@ -22,53 +23,40 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     """
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
     w, t0 = ca.SX.sym("w", 2 * len(sampled)), ca.SX.sym("t0")
-    indexed, chains = dae.indexed, dae.reduced.chains
-    given = dependents(dae)
-    follow = {name for _, name in given}
-    states = tuple(
-        derivative_name(n, k)
-        for k in range(max(indexed.orders.values(), default=0))
-        for n, top in indexed.orders.items()
-        if k < top and n not in follow
-    )
-    highest = {derivative_name(n, top): chains.sx(n, top) for n, top in indexed.orders.items()}
-    last = {(i, c): indexed.residuals[i, c] for i, c in enumerate(indexed.counts)}
-    guide = Guide(dae.start, dae.table.values, states)
-    for block in dae.blocks:
-        if not highest.keys() & set(block.unknowns):
-            block.enter(guide)
-    blocks = solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
+    chains, given = dae.reduced.chains, dependents(dae)
+    states = _states(dae, {name for _, name in given})
+    highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
+    last = {(i, c): dae.indexed.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
+    blocks = _highest_blocks(dae, states, last, highest)
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
-    numbers = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
-    definitions = [*numbers, *((chains.named(n), e) for n, e in known.items())]
+    definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
+    definitions += [(chains.named(n), e) for n, e in known.items()]
     definitions += definitions_of(dae, given)
+    definitions += [pair for block in blocks for pair in block.definitions]
     implicit = [b for b in blocks if b.solution is None]
-    for block in blocks:
-        definitions += block.definitions
-    ode = (
-        ca.vertcat(*(chains.sx(base, k + 1) for base, k in map(split_derivative, states)))
-        if states
-        else ca.SX(0, 1)
-    )
-    algebraic = ca.vertcat(*(r for b in implicit for r in b.residuals)) if implicit else ca.SX(0, 1)
-    invariants, rows = _invariants(dae, {i for i, _ in given})
-    tops = ca.vertcat(*highest.values()) if highest else ca.SX(0, 1)
-    pivots = ca.jacobian(ca.vertcat(*last.values()), tops) if last else ca.SX(0, 0)
-    v, e = [s for s, _ in definitions], [d for _, d in definitions]
+    tears = [y for b in implicit for y in b.tears]
     matrices = [
         ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears))
         for b in blocks
         if len(b.unknowns) > 1 and b.tears
     ]
-    residual = dae.table.reduce(ca.vertcat(*(e.residual for e in dae.redundant)))
-    dropped = dae.reduced.written(residual) if dae.redundant else ca.SX(0, 1)
-    wanted = [ode, algebraic, ca.densify(pivots), *matrices, *invariants, dropped]
-    _, found = ca.substitute_inplace(v, e, wanted, False)
+    levels, rows = _invariants(dae, {i for i, _ in given})
+    left_out = dae.table.reduce(_column([e.residual for e in dae.redundant]))
+    wanted = [
+        _column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
+        _column([r for b in implicit for r in b.residuals]),
+        ca.densify(ca.jacobian(_column(list(last.values())), _column(list(highest.values())))),
+        dae.reduced.written(left_out),
+        *matrices,
+        *levels,
+    ]
+    symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
+    _, (ode, algebraic, pivots, dropped, *rest) = ca.substitute_inplace(symbols, values, wanted, False)
+    matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
-    divisors = [found[2][row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
-    x = ca.vertcat(*(chains.named(n) for n in states)) if states else ca.SX(0, 1)
-    tears = [y for b in implicit for y in b.tears]
-    z = ca.vertcat(*tears) if tears else ca.SX(0, 1)
+    divisors = [pivots[row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
+    x, z = _column([chains.named(n) for n in states]), _column(tears)
+    constraints = _constraints(dae, invariants, states)
     return Coordinates(
         dae=dae,
         states=states,
@@ -78,21 +66,42 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         z=z,
         w=w,
         t0=t0,
-        ode=found[0],
-        algebraic=found[1],
-        invariants=tuple(found[3 + len(matrices) : -1]),
+        ode=ode,
+        algebraic=algebraic,
+        invariants=tuple(invariants),
         rows=tuple(rows),
         known=known,
         definitions=tuple(definitions),
-        pivots=found[2],
-        dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(found[-1])], {"cse": True}),
-        conditioning=Conditioning(
-            *_constraints(dae, found[3 + len(matrices) : -1], states),
-            divisors,
-            found[3 : 3 + len(matrices)],
-            [x, z, time, t0, w],
-        ),
+        pivots=pivots,
+        dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
+        conditioning=Conditioning(*constraints, divisors, matrices, [x, z, time, t0, w]),
     )
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+
+def _states(dae: Dae, follow: Collection[str]) -> tuple[str, ...]:
+    """Every derivative below the highest of the variables that do not follow from others."""
+    orders = dae.indexed.orders
+    return tuple(
+        derivative_name(n, k)
+        for k in range(max(orders.values(), default=0))
+        for n, top in orders.items()
+        if k < top and n not in follow
+    )
+
+
+def _highest_blocks(
+    dae: Dae, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
+) -> list[Block]:
+    """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
+    guide = Guide(dae.start, dae.table.values, states)
+    for block in dae.blocks:
+        if not highest.keys() & set(block.unknowns):
+            block.enter(guide)
+    return solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
 
 
 def _constraints(dae: Dae, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
