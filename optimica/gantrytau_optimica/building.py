@@ -1,7 +1,8 @@
 """From a problem in the model's symbols to a control problem in states, algebraics and inputs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -9,13 +10,14 @@ import numpy as np
 
 from gantrytau import Dae, ModelError
 from gantrytau.flat_model import FlatVariable
-from gantrytau.symbols import time
+from gantrytau.symbols import split_derivative, time
 from gantrytau.system import System
-from gantrytau_optimica.guesses import first_guesses, typical_size
+from gantrytau_optimica.conditions import link_conditions, start_conditions, with_targets
+from gantrytau_optimica.guesses import first_guesses, number_guess, typical_size
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint, ReadProblem
-from gantrytau_optimica.records import ControlProblem, FreeNumber, PointValue, Signal
-from gantrytau_optimica.sorting import check_symbols, limit_rows, signal_limits, sorted_limits
+from gantrytau_optimica.records import ControlProblem, Course, FreeNumber, Phase, Pieces, PointValue, Signal
+from gantrytau_optimica.sorting import check_symbols, limit_rows, signal_limits, with_limits
 from gantrytau_optimica.wording import algebraic_words
 
 
@@ -29,94 +31,192 @@ class Built:
     numbers: Mapping[str, float]  # parameters that are neither free nor held
     points: tuple[Point, ...]
     constraints: tuple[Constraint, ...]
+    closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
+
+    def expressed(self, names: Sequence[str]) -> ca.SX:
+        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem."""
+        found = self.system.resolve([self.read.dae.expression(name) for name in names])
+        return ca.vertcat(ca.SX(0, 1), *known(found, self.read, self.numbers))
 
 
-def build(read: ReadProblem, guess: Mapping[str, Any], held: Sequence[str] = ()) -> Built:
-    """Bring a problem into the form that is transcribed; `held`: parameters that stay symbols, scalars.
+def build(
+    read: ReadProblem,
+    guess: Mapping[str, Any],
+    held: Sequence[str] = (),
+    controls: Mapping[str, Pieces] | None = None,
+) -> Built:
+    """Bring a problem into the form that is transcribed.
 
-    Raises ModelError where it cannot be brought into that form.
+    held: scalar parameters that stay symbols; controls: how inputs are made, by scalar name. Raises ModelError where
+    it cannot be brought into that form.
     """
     dae = read.dae
     system = dae.system("lifted")
-    numbers_chosen = _free_numbers(dae, guess, held)
-    open_names = {n.name for n in numbers_chosen}
+    chosen = _free_numbers(dae, guess, held)
+    open_names = {n.name for n in chosen}
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in open_names}
-    more_points, more = _start_conditions(dae)
-    points = (*read.points, *more_points)
-    constraints = (*read.constraints, *more)
+    conditions = (start_conditions(dae), link_conditions(read))
+    points = (*read.points, *(p for more, _ in conditions for p in more))
+    constraints = (*read.constraints, *(c for _, more in conditions for c in more))
     limits = (*constraints, *_declared_limits(dae))
-    expressions = [
-        *(read.objective, read.integrand, read.start_time, read.final_time),
-        *(p.expression for p in points),
-        *(p.time for p in points if not isinstance(p.time, str)),
-        *(e for c in limits for e in (c.expression, c.lower, c.upper)),
+
+    def resolve(expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        return known(system.express([ca.SX(e) for e in expressions]), read, numbers)
+
+    rows = resolve([e for c in limits for e in (c.expression, c.lower, c.upper)])
+    values = resolve([p.expression for p in points])
+    times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
+    objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
+    ode, residuals = known([system.ode, system.residuals], read, numbers)
+    split = _Split(read, system, ode, residuals, dict(controls or {}))
+    phases = []
+    for k, stage in enumerate(read.phases):
+        integrand, start_time, final_time = resolve([stage.integrand, stage.start_time, stage.final_time])
+        mine = [i for i, p in enumerate(points) if read.phase_of(p.expression, f"`{p.symbol}`") == k]
+        phase = replace(
+            split.phase(k),
+            start_time=start_time,
+            final_time=final_time,
+            integrand=integrand,
+            points=tuple(PointValue(points[i].symbol, values[i], times[i]) for i in mine),
+        )
+        phases.append(with_targets(read, k, phase, targets, objective))
+    integrated = [t.symbol for t in read.targets if t.integrated]
+    if integrated:
+        objective = ca.substitute(objective, ca.vertcat(*integrated), ca.SX.zeros(len(integrated), 1))
+    draft = ControlProblem(read.name, time, tuple(phases), chosen, objective, ())
+    found = iter(rows)
+    sorted_rows = [
+        row for c in limits for row in limit_rows(c, next(found), next(found), next(found), read.name)
     ]
-    found = iter(_numbered(system.express([ca.SX(e) for e in expressions]), dae, numbers))
-    objective, integrand, start_time, final_time = (next(found) for _ in range(4))
-    values = [next(found) for _ in points]
-    times = [p.time if isinstance(p.time, str) else next(found) for p in points]
-    rows = [row for c in limits for row in limit_rows(c, next(found), next(found), next(found), read.name)]
-    ode, residuals = _numbered([system.ode, system.residuals], dae, numbers)
-    words = algebraic_words(dae)
-    draft = ControlProblem(
-        time=time,
-        start_time=start_time,
-        final_time=final_time,
-        states=_signals(system.states, system.x.elements()),
-        algebraics=tuple(
-            Signal(a.name, a.symbol, a.min, np.inf, 1.0, np.zeros_like, words.get(a.name, ("", a.name))[1])
-            for a in system.algebraics
-        ),
-        inputs=_signals(system.inputs, system.u.elements()),
-        free=numbers_chosen,
-        ode=ode,
-        residuals=residuals,
-        residual_names=tuple(
-            words.get(a.name, (f"the equation of {a.name}", ""))[0] for a in system.algebraics
-        ),
-        integrand=integrand,
-        objective=objective,
-        path_limits=(),
-        boundary=(),
-        points=tuple(PointValue(p.symbol, v, t) for p, v, t in zip(points, values, times, strict=True)),
-    )
-    path, boundary = sorted_limits(draft, rows, read.name)
-    draft = replace(draft, path_limits=path, boundary=boundary)
+    draft = with_limits(draft, sorted_rows)
     check_symbols(draft, read.name)
-    built = Built(read, draft, system, numbers, points, constraints)
-    return replace(built, problem=_with_sizes(with_guesses(built, guess), read.name))
+    names = [a.name for a in system.algebraics if a.closed is not None]
+    forms = known([a.closed for a in system.algebraics if a.closed is not None], read, {})
+    built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
+    return replace(built, problem=_with_sizes(with_guesses(built, guess)))
 
 
 def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
     """The control problem with first guesses along its free and held numbers as they are."""
-    draft = built.problem
-    guesses = first_guesses(
-        built.read, draft, built.system, built.numbers, built.points, built.constraints, guess
-    )
-
-    def done(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
-        return tuple(replace(s, guess=guesses[s.name]) for s in signals)
-
-    return replace(
-        draft, states=done(draft.states), algebraics=done(draft.algebraics), inputs=done(draft.inputs)
-    )
+    guesses = first_guesses(built, guess)
+    return _changed(built.problem, lambda phase, signal: replace(signal, guess=guesses[signal.name]))
 
 
-def _with_sizes(draft: ControlProblem, name: str) -> ControlProblem:
-    bounds = signal_limits(draft, name)
-
-    def done(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
-        return tuple(replace(s, nominal=typical_size(s.guess, bounds[s.name])) for s in signals)
-
-    return replace(
-        draft, states=done(draft.states), algebraics=done(draft.algebraics), inputs=done(draft.inputs)
+def _with_sizes(draft: ControlProblem) -> ControlProblem:
+    bounds = {name: ends for phase in draft.phases for name, ends in signal_limits(phase, draft.name).items()}
+    return _changed(
+        draft, lambda phase, signal: replace(signal, nominal=typical_size(signal, bounds[signal.name]))
     )
 
 
-def _signals(names: Sequence[str], symbols: Sequence[ca.SX]) -> tuple[Signal, ...]:
-    return tuple(
-        Signal(n, s, -np.inf, np.inf, 1.0, np.zeros_like) for n, s in zip(names, symbols, strict=True)
-    )
+def _changed(draft: ControlProblem, change: Callable[[Phase, Signal], Signal]) -> ControlProblem:
+    """The problem with every signal changed."""
+    phases = []
+    for phase in draft.phases:
+        parts = (
+            tuple(change(phase, s) for s in part) for part in (phase.states, phase.algebraics, phase.inputs)
+        )
+        states, algebraics, inputs = parts
+        phases.append(replace(phase, states=states, algebraics=algebraics, inputs=inputs))
+    return replace(draft, phases=tuple(phases))
+
+
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """The system of equations split by phases."""
+
+    read: ReadProblem
+    system: System
+    ode: ca.SX
+    residuals: ca.SX
+    controls: dict[str, Pieces]
+
+    def phase(self, number: int) -> Phase:
+        """The dynamics of one phase; its times, costs and points are still missing."""
+        system, words = self.system, algebraic_words(self.read.dae)
+        nominal = {n: x for v in self.read.dae.flat.variables for n, x in _nominals(v, self.read.dae)}
+        states = [k for k, name in enumerate(system.states) if self._owner(name) == number]
+        algebraics = [k for k, a in enumerate(system.algebraics) if self._owner(a.name) == number]
+        inputs, courses = [], []
+        for name, symbol in zip(system.inputs, system.u.elements(), strict=True):
+            if self._owner(name) != number:
+                continue
+            course = self.read.courses.get(name)
+            if course is None:
+                pieces = self.controls.get(name, Pieces())
+                inputs.append(_signal(name, symbol, nominal.get(name, np.nan), pieces))
+            elif not isinstance(course, ca.SX):
+                samples, column = course
+                courses.append(
+                    Course(name, symbol, partial(samples.at, column=column), samples.jumps(column))
+                )
+        return Phase(
+            name=self.read.phases[number].name,
+            start_time=ca.SX(0),
+            final_time=ca.SX(1),
+            states=tuple(
+                _signal(system.states[k], system.x[k], nominal.get(system.states[k], np.nan)) for k in states
+            ),
+            algebraics=tuple(
+                replace(_signal(a.name, a.symbol), min=a.min, words=words.get(a.name, ("", a.name))[1])
+                for a in (system.algebraics[k] for k in algebraics)
+            ),
+            inputs=tuple(inputs),
+            courses=tuple(courses),
+            ode=self.ode[states] if states else ca.SX(0, 1),
+            residuals=self.residuals[algebraics] if algebraics else ca.SX(0, 1),
+            residual_names=tuple(
+                words.get(a.name, (f"the equation of {a.name}", ""))[0]
+                for a in (system.algebraics[k] for k in algebraics)
+            ),
+            integrand=ca.SX(0),
+        )
+
+    def _owner(self, name: str) -> int:
+        """Number of the phase of a variable, a derivative, or the square root in one."""
+        if len(self.read.phases) == 1:
+            return 0
+        while (bare := name.removeprefix("sqrt(").removeprefix("der(")) != name:
+            name = bare
+        return next(k for k, phase in enumerate(self.read.phases) if phase.owns(name))
+
+
+def _signal(name: str, symbol: ca.SX, nominal: float = np.nan, pieces: Pieces | None = None) -> Signal:
+    return Signal(name, symbol, -np.inf, np.inf, nominal, np.zeros_like, pieces=pieces or Pieces())
+
+
+def _nominals(variable: FlatVariable, dae: Dae) -> list[tuple[str, float]]:
+    """Declared typical sizes by scalar name."""
+    if variable.nominal is None:
+        return []
+    numbers = (abs(float(dae.table.number(x)[0])) for x in variable.nominal)
+    return [(n, x) for n, x in zip(variable.elements, numbers, strict=True) if x > 0]
+
+
+def known(expressions: list[ca.SX], read: ReadProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
+    """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
+    old = [read.dae.table.symbols[n] for n in numbers]
+    new = [ca.SX(x) for x in numbers.values()]
+    expressions = _with_courses(expressions, read)
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
+
+
+def _with_courses(expressions: list[ca.SX], read: ReadProblem) -> list[ca.SX]:
+    """Inputs and their derivatives replaced by courses that are expressions of time."""
+    courses = {name: course for name, course in read.courses.items() if isinstance(course, ca.SX)}
+    if not courses or not expressions:
+        return expressions
+    old, new = [], []
+    for leaf in ca.symvar(ca.vertcat(*(ca.vec(ca.densify(e)) for e in expressions))):
+        base, order = split_derivative(leaf.name())
+        if base in courses:
+            value = courses[base]
+            for _ in range(order):
+                value = ca.jacobian(value, time)
+            old.append(leaf)
+            new.append(ca.densify(value))
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
 
 
 def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tuple[FreeNumber, ...]:
@@ -138,48 +238,6 @@ def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tu
                 value = table.values[name]
                 found.append(FreeNumber(name, table.symbols[name], value, value, value, held=True))
     return tuple(found)
-
-
-def number_guess(name: str, guess: Mapping[str, Any], otherwise: float) -> float:
-    """The guess of a free number; ModelError if it is none."""
-    if name not in guess:
-        return otherwise
-    try:
-        value = float(np.asarray(guess[name], dtype=float).item())
-    except (TypeError, ValueError):
-        raise ModelError(f"guess {name}: found {guess[name]!r}, expected a number") from None
-    if not np.isfinite(value):
-        raise ModelError(f"guess {name}: found {value}, expected a finite number")
-    return value
-
-
-def _numbered(expressions: list[ca.SX], dae: Dae, numbers: Mapping[str, float]) -> list[ca.SX]:
-    """Parameters that are not free replaced by their numbers."""
-    if not numbers:
-        return expressions
-    symbols = ca.vertcat(*(dae.table.symbols[n] for n in numbers))
-    return ca.substitute(expressions, [symbols], [ca.SX(ca.DM(list(numbers.values())))])
-
-
-def _start_conditions(dae: Dae) -> tuple[list[Point], list[Constraint]]:
-    """Fixed starts and initial equations of the model, as conditions at the initial time."""
-    points: list[Point] = []
-    found: list[Constraint] = []
-    for variable in dae.flat.variables:
-        if not variable.fixed or variable.start is None:
-            continue
-        for name, symbol, value in zip(
-            variable.elements, variable.symbol.elements(), variable.start, strict=True
-        ):
-            points.append(Point(ca.SX.sym(f"initial({name})"), symbol, "initial"))
-            found.append(
-                Constraint(points[-1].symbol, value, value, f"initial({name}) == {value} (fixed start)")
-            )
-    for equation in dae.flat.initial_equations:
-        points.append(Point(ca.SX.sym(f"initial({equation.text})"), equation.residual, "initial"))
-        zero = ca.SX(0)
-        found.append(Constraint(points[-1].symbol, zero, zero, f"initial equation {equation.text}"))
-    return points, found
 
 
 def _declared_limits(dae: Dae) -> list[Constraint]:

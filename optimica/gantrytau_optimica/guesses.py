@@ -9,53 +9,66 @@ import numpy as np
 
 from gantrytau import Dae, ModelError, Result
 from gantrytau.symbols import derivative_name, split_derivative
-from gantrytau.system import System
 from gantrytau_optimica.optimization import Point
-from gantrytau_optimica.reading import Constraint, ReadProblem
-from gantrytau_optimica.records import ControlProblem
+from gantrytau_optimica.reading import Constraint
+from gantrytau_optimica.records import ControlProblem, Course, Phase, Signal
 
 if TYPE_CHECKING:
+    from gantrytau_optimica.building import Built
     from gantrytau_optimica.optimum import Optimum
 
 Guess = Callable[[np.ndarray], np.ndarray]
 RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
 
 
-def first_guesses(
-    read: ReadProblem,
-    draft: ControlProblem,
-    system: System,
-    numbers: Mapping[str, float],
-    points: Sequence[Point],
-    constraints: Sequence[Constraint],
-    given: Mapping[str, Any],
-) -> dict[str, Guess]:
-    """A function of fractions of the horizon (n,) for every signal of the control problem, by name."""
-    dae = read.dae
-    horizon = _horizon(draft)
-    own = _given(dae, given, horizon)
-    ends = _ends(dae, points, constraints, {n.name: n.guess for n in draft.free})
+def first_guesses(built: "Built", given: Mapping[str, Any]) -> dict[str, Guess]:
+    """A function of shares of the horizon (n,) for every signal of the control problem, by name."""
+    dae, problem = built.read.dae, built.problem
+    horizons = [horizon(problem, phase) for phase in problem.phases]
+    ends = _ends(dae, built.points, built.constraints, {n.name: n.guess for n in problem.free})
     found: dict[str, Guess] = {}
-    symbols: dict[str, Guess] = {}
-    for name, symbol in zip(system.states, system.x.elements(), strict=True):
-        key = symbol.name()
-        symbols[key] = found[name] = own.get(key) or _from_ends(dae, key, ends, horizon[1] - horizon[0])
-    for name, symbol in zip(system.inputs, system.u.elements(), strict=True):
-        key = symbol.name()
-        symbols[key] = found[name] = own.get(key) or _constant(dae.start.get(key, 0.0))
-    found.update(_algebraics(draft, system, numbers, symbols, own, horizon))
+    for phase, span in zip(problem.phases, horizons, strict=True):
+        own = _given(dae, given, span)
+        symbols: dict[str, Guess] = {}
+        for signal in phase.states:
+            key = signal.symbol.name()
+            symbols[key] = found[signal.name] = own.get(key) or _from_ends(dae, key, ends, span[1] - span[0])
+        for signal in phase.inputs:
+            key = signal.symbol.name()
+            symbols[key] = found[signal.name] = own.get(key) or _constant(dae.start.get(key, 0.0))
+        for course in phase.courses:
+            symbols[course.symbol.name()] = _course(course, span)
+        found.update(_algebraics(built, phase, symbols, own, span))
     return found
 
 
-def _horizon(draft: ControlProblem) -> tuple[float, float]:
-    numbers = ca.vertcat(*(n.symbol for n in draft.free)) if draft.free else ca.SX(0, 1)
-    evaluate = ca.Function("horizon", [numbers], [draft.start_time, draft.final_time])
-    start, stop = (float(x) for x in evaluate(ca.DM([n.guess for n in draft.free])))
+def horizon(problem: ControlProblem, phase: Phase) -> tuple[float, float]:
+    """Start and end of a phase in s by the guesses of the free numbers. Raises ModelError if they are not in order."""
+    evaluate = ca.Function("horizon", [problem.numbers], [phase.start_time, phase.final_time])
+    start, stop = (float(x) for x in evaluate(ca.DM([n.guess for n in problem.free])))
     if not start < stop:
+        where = f"{problem.name}.{phase.name}" if phase.name else problem.name
         raise ModelError(
-            f"start_time {start:g} s and final_time {stop:g} s, expected the first to be the smaller"
+            f"{where}: start_time {start:g} s and final_time {stop:g} s, expected the first to be the smaller"
         )
     return start, stop
+
+
+def _course(course: Course, span: tuple[float, float]) -> Guess:
+    return lambda share: course.value(span[0] + np.asarray(share) * (span[1] - span[0]))
+
+
+def number_guess(name: str, guess: Mapping[str, Any], otherwise: float) -> float:
+    """The guess of a free number; ModelError if it is none."""
+    if name not in guess:
+        return otherwise
+    try:
+        value = float(np.asarray(guess[name], dtype=float).item())
+    except (TypeError, ValueError):
+        raise ModelError(f"guess {name}: found {guess[name]!r}, expected a number") from None
+    if not np.isfinite(value):
+        raise ModelError(f"guess {name}: found {value}, expected a finite number")
+    return value
 
 
 def _constant(value: float) -> Guess:
@@ -199,25 +212,31 @@ LEAST_ROOT = (
 
 
 def _algebraics(
-    draft, system: System, numbers, symbols: Mapping[str, Guess], own, horizon
+    built: "Built",
+    phase: Phase,
+    symbols: Mapping[str, Guess],
+    own: Mapping[str, Guess],
+    span: tuple[float, float],
 ) -> dict[str, Guess]:
     """Algebraics from their closed forms along the guess of the rest, where they have one, one after another."""
-    dae = system.dae
-    known = [*(dae.table.symbols[n] for n in numbers), *(n.symbol for n in draft.free)]
-    values = ca.DM([*numbers.values(), *(n.guess for n in draft.free)])
-    leaves = [*system.x.elements(), *system.u.elements()]
+    dae, free = built.read.dae, built.problem.free
+    old = ca.vertcat(*(dae.table.symbols[n] for n in built.numbers), built.problem.numbers)
+    values = ca.DM([*built.numbers.values(), *(n.guess for n in free)])
+    leaves = [s.symbol for s in (*phase.states, *phase.inputs, *phase.courses)]
     signals = [symbols[s.name()] for s in leaves]
     found: dict[str, Guess] = {}
-    for algebraic in system.algebraics:
-        if algebraic.name in own:
-            guess = own[algebraic.name]
-        elif algebraic.closed is None:
+    for algebraic in phase.algebraics:
+        closed = built.closed.get(algebraic.name)
+        if algebraic.symbol.name() in own:
+            guess = own[algebraic.symbol.name()]
+        elif closed is None:
             guess = _constant(dae.start.get(algebraic.name, 1.0))
         else:
-            closed = algebraic.closed
-            closed = ca.substitute(closed, ca.vertcat(*known), values) if known else closed
-            function = ca.Function("closed", [draft.time, ca.vertcat(*leaves)], [ca.densify(closed)])
-            guess = _Closed(function, tuple(signals), horizon, root=algebraic.min == 0.0)
+            closed = ca.substitute(closed, old, values) if old.numel() else closed
+            function = ca.Function(
+                "closed", [built.problem.time, ca.vertcat(ca.SX(0, 1), *leaves)], [ca.densify(closed)]
+            )
+            guess = _Closed(function, tuple(signals), span, root=algebraic.min == 0.0)
         found[algebraic.name] = guess
         leaves.append(algebraic.symbol)
         signals.append(guess)
@@ -245,10 +264,12 @@ class _Closed:
         return found
 
 
-def typical_size(guess: Guess, bounds: tuple[float, float]) -> float:
-    """A typical magnitude from limits, else from the guess."""
+def typical_size(signal: Signal, bounds: tuple[float, float]) -> float:
+    """A typical magnitude: declared, else from limits, else from the guess."""
+    if np.isfinite(signal.nominal):
+        return signal.nominal
     finite = [abs(b) for b in bounds if np.isfinite(b) and b != 0.0]
-    size = max(finite) if finite else float(np.max(np.abs(guess(np.linspace(0.0, 1.0, 11)))))
+    size = max(finite) if finite else float(np.max(np.abs(signal.guess(np.linspace(0.0, 1.0, 11)))))
     return size if 1e-6 < size < 1e9 else 1.0
 
 

@@ -45,20 +45,23 @@ class Solution:
     solve_time: float
 
 
+@dataclass(frozen=True)
+class Policy:
+    """How long and how closely Ipopt is to look: tolerance, iterations, s, and who is told."""
+
+    tolerance: float = 1e-8
+    max_iterations: int = 1000
+    max_time: float = 300.0
+    progress: Progress | None = None
+
+
 class Solver:
     """Ipopt with exact derivatives for one program; may be called again with other numbers and guesses."""
 
-    def __init__(
-        self,
-        program: Program,
-        *,
-        tolerance: float,
-        max_iterations: int,
-        max_time: float,
-        progress: Progress | None,
-    ):
+    def __init__(self, program: Program, policy: Policy):
         assembled = program.assembled
-        self.watch = _Watch(assembled.variables, assembled.rows, progress)
+        self.policy = policy
+        self.watch = _Watch(assembled.variables, assembled.rows, policy.progress)
         options = {
             "iteration_callback": self.watch,
             "print_time": False,
@@ -68,9 +71,9 @@ class Solver:
                 "sb": "yes",
                 "mu_strategy": "adaptive",
                 "linear_solver": "mumps",
-                "tol": tolerance,
-                "max_iter": max_iterations,
-                "max_wall_time": max_time,
+                "tol": policy.tolerance,
+                "max_iter": policy.max_iterations,
+                "max_wall_time": policy.max_time,
             },
         }
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}

@@ -4,15 +4,17 @@ Optimica (Åkesson, 2008) as Python: a problem is a class; it is a model as well
 quantities and equations of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
 
 from gantrytau import Model, ModelError, Parameter
+from gantrytau_optimica.measurements import Samples
 
 
 class Free(Parameter):
@@ -52,11 +54,16 @@ class Optimization(Model):
                 yield final(self.cart.s) == 1
 
     given: the complete list of what stays known, as in `translate`; empty: the optimiser chooses all inputs.
+    inputs: courses of those that it does not choose, by name: numbers, functions of time, (times, values) or Samples.
+    A component that is an Optimization itself is a phase: it has a clock, objective and limits of its own, and this
+    problem may add an objective and conditions on values at times, `yield link(self.first, self.second)` among them.
+    A problem without derivatives and time is a static one: its signals have one value.
     """
 
     start_time: Any = 0.0
     final_time: Any = 1.0
     given: tuple[str, ...] = ()
+    inputs: Mapping[str, Any] = MappingProxyType({})
 
     def objective(self) -> Any:
         """What is minimised, of free numbers and of signals at times: `self.final_time`, `final(x)**2`."""
@@ -80,18 +87,92 @@ class Point:
     time: Any  # "initial", "final", a number, or an SX of free numbers
 
 
-_points: ContextVar[list[Point] | None] = ContextVar("points of the problem being read", default=None)
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A symbol that stands for a sum over samples, or for an integral, of the squared error of an expression (k,)."""
+
+    symbol: ca.SX
+    expression: ca.SX
+    samples: Samples
+    integrated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """The second phase begins where the first ends, but for the variables that jump."""
+
+    first: Optimization
+    second: Optimization
+    jump: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What the statements of a problem asked for while it was read."""
+
+    points: list[Point] = field(default_factory=list)
+    targets: list[Target] = field(default_factory=list)
+
+
+_asked: ContextVar[Asked | None] = ContextVar("what the problem being read asked for", default=None)
 
 
 @contextmanager
-def reading() -> Iterator[list[Point]]:
-    """While it lasts, `initial`, `final` and `at` record what they are asked for."""
-    points: list[Point] = []
-    token = _points.set(points)
+def reading() -> Iterator[Asked]:
+    """While it lasts, `initial`, `final`, `at` and the sums over samples record what they are asked for."""
+    asked = Asked()
+    token = _asked.set(asked)
     try:
-        yield points
+        yield asked
     finally:
-        _points.reset(token)
+        _asked.reset(token)
+
+
+def link(first: Optimization, second: Optimization, *, jump: Sequence[str] = ()) -> Link:
+    """`yield link(self.out, self.back)`: all states of the second phase begin where the first ends.
+
+    jump: names within the phase that do not, as "ball.v" after a contact. A free start time of the second phase
+    is the final time of the first.
+    """
+    for which in (first, second):
+        if not isinstance(which, Optimization):
+            raise ModelError(f"link: found {which!r}, expected two phases: components that are Optimizations")
+    if isinstance(jump, str):
+        raise ModelError(f"link: found jump='{jump}', expected a list of names; write ['{jump}']")
+    return Link(first, second, tuple(jump))
+
+
+def sum_of_squares(expression: Any, samples: Samples) -> ca.SX:
+    """For `objective`: the sum over all samples of ((expression at its time - value) / deviation)^2.
+
+    expression: (k,) signals, samples of k columns; the times need not lie on the mesh.
+    """
+    return _target("sum_of_squares", expression, samples, integrated=False)
+
+
+def integral_of_squares(expression: Any, samples: Samples) -> ca.SX:
+    """For `objective`: the integral over the horizon of ((expression - course) / deviation)^2, in s times its square.
+
+    The course between the samples is that of their kind, straight lines or steps; gaps are refused.
+    """
+    return _target("integral_of_squares", expression, samples, integrated=True)
+
+
+def _target(words: str, expression: Any, samples: Samples, integrated: bool) -> ca.SX:
+    asked = _asked.get()
+    if asked is None:
+        raise ModelError(f"{words} was used outside of an optimisation problem; use it in objective()")
+    if not isinstance(samples, Samples):
+        raise ModelError(f"{words}: found {samples!r}, expected Samples(times, values)")
+    expression = ca.vec(_signals(words, expression, asked.points))
+    if expression.numel() != samples.values.shape[1]:
+        raise ModelError(
+            f"{words}: found {expression.numel()} expressions and samples of {samples.values.shape[1]} columns, expected "
+            "as many"
+        )
+    symbol = ca.SX.sym(f"{words}({', '.join(str(e) for e in expression.elements())})")
+    asked.targets.append(Target(symbol, expression, samples, integrated))
+    return symbol
 
 
 def initial(expression: Any) -> ca.SX:
@@ -110,17 +191,17 @@ def at(time: Any, expression: Any) -> ca.SX:
 
 
 def _point(words: str, expression: Any, time: Any) -> ca.SX:
-    points = _points.get()
-    if points is None:
+    asked = _asked.get()
+    if asked is None:
         raise ModelError(
             f"{words} was used outside of an optimisation problem; use it in constraints() or objective()"
         )
-    expression = _signals(words, expression, points)
+    expression = _signals(words, expression, asked.points)
     names = [
         f"{words}({e})" if words in ("initial", "final") else f"{words} of {e}" for e in expression.elements()
     ]
     symbol = ca.reshape(ca.vertcat(*(ca.SX.sym(name) for name in names)), *expression.shape)
-    points.append(Point(ca.vec(symbol), ca.vec(expression), time))
+    asked.points.append(Point(ca.vec(symbol), ca.vec(expression), time))
     return symbol
 
 

@@ -3,25 +3,29 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
 from gantrytau.translation import names
-from gantrytau_optimica.building import Built, build, number_guess, with_guesses
-from gantrytau_optimica.guesses import guess_of
-from gantrytau_optimica.ipopt import Progress, Solver
+from gantrytau_optimica.building import Built, build, with_guesses
+from gantrytau_optimica.checking import static
+from gantrytau_optimica.controls import read_controls
+from gantrytau_optimica.guesses import guess_of, number_guess
+from gantrytau_optimica.ipopt import Policy, Progress, Solver
+from gantrytau_optimica.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.program import Program, transcribe
+from gantrytau_optimica.program import Program, check_freedom, transcribe
 from gantrytau_optimica.reach import out_of_reach, reach_text
 from gantrytau_optimica.reading import ReadProblem, read_problem
-from gantrytau_optimica.records import FreeNumber
+from gantrytau_optimica.records import FreeNumber, Phase
 from gantrytau_optimica.scheme import collocation
 
 Problem = Optimization | type[Optimization] | ReadProblem
 Guesses = Mapping[str, Any] | Result | Optimum
+ROUNDS = 5  # of solving again with points at moving times read from other elements
 
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
@@ -34,10 +38,12 @@ REMEDIES = {
 def optimize(
     problem: Problem,
     *,
-    elements: int = 50,
+    elements: int | Sequence[float] = 50,
     points: int = 3,
     scheme: str = "radau",
+    lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
+    controls: Mapping[str, Any] | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
     max_time: float = 300.0,
@@ -57,7 +63,9 @@ def optimize(
         elements=elements,
         points=points,
         scheme=scheme,
+        lengths=lengths,
         guess=guess,
+        controls=controls,
         tolerance=tolerance,
         max_iterations=max_iterations,
         max_time=max_time,
@@ -69,10 +77,12 @@ def prepare(
     problem: Problem,
     *,
     parameters: Sequence[str] = (),
-    elements: int = 50,
+    elements: int | Sequence[float] = 50,
     points: int = 3,
     scheme: str = "radau",
+    lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
+    controls: Mapping[str, Any] | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
     max_time: float = 300.0,
@@ -82,19 +92,21 @@ def prepare(
 
     The other keywords are those of `optimize`.
     """
-    _check(elements, tolerance, max_iterations, max_time, progress)
+    _check(tolerance, max_iterations, max_time, progress)
     grid = collocation(scheme, points)
+    mesh = mesh_of(elements, _free_lengths(lengths))
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     begin = time.perf_counter()
     guess = _guesses(guess, read)
     held = [n for name in names(parameters) for n in _parameter(read, name)]
-    built = build(read, guess, held)
-    program = transcribe(built.problem, np.linspace(0.0, 1.0, elements + 1), grid)
-    _check_freedom(read.name, program)
-    solver = Solver(
-        program, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time, progress=progress
-    )
-    return Prepared(built, program, solver, guess, time.perf_counter() - begin)
+    built = build(read, guess, held, read_controls(read, controls or {}))
+    if static(read.dae):
+        grid, mesh = collocation("radau", 1), mesh_of(1)
+    meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
+    program = transcribe(built.problem, meshes, grid)
+    check_freedom(program)
+    policy = Policy(tolerance, max_iterations, max_time, progress)
+    return Prepared(built, program, Solver(program, policy), guess, time.perf_counter() - begin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +120,8 @@ class Prepared:
     build_time: float
 
     def __repr__(self) -> str:
-        return f"<Prepared {self.built.read.name}: {self.program.places.size} unknowns, {len(self.program.rows)} conditions>"
+        size, rows = self.program.places.size, self.program.assembled.rows
+        return f"<Prepared {self.built.read.name}: {size} unknowns, {rows} conditions>"
 
     def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
@@ -130,6 +143,11 @@ class Prepared:
                 optimum=Optimum(read.name, built, program, unsolved, self.build_time),
             )
         solution = self.solver.solve(program, _first(program, built))
+        for _ in range(ROUNDS):
+            if not solution.success or not program.astray(solution.w):
+                break
+            program = _relocated(program, solution.w)
+            solution = Solver(program, self.solver.policy).solve(program, solution.w)
         optimum = Optimum(read.name, built, program, solution, self.build_time)
         if not solution.success:
             remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
@@ -160,9 +178,32 @@ class Prepared:
         return replace(number, guess=value, min=value, max=value)
 
 
-def _check(elements: Any, tolerance: Any, max_iterations: Any, max_time: Any, progress: Any) -> None:
-    if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
-        raise ModelError(f"elements={elements!r}: expected a whole number of at least 1")
+def _relocated(program: Program, w: np.ndarray) -> Program:
+    """The program with the points at moving times read from the elements in which they now lie."""
+    layouts = program.places.layouts
+    borders = [layout.placed(w).borders for layout in layouts]
+    located = (w[program.places.free], borders)
+    return transcribe(program.problem, [layout.mesh for layout in layouts], layouts[0].scheme, located)
+
+
+def _free_lengths(lengths: Any) -> bool:
+    if lengths not in ("given", "free"):
+        raise ModelError(
+            f"lengths={lengths!r}: expected 'given' or 'free' (the optimiser places the borders of the elements)"
+        )
+    return lengths == "free"
+
+
+def _with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
+    """The mesh with borders where a known input jumps."""
+    jumps = [course.jumps for course in phase.courses if course.jumps.size]
+    if not jumps or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
+        return mesh
+    start, final = float(phase.start_time), float(phase.final_time)
+    return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
+
+
+def _check(tolerance: Any, max_iterations: Any, max_time: Any, progress: Any) -> None:
     if not isinstance(tolerance, float) or not 0 < tolerance < 1:
         raise ModelError(f"tolerance={tolerance!r}: expected a number between 0 and 1")
     if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
@@ -194,32 +235,12 @@ def _parameter(read: ReadProblem, name: str) -> tuple[str, ...]:
 
 def _first(program: Program, built: Built) -> np.ndarray:
     """The guess as unknowns of the program, inside of their bounds."""
-    problem = built.problem
-    w = np.zeros(program.places.scale.size)
-    inside = (
-        program.places.mesh[:-1, None] + np.diff(program.places.mesh)[:, None] * program.places.scheme.points
-    )
-    for signals, table in (
-        (problem.states, program.places.states),
-        (problem.algebraics, program.places.algebraics),
-        (problem.inputs, program.places.inputs),
-    ):
-        for column, signal in enumerate(signals):
-            w[table[..., column]] = signal.guess(inside.ravel()).reshape(inside.shape)
-    for column, signal in enumerate(problem.states):
-        w[program.places.starts[:, column]] = signal.guess(program.places.mesh)
-    w[program.places.free] = [number.guess for number in problem.free]
-    return np.clip(w, program.lbw * program.places.scale, program.ubw * program.places.scale)
-
-
-def _check_freedom(name: str, program: Program) -> None:
-    equalities = int(np.sum(program.lbg == program.ubg))
-    fixed = int(np.sum(program.lbw == program.ubw))
-    unknowns = program.places.scale.size - fixed
-    if unknowns == 0:
-        raise ModelError(f"{name}: nothing is free; declare a Free number or an Input")
-    if equalities > unknowns:
-        raise ModelError(
-            f"{name}: {equalities} conditions for {unknowns} unknowns on this mesh, expected no more conditions than "
-            "unknowns; remove some at the ends or along the path, or free a number"
-        )
+    places = program.places
+    w = np.zeros(places.size)
+    w[places.free] = [number.guess for number in built.problem.free]
+    for layout, phase in zip(places.layouts, built.problem.phases, strict=True):
+        w[layout.knots] = layout.mesh.borders[list(layout.mesh.moving)]
+        for number, signal in enumerate(phase.signals):
+            mine = layout.of(number)
+            w[mine] = signal.guess(layout.moment[mine - layout.first])
+    return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)

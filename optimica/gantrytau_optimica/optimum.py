@@ -1,20 +1,22 @@
 """The answer of an optimisation, looked up by the model's own names."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from gantrytau import Dae, Result
+from gantrytau import Dae, ModelError, Result
+from gantrytau.symbols import split_derivative
 from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
 from gantrytau_optimica.ipopt import Solution
 from gantrytau_optimica.program import Program
 from gantrytau_optimica.reporting import report
-from gantrytau_optimica.scheme import interpolation
+from gantrytau_optimica.trajectory import Trajectory
+
+Signal = Callable[[Any], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,61 +71,86 @@ class Optimum:
     def _numbers(self) -> dict[str, float]:
         """Free and held numbers."""
         numbers = self.program.problem.free
-        return dict(
-            zip((n.name for n in numbers), self.solution.w[self.program.places.free].tolist(), strict=True)
-        )
+        values = self.solution.w[self.program.places.free].tolist()
+        return dict(zip((n.name for n in numbers), values, strict=True))
 
     @cached_property
-    def _horizon(self) -> tuple[float, float]:
-        problem = self.program.problem
-        numbers = ca.vertcat(*(n.symbol for n in problem.free)) if problem.free else ca.SX(0, 1)
-        evaluate = ca.Function("horizon", [numbers], [problem.start_time, problem.final_time])
-        start, stop = evaluate(ca.DM(list(self._numbers.values())))
-        return float(start), float(stop)
+    def phases(self) -> dict[str, Trajectory]:
+        """Horizon, times and signals of every phase by its name; "" where there is only one."""
+        problem, numbers = self.program.problem, np.array(list(self._numbers.values()))
+        return {
+            layout.phase.name: Trajectory(problem, layout, self.solution.w, numbers)
+            for layout in self.program.places.layouts
+        }
+
+    @property
+    def _only(self) -> Trajectory:
+        if len(self.phases) > 1:
+            names = ", ".join(f"'{name}'" for name in self.phases)
+            raise ModelError(
+                f"{self.name} has phases with times of their own; ask one of .phases[...]: {names}"
+            )
+        return next(iter(self.phases.values()))
 
     @property
     def start_time(self) -> float:
-        """Start of the horizon in s."""
-        return self._horizon[0]
+        """Start of the horizon in s; with phases, of the first."""
+        return next(iter(self.phases.values())).start_time
 
     @property
     def final_time(self) -> float:
-        """End of the horizon in s."""
-        return self._horizon[1]
+        """End of the horizon in s; with phases, of the last."""
+        return list(self.phases.values())[-1].final_time
 
-    @cached_property
+    @property
     def time(self) -> np.ndarray:
         """The start and all collocation points in s."""
-        mesh, points = self.program.places.mesh, self.program.places.scheme.points
-        inside = (mesh[:-1, None] + np.diff(mesh)[:, None] * points).ravel()
-        fractions = np.concatenate([[0.0], inside] if points[-1] == 1.0 else [[0.0], inside, [1.0]])
-        return self.start_time + (self.final_time - self.start_time) * fractions
+        return self._only.time
 
-    @cached_property
+    @property
     def breaks(self) -> np.ndarray:
         """Times in s at which inputs may jump: the borders between elements."""
-        return self.start_time + (self.final_time - self.start_time) * self.program.places.mesh[1:-1]
+        return self._only.breaks
 
-    @cached_property
+    def _phase(self, name: str) -> Trajectory:
+        """The phase of a variable."""
+        if len(self.phases) == 1:
+            return self._only
+        base = split_derivative(name)[0]
+        for path, phase in self.phases.items():
+            if base.startswith(f"{path}."):
+                return phase
+        return next(iter(self.phases.values()))  # a parameter is the same in all
+
+    @property
     def result(self) -> Result:
         """All variables of the model over `time`, to plot and save."""
-        names = list(self.dae.variables)
-        rows = self._values(names, self.time)
+        return self._results[self._only.phase.name]
+
+    @cached_property
+    def _results(self) -> dict[str, Result]:
         units, words = labels(self.dae)
-        return Result(
-            self.time, dict(zip(names, rows, strict=True)), units=units, descriptions=words, title=self.name
-        )
+        found = {}
+        for path, phase in self.phases.items():
+            names = [n for n in self.dae.variables if not path or n.startswith(f"{path}.")]
+            rows = self._values(names, phase, phase.time)
+            title = f"{self.name}.{path}" if path else self.name
+            found[path] = Result(
+                phase.time, dict(zip(names, rows, strict=True)), units=units, descriptions=words, title=title
+            )
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
         """All names that can be asked for."""
-        return (*self.result.names, *self.free)
+        return (*(n for result in self._results.values() for n in result.names), *self.free)
 
     def __repr__(self) -> str:
-        return f"<Optimum {self.name}: {self.status}, objective {self.objective:.8g}, {self.time.size} times>"
+        size = sum(phase.time.size for phase in self.phases.values())
+        return f"<Optimum {self.name}: {self.status}, objective {self.objective:.8g}, {size} times>"
 
     def __contains__(self, name: object) -> bool:
-        return name in self.free or name in self.result
+        return name in self.free or any(name in result for result in self._results.values())
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -131,33 +158,33 @@ class Optimum:
     def __getitem__(self, name: str) -> Any:
         if name in self.free:
             return self.free[name]
-        if name in self.result or name in self.dae.variables or name in self.dae.vectors:
-            return self.result[name]
         self.dae.expand(name)  # raises for unknown names
-        return self.signal(name)(self.time)
+        phase = self._phase(name)
+        result = self._results[phase.phase.name]
+        if name in result or name in self.dae.vectors:
+            return result[name]
+        return self.signal(name)(phase.time)
 
     def final(self, name: str) -> Any:
         """The value at the end of the horizon."""
         return self[name][-1]
 
     def integral(self, name: str) -> float:
-        """The integral of a variable over the horizon, by the quadrature of the collocation."""
-        mesh, scheme = self.program.places.mesh, self.program.places.scheme
-        span = self.final_time - self.start_time
-        fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * scheme.points
-        values = self.signal(name)(self.start_time + span * fractions.ravel()).reshape(fractions.shape)
-        return float(span * np.sum(np.diff(mesh)[:, None] * scheme.weights * values))
+        """The integral of a variable over its phase, by the quadrature of the collocation, in its unit times s."""
+        (name,) = self.dae.expand(name)
+        return float(self._phase(name).integral(self.built.expressed([name]))[0])
 
-    def signal(self, name: str):
+    def signal(self, name: str) -> Signal:
         """A variable or derivative as a vectorised function of time: (n,) -> (n,) or (n, k), from the polynomials
         of the solution; between the collocation points they need not keep to limits.
         """
         elements = self.dae.expand(name)
         whole = elements != (name,)
+        phase, expressions = self._phase(elements[0]), self.built.expressed(elements)
 
         def value(times: Any) -> np.ndarray:
             times = np.asarray(times, dtype=float)
-            rows = self._values(elements, np.atleast_1d(times))
+            rows = phase.values(expressions, np.atleast_1d(times))
             found = rows.T if whole else rows[0]
             return found if times.ndim else found[0]
 
@@ -173,41 +200,8 @@ class Optimum:
 
     def report(self) -> str:
         """How it ended, and what remains violated or binds, in the model's words."""
-        return report(self.name, self.program, self.solution, self._horizon)
+        return report(self.program, self.solution, list(self.phases.values()))
 
-    def _values(self, names: Sequence[str], times: np.ndarray) -> np.ndarray:
+    def _values(self, names: Sequence[str], phase: Trajectory, times: np.ndarray) -> np.ndarray:
         """Values (names, times) of scalars of the model."""
-        problem, system = self.program.problem, self.built.system
-        expressions = ca.vertcat(*(self.dae.expression(n) for n in names))
-        (found,) = system.resolve([expressions])
-        numbers = self.built.numbers
-        if numbers:
-            symbols = ca.vertcat(*(self.dae.table.symbols[n] for n in numbers))
-            found = ca.substitute(found, symbols, ca.DM(list(numbers.values())))
-        signals = ca.vertcat(*(s.symbol for s in problem.signals)) if problem.signals else ca.SX(0, 1)
-        free = ca.vertcat(*(n.symbol for n in problem.free)) if problem.free else ca.SX(0, 1)
-        function = ca.Function("values", [problem.time, signals, free], [ca.densify(found)])
-        p = np.tile(np.array(list(self._numbers.values()))[:, None], (1, times.size))
-        rows = np.array(function(times[None, :], self._signals(times), p))
-        return rows if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)
-
-    def _signals(self, times: np.ndarray) -> np.ndarray:
-        """States, algebraics and inputs at any times, from the polynomials of their elements."""
-        program, w = self.program, self.solution.w
-        span = self.final_time - self.start_time
-        fraction = np.clip((times - self.start_time) / span, 0.0, 1.0)
-        # a time on a border belongs to the element before it, where the limits hold at the last point
-        element = np.clip(
-            np.searchsorted(program.places.mesh, fraction - 1e-13, side="right") - 1,
-            0,
-            program.places.mesh.size - 2,
-        )
-        local = (fraction - program.places.mesh[element]) / np.diff(program.places.mesh)[element]
-        nodes = np.concatenate([program.places.starts[:-1, None, :], program.places.states], axis=1)
-        x = np.einsum("tj,tjs->st", interpolation(program.places.scheme.nodes, local), w[nodes][element])
-        weights = interpolation(program.places.scheme.points, local)
-        others = [
-            np.einsum("tj,tjs->st", weights, w[table][element])
-            for table in (program.places.algebraics, program.places.inputs)
-        ]
-        return np.vstack([x, *others])
+        return phase.values(self.built.expressed(names), times)

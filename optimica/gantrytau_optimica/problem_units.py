@@ -3,7 +3,7 @@
 Objective and integrand are not: a cost may add what is not alike, with weights of one that nobody writes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -30,16 +30,10 @@ class _Sides(Equation):
 
 
 def check_problem_units(
-    flat: FlatModel,
-    name: str,
-    constraints: Sequence["Constraint"],
-    points: Sequence[Point],
-    times: Sequence[ca.SX],
+    flat: FlatModel, constraints: Sequence["Constraint"], points: Sequence[Point], times: Mapping[str, ca.SX]
 ) -> None:
     """ModelError for terms or sides whose units disagree. A value at a time has the unit of its variable."""
-    pairs = [
-        (t, time, f"{name}.{which}") for t, which in zip(times, ("start_time", "final_time"), strict=True)
-    ]
+    pairs = [(value, time, place) for place, value in times.items()]
     for constraint in constraints:
         for bound in (constraint.lower, constraint.upper):
             if not bound.is_constant():

@@ -16,7 +16,7 @@ WORDS = {"initial": "start", "final": "end"}
 class OutOfReach:
     """An equation of the model without solution at an end that the problem demands."""
 
-    when: str  # "initial" or "final"
+    when: str  # "start" or "end", with the phase
     equation: str
     conditions: tuple[str, ...]
     missing: float  # how much its square falls short
@@ -28,7 +28,7 @@ def reach_text(lost: Sequence[OutOfReach]) -> str:
     for one in sorted(lost, key=lambda x: -x.missing):
         groups.setdefault((one.when, one.conditions), []).append(one)
     return "; ".join(
-        f"the {WORDS[when]} is out of reach: {', '.join(f'`{c}`' for c in conditions)} leave no solution of "
+        f"the {when} is out of reach: {', '.join(f'`{c}`' for c in conditions)} leave no solution of "
         + ", nor of ".join(f"{x.equation} (the square there would be {-x.missing:.4g})" for x in found)
         for (when, conditions), found in groups.items()
     )
@@ -36,15 +36,16 @@ def reach_text(lost: Sequence[OutOfReach]) -> str:
 
 def out_of_reach(built: Built) -> list[OutOfReach]:
     """Equations that have no solution where the conditions decide them."""
-    problem, system = built.problem, built.system
+    problem = built.problem
     held = {n.symbol.element_hash(): n.guess for n in problem.free if n.held}
     found: list[OutOfReach] = []
-    for when, states in known_states(problem).items():
+    for (number, when), states in known_states(problem).items():
+        phase = problem.phases[number]
         values = {h: (row.lower, row.name) for h, row in states.items()}
-        for k, algebraic in enumerate(system.algebraics):
-            if algebraic.closed is None or algebraic.min != 0.0:
+        for k, algebraic in enumerate(phase.algebraics):
+            if algebraic.name not in built.closed or algebraic.min != 0.0:
                 continue
-            radicand = ca.substitute(-problem.residuals[k], algebraic.symbol, 0)
+            radicand = ca.substitute(-phase.residuals[k], algebraic.symbol, 0)
             leaves = ca.symvar(radicand)
             if not all(leaf.element_hash() in values or leaf.element_hash() in held for leaf in leaves):
                 continue
@@ -56,6 +57,6 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
             )
             if value < -1e-9 * max(1.0, float(np.max(np.abs(numbers), initial=0.0)) ** 2):
                 names = tuple(values[h][1] for leaf in leaves if (h := leaf.element_hash()) in values)
-                equation = problem.residual_names[k].rstrip(",")
-                found.append(OutOfReach(when, equation, names, -value))
+                where = f"{WORDS[when]} of {phase.name}" if phase.name else WORDS[when]
+                found.append(OutOfReach(where, phase.residual_names[k].rstrip(","), names, -value))
     return found

@@ -1,21 +1,25 @@
 """Reads an optimisation problem: the model translated, objective and constraints in its symbols."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from functools import partial
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from gantrytau import Dae, ModelError
+from gantrytau import Dae, ModelError, Parameter
 from gantrytau.flat_model import FlatModel
 from gantrytau.flattening import write_out
 from gantrytau.functions import Between
-from gantrytau.instantiation import Instance, instantiate
-from gantrytau.symbols import split_derivative, time, writing
+from gantrytau.instantiation import Instance, Placed, instantiate
+from gantrytau.signals import read_signals
+from gantrytau.symbols import split_derivative, writing
 from gantrytau.translation import names, translate_flat
 from gantrytau.unit_checking import check_units
-from gantrytau_optimica.optimization import Free, Optimization, Point, initial, reading
+from gantrytau_optimica.checking import check_objective, check_spelling, check_times
+from gantrytau_optimica.measurements import Samples
+from gantrytau_optimica.optimization import Free, Link, Optimization, Point, Target, initial, reading
 from gantrytau_optimica.problem_units import check_problem_units
 from gantrytau_optimica.wording import relation_text, told
 
@@ -35,17 +39,56 @@ class Constraint:
 
 
 @dataclass(frozen=True, eq=False)
+class ReadPhase:
+    """A phase in the model's symbols; `name` is its path, "" where there is only one."""
+
+    name: str
+    integrand: ca.SX
+    start_time: ca.SX  # a number or an expression of free numbers
+    final_time: ca.SX
+
+    def owns(self, name: str) -> bool:
+        """Whether a variable belongs to this phase."""
+        return not self.name or name.startswith(f"{self.name}.")
+
+
+@dataclass(frozen=True, eq=False)
+class ReadLink:
+    """The paths of two phases of which the second begins where the first ends, and what jumps, with its path."""
+
+    first: str
+    second: str
+    jump: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class ReadProblem:
-    """A problem in the model's symbols. start_time, final_time: numbers or expressions of free numbers."""
+    """A problem in the model's symbols. courses: inputs that the optimiser does not choose, by scalar name."""
 
     name: str
     dae: Dae
     objective: ca.SX
-    integrand: ca.SX
+    phases: tuple[ReadPhase, ...]
     constraints: tuple[Constraint, ...]
+    links: tuple[ReadLink, ...]
     points: tuple[Point, ...]
-    start_time: ca.SX
-    final_time: ca.SX
+    targets: tuple[Target, ...]
+    courses: Mapping[str, ca.SX | tuple[Samples, int]]
+
+    def phase_of(self, expression: ca.SX, what: str) -> int:
+        """Number of the phase whose variables an expression holds. Raises ModelError if they are of several."""
+        if len(self.phases) == 1:
+            return 0
+        names = [split_derivative(leaf.name())[0] for leaf in ca.symvar(expression)]
+        found = {k for n in names for k, phase in enumerate(self.phases) if phase.owns(n)}
+        if len(found) != 1:
+            words = (
+                "belongs to no phase"
+                if not found
+                else "joins " + " and ".join(self.phases[k].name for k in sorted(found))
+            )
+            raise ModelError(f"{self.name}: {what} {words}, expected variables of one phase")
+        return found.pop()
 
 
 def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
@@ -61,22 +104,125 @@ def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
     name = type(root).__name__
     flat = write_out(instance)
     known = set(flat.derivatives)
-    _check_spelling(type(root))
-    with writing(instance.symbols), reading() as points:
-        objective = _scalar(f"{name}.objective", root.objective)
-        integrand = _scalar(f"{name}.integrand", root.integrand)
-        constraints = _constraints(name, root)
+    stages = _stages(name, instance)
+    for _, one in stages:
+        check_spelling(type(one))
+    with writing(instance.symbols), reading() as asked:
+        objective = sum(
+            (_scalar(_place(name, path, "objective"), one.objective) for path, one in stages), ca.SX(0)
+        )
+        found = [c for path, one in stages for c in _constraints(_place(name, path, "constraints"), one)]
         flat, starts = _free_starts(flat, instance)
-        times = [_time(f"{name}.{which}", getattr(root, which)) for which in ("start_time", "final_time")]
+        phases = tuple(_phase(name, path, one) for path, one in (stages[1:] or stages))
+        if stages[1:] and not _scalar(f"{name}.integrand", root.integrand).is_zero():
+            raise ModelError(
+                f"{name}.integrand: found an integrand beside phases, expected none; write it in the phases"
+            )
+    constraints = [*(c for c in found if isinstance(c, Constraint)), *starts]
     mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
-    check_problem_units(replace(flat, derivatives=derivatives), name, constraints, points, times)
-    dae = translate_flat(flat, given=names(root.given), find=mentioned)
-    read = ReadProblem(name, dae, objective, integrand, (*constraints, *starts), tuple(points), *times)
-    _check_objective(read)
-    _check_times(read)
+    times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
+    check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
+    dae = translate_flat(flat, given=_given(stages, flat), find=mentioned)
+    links = [
+        ReadLink(
+            instance.path(c.first),
+            instance.path(c.second),
+            tuple(f"{instance.path(c.second)}.{n}" for n in c.jump),
+        )
+        for c in found
+        if isinstance(c, Link)
+    ]
+    read = ReadProblem(
+        name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
+        _courses(name, stages, dae),
+    )  # fmt: skip
+    read = check_objective(read)
+    check_times(read)
     return read
+
+
+def _place(name: str, path: str, which: str) -> str:
+    return ".".join(part for part in (name, path, which) if part)
+
+
+def _stages(name: str, instance: Instance) -> list[tuple[str, Any]]:
+    """The problem itself and its phases, with their paths."""
+    inner = [(path, c) for path, c in instance.components if isinstance(c, Optimization) and path]
+    for path, _ in inner:
+        around = [p for p, _ in inner if path.startswith(f"{p}.")]
+        if around or "." in path:
+            raise ModelError(
+                f"{name}: the phase {path} lies inside of {around[0] if around else path.rsplit('.', 1)[0]}, expected "
+                "phases as components of the problem itself; move it there"
+            )
+    if inner:
+        lost = [
+            q.name
+            for q in instance.quantities
+            if _varies(q) and not any(q.name.startswith(f"{p}.") for p, _ in inner)
+        ]
+        if lost:
+            raise ModelError(
+                f"{name}: {lost[0]} belongs to no phase, expected variables in phases only; declare it in one"
+            )
+    return [("", instance.root), *inner]
+
+
+def _varies(placed: Placed) -> bool:
+    return not isinstance(placed.declaration, Parameter)
+
+
+def _phase(name: str, path: str, one: Any) -> ReadPhase:
+    integrand = _scalar(_place(name, path, "integrand"), one.integrand)
+    times = [_time(_place(name, path, which), getattr(one, which)) for which in ("start_time", "final_time")]
+    return ReadPhase(path, integrand, *times)
+
+
+def _given(stages: list[tuple[str, Any]], flat: FlatModel) -> tuple[str, ...]:
+    """What stays known in all phases; () if no phase says."""
+    if not any(names(one.given) for _, one in stages):
+        return ()
+    found = []
+    for path, one in stages:
+        own = [f"{path}.{n}" if path else n for n in names(one.given)]
+        if path and not own:  # its declared inputs, as where no `given` is
+            own = [n for n in flat.inputs if n.startswith(f"{path}.")]
+        found += own
+    return tuple(found)
+
+
+def _courses(name: str, stages: list[tuple[str, Any]], dae: Dae) -> dict[str, ca.SX | tuple[Samples, int]]:
+    """Known courses of inputs, as expressions of time or columns of samples."""
+    found: dict[str, ca.SX | tuple[Samples, int]] = {}
+    for path, one in stages:
+        if not isinstance(one.inputs, Mapping):
+            raise ModelError(
+                f"{_place(name, path, 'inputs')}: found {one.inputs!r}, expected {{name: course}}"
+            )
+        for given, value in one.inputs.items():
+            full = f"{path}.{given}" if path else given
+            elements = dae.expand(full)
+            for element in elements:
+                if element not in dae.inputs:
+                    raise ModelError(
+                        f"{name}: {element} is no input here, expected one of {', '.join(dae.inputs)}; take it out of "
+                        "`inputs`, or name it in `given`"
+                    )
+            if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
+                value = told(f"{name}, input {full}", partial(Samples, *value))
+            if isinstance(value, Samples):
+                if value.values.shape[1] != len(elements):
+                    raise ModelError(
+                        f"input {full}: found {value.values.shape[1]} columns, expected {len(elements)}"
+                    )
+                found.update((e, (value, k)) for k, e in enumerate(elements))
+            else:
+                found.update(
+                    {n: s for n, s in read_signals({full: value}, dae.expand).items() if isinstance(s, ca.SX)}
+                )
+    return found
 
 
 def _scalar(place: str, evaluate: Callable[[], Any]) -> ca.SX:
@@ -102,22 +248,21 @@ def _time(place: str, value: Any) -> ca.SX:
     return time
 
 
-def _constraints(name: str, root: Any) -> list[Constraint]:
-    found: list[Constraint] = []
-    statements = told(f"{name}.constraints", root.constraints)
+def _constraints(where: str, problem: Any) -> list[Constraint | Link]:
+    found: list[Constraint | Link] = []
+    statements = told(where, problem.constraints)
     if not isinstance(statements, Iterable) or isinstance(statements, (ca.SX, str)):
-        raise ModelError(
-            f"{name}.constraints: found {statements!r}, expected constraints; give each out with `yield`"
-        )
+        raise ModelError(f"{where}: found {statements!r}, expected constraints; give each out with `yield`")
+    where = where.removesuffix(".constraints")
     generator = iter(statements)
     end, number = object(), 0
     while True:
         number += 1
-        place = f"{name}, constraint {number}"
+        place = f"{where}, constraint {number}"
         statement = told(place, lambda: next(generator, end))
         if statement is end:
             return found
-        found += _constraint(place, statement)
+        found += [statement] if isinstance(statement, Link) else _constraint(place, statement)
 
 
 def _constraint(place: str, statement: Any) -> list[Constraint]:
@@ -166,40 +311,6 @@ def _limit(place: str, bound: Any, expression: ca.SX) -> ca.SX:
             f"{place}: a limit has shape {bound.shape}, the expression {expression.shape}; make them equal"
         )
     return bound
-
-
-def _check_objective(read: ReadProblem) -> None:
-    signals = set(read.dae.variables)
-    for leaf in ca.symvar(read.objective):
-        base, _ = split_derivative(leaf.name())
-        if base in signals or leaf.name() == time.name():
-            raise ModelError(
-                f"{read.name}.objective depends on {leaf.name()}, which changes over time; say at which time "
-                f"with final({leaf.name()}) or initial(...), or integrate it by returning it from integrand()"
-            )
-
-
-def _check_spelling(problem: type[Optimization]) -> None:
-    """A misspelt method would never be asked for."""
-    expected = ("objective", "integrand", "constraints", "equations", "initial_equations")
-    for name in dir(problem):
-        if name.startswith("_") or hasattr(Optimization, name) or not callable(getattr(problem, name)):
-            continue
-        close = get_close_matches(name, expected, n=1, cutoff=0.85)
-        if close:
-            raise ModelError(
-                f"{problem.__name__}.{name}: nothing asks for a method of this name; did you mean '{close[0]}'?"
-            )
-
-
-def _check_times(read: ReadProblem) -> None:
-    free = {n for p in read.dae.flat.parameters for n in p.elements}
-    for which, value in (("start_time", read.start_time), ("final_time", read.final_time)):
-        for leaf in ca.symvar(value):
-            if leaf.name() not in free:
-                raise ModelError(
-                    f"{read.name}.{which} depends on {leaf.name()}, expected a number or Free(...) and parameters"
-                )
 
 
 def _free_starts(flat: FlatModel, instance: Instance) -> tuple[FlatModel, list[Constraint]]:

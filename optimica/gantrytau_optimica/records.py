@@ -1,15 +1,36 @@
-"""An optimal-control problem as plain CasADi expressions: what the transcription consumes."""
+"""An optimal-control problem as plain CasADi expressions: what the transcription consumes.
+
+minimise    objective(points, free) + sum over phases of the integrals of their integrands
+subject to  x' = ode(t, x, z, u, free), 0 = residuals(t, x, z, u, free)        in every phase
+            lower <= path limits(t, x, z, u, free) <= upper                    in every phase
+            lower <= boundary(points, free) <= upper
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 
 
+@dataclass(frozen=True)
+class Pieces:
+    """How an input is made: free at every point, or constant or linear over groups of elements.
+
+    elements: in each group; max_step: largest change from one value to the next; step_penalty: weight of the
+    squares of these changes in the objective.
+    """
+
+    kind: Literal["free", "constant", "linear"] = "free"
+    elements: int = 1
+    max_step: float | None = None
+    step_penalty: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A scalar over time: symbol, limits, typical size, and guess as a function of times (n,) -> (n,)."""
+    """A scalar over time: symbol, limits, typical size, and guess as a function of shares of the horizon (n,) -> (n,)."""
 
     name: str
     symbol: ca.SX
@@ -18,6 +39,17 @@ class Signal:
     nominal: float
     guess: Callable[[np.ndarray], np.ndarray]
     words: str = ""  # what it is at a limit, where the name says nothing to the user
+    pieces: Pieces = Pieces()
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A symbol whose values are known: value(times (n,) in s) -> (n,); jumps: times in s at which it is not smooth."""
+
+    name: str
+    symbol: ca.SX
+    value: Callable[[np.ndarray], np.ndarray]
+    jumps: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +66,7 @@ class FreeNumber:
 
 @dataclass(frozen=True, eq=False)
 class PointValue:
-    """Symbols (k,) that stand for expressions (k,) of the signals at a time.
+    """Symbols (k,) that stand for expressions (k,) of the signals of a phase at a time.
 
     time: "initial", "final", or a number or expression of free numbers in s.
     """
@@ -42,6 +74,17 @@ class PointValue:
     symbol: ca.SX
     expression: ca.SX
     time: str | ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class SampleSum:
+    """`symbol` stands for the sum over samples of ((expression(t_k) - value_k) / deviation_k)^2."""
+
+    symbol: ca.SX
+    expression: ca.SX
+    times: np.ndarray
+    values: np.ndarray
+    deviations: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,29 +98,60 @@ class Limit:
 
 
 @dataclass(frozen=True, eq=False)
-class ControlProblem:
-    """Minimise objective + integral of integrand, subject to x' = ode and 0 = residuals, and to limits.
+class Phase:
+    """A stretch of time with equations, limits and a clock of its own; `name` is "" where there is only one.
 
-    ode, residuals: one row per state and algebraic, expressions of time, signals and free numbers.
+    ode, residuals: one row per state and algebraic, expressions of time, signals, courses and free numbers.
     """
 
-    time: ca.SX
+    name: str
     start_time: ca.SX
     final_time: ca.SX
     states: tuple[Signal, ...]
     algebraics: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
-    free: tuple[FreeNumber, ...]
+    courses: tuple[Course, ...]
     ode: ca.SX
     residuals: ca.SX
     residual_names: tuple[str, ...]
     integrand: ca.SX
-    objective: ca.SX
-    path_limits: tuple[Limit, ...]
-    boundary: tuple[Limit, ...]
-    points: tuple[PointValue, ...]
+    path_limits: tuple[Limit, ...] = ()
+    points: tuple[PointValue, ...] = ()
+    sums: tuple[SampleSum, ...] = ()
 
     @property
     def signals(self) -> tuple[Signal, ...]:
         """States, algebraics and inputs."""
         return (*self.states, *self.algebraics, *self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlProblem:
+    """Phases, the numbers they share, the objective beside the integrals, and conditions on points."""
+
+    name: str
+    time: ca.SX
+    phases: tuple[Phase, ...]
+    free: tuple[FreeNumber, ...]
+    objective: ca.SX
+    boundary: tuple[Limit, ...]
+
+    @property
+    def numbers(self) -> ca.SX:
+        """Symbols of the free numbers, (k,)."""
+        return ca.vertcat(ca.SX(0, 1), *(n.symbol for n in self.free))
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Signals of all phases."""
+        return tuple(s for phase in self.phases for s in phase.signals)
+
+    @property
+    def points(self) -> tuple[PointValue, ...]:
+        """Points of all phases."""
+        return tuple(p for phase in self.phases for p in phase.points)
+
+    @property
+    def sums(self) -> tuple[SampleSum, ...]:
+        """Sums over samples of all phases."""
+        return tuple(s for phase in self.phases for s in phase.sums)

@@ -1,9 +1,12 @@
 """How a solve ended, in the model's words: what is violated, what binds, and when."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gantrytau_optimica.ipopt import Solution
 from gantrytau_optimica.program import Program
+from gantrytau_optimica.trajectory import Trajectory
 
 MEANING = {
     "dynamics": "the motion of {}",
@@ -11,88 +14,88 @@ MEANING = {
     "continuity": "the continuity of {}",
     "path": "`{}`",
     "boundary": "`{}`",
+    "step": "the largest step of {}",
+    "border": "{}",
 }
+ORDER = ("boundary", "path", "step", "border", "continuity", "algebraic", "dynamics")
 
 
-def report(name: str, program: Program, solution: Solution, horizon: tuple[float, float]) -> str:
+def report(program: Program, solution: Solution, phases: Sequence[Trajectory]) -> str:
     """Status, worst violations with their times, and the limits that bind."""
+    horizon = ", ".join(
+        f"{'horizon' if not p.phase.name else p.phase.name} {p.start_time:.6g} to {p.final_time:.6g} s"
+        for p in phases
+    )
     lines = [
-        f"{name}: {solution.status} after {solution.iterations} iterations, objective {solution.objective:.8g}, "
-        f"horizon {horizon[0]:.6g} to {horizon[1]:.6g} s"
+        f"{program.problem.name}: {solution.status} after {solution.iterations} iterations, objective "
+        f"{solution.objective:.8g}, {horizon}"
     ]
-    violations = _violations(program, solution, horizon)
+    violations = _violations(program, solution, phases)
     if not solution.success and violations:
         lines.append("Not met:")
         lines += [f"  {line}" for line in violations[:8]]
-    binding = _binding(program, solution, horizon)
+    binding = [line for phase in phases for line in _binding(program, solution, phase)]
+    binding += _binding_numbers(program, solution)
     if binding:
         lines.append("At their limits:")
         lines += [f"  {line}" for line in binding[:12]]
     return "\n".join(lines)
 
 
-def _violations(program: Program, solution: Solution, horizon: tuple[float, float]) -> list[str]:
+def _violations(program: Program, solution: Solution, phases: Sequence[Trajectory]) -> list[str]:
+    """What is not met, conditions of the user first: what the model does to meet them says less."""
     g = solution.constraints
     amount = np.maximum(program.lbg - g, g - program.ubg)
     amount = np.where(np.isfinite(g), amount, np.inf)
-    worst: dict[tuple[str, str], tuple[float, float | None]] = {}
-    for k in np.flatnonzero(amount > 1e-6):
-        row = program.rows[k]
-        key = (row.kind, row.name)
-        if key not in worst or amount[k] > worst[key][0]:
-            worst[key] = (float(amount[k]), row.fraction)
     found = []
-    # conditions of the user first: what the model does to meet them says less
-    order = ("boundary", "path", "continuity", "algebraic", "dynamics")
-    for (kind, name), (size, fraction) in sorted(
-        worst.items(), key=lambda m: (order.index(m[0][0]), -m[1][0])
-    ):
-        when = "" if fraction is None else f" at t = {_at(fraction, horizon):.4g} s"
+    for group in program.groups:
+        mine = amount[group.rows]
+        worst = int(np.argmax(mine))
+        if mine[worst] <= 1e-6:
+            continue
+        size, moment = mine[worst] * group.size, group.moments[worst]
+        when = "" if np.isnan(moment) else f" at t = {phases[group.phase].times(moment):.4g} s"
         how = "is not finite" if np.isinf(size) else f"is off by {size:.3g}"
-        found.append(f"{MEANING[kind].format(name)} {how}{when}")
+        found.append(
+            (ORDER.index(group.kind), -size, f"{MEANING[group.kind].format(group.name)} {how}{when}")
+        )
+    return [text for _, _, text in sorted(found)]
+
+
+def _binding(program: Program, solution: Solution, trajectory: Trajectory) -> list[str]:
+    """Limits of one phase that are reached, with the intervals of time."""
+    found: list[str] = []
+    layout = trajectory.layout
+    times = trajectory.times(layout.fractions)
+    lower, upper = program.lbw * program.places.scale, program.ubw * program.places.scale
+    for number, signal in enumerate(trajectory.phase.signals):
+        places = layout.tracks[number].unknowns[:, -1] if number in layout.chains else layout.of(number)
+        moments = trajectory.times(trajectory.mesh.borders[1:]) if number in layout.chains else None
+        when = trajectory.times(layout.moment[places - layout.first]) if moments is None else moments
+        value = solution.w[places]
+        for word, bound in (("lower", lower[places]), ("upper", upper[places])):
+            reached = _reached(value, bound)
+            if np.any(reached):
+                found.append(
+                    f"{signal.words} {_intervals(reached, when)}"
+                    if signal.words and signal.words != signal.name
+                    else f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, when)}"
+                )
+    number = program.places.layouts.index(layout)
+    for group in program.groups:
+        if group.kind != "path" or group.phase != number:
+            continue
+        for word, bound in (("lower", group.lower), ("upper", group.upper)):
+            reached = _reached(solution.constraints[group.rows], np.full(group.rows.size, bound))
+            if np.any(reached):
+                found.append(f"`{group.name}` at its {word} limit {_intervals(reached, times)}")
     return found
 
 
-def _at(fraction: float, horizon: tuple[float, float]) -> float:
-    return horizon[0] + fraction * (horizon[1] - horizon[0])
-
-
-def _binding(program: Program, solution: Solution, horizon: tuple[float, float]) -> list[str]:
-    """Limits that are reached, with the intervals of time."""
-    found: list[str] = []
-    points = (
-        program.places.mesh[:-1, None] + np.diff(program.places.mesh)[:, None] * program.places.scheme.points
-    )
-    times = np.array([_at(f, horizon) for f in points.ravel()])
+def _binding_numbers(program: Program, solution: Solution) -> list[str]:
+    found = []
     lower, upper = program.lbw * program.places.scale, program.ubw * program.places.scale
-    problem = program.problem
-    for signals, table in (
-        (problem.states, program.places.states),
-        (problem.algebraics, program.places.algebraics),
-        (problem.inputs, program.places.inputs),
-    ):
-        for column, signal in enumerate(signals):
-            places = table[..., column].ravel()
-            value = solution.w[places]
-            for word, bound in (("lower", lower[places]), ("upper", upper[places])):
-                reached = _reached(value, bound)
-                if np.any(reached):
-                    found.append(
-                        f"{signal.words} {_intervals(reached, times)}"
-                        if signal.words and signal.words != signal.name
-                        else f"{signal.name} at its {word} limit {bound[reached][0]:.6g} {_intervals(reached, times)}"
-                    )
-    rows: dict[str, list[int]] = {}
-    for k, row in enumerate(program.rows):
-        if row.kind == "path":
-            rows.setdefault(row.name, []).append(k)
-    for name, places in rows.items():
-        g, low, high = solution.constraints[places], program.lbg[places], program.ubg[places]
-        for word, bound in (("lower", low), ("upper", high)):
-            reached = _reached(g, bound)
-            if np.any(reached):
-                found.append(f"`{name}` at its {word} limit {_intervals(reached, times)}")
-    for number, place in zip(problem.free, program.places.free, strict=True):
+    for number, place in zip(program.problem.free, program.places.free, strict=True):
         if number.held:
             continue
         for word, bound in (("lower", lower[place]), ("upper", upper[place])):

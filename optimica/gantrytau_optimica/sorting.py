@@ -1,12 +1,14 @@
 """Limits and conditions sorted: on the path or at a time, on one signal or on an expression, repeated or not."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.symbols import split_derivative
 from gantrytau_optimica.reading import Constraint
-from gantrytau_optimica.records import ControlProblem, Limit
+from gantrytau_optimica.records import ControlProblem, Limit, Phase
 
 
 def limit_rows(constraint: Constraint, expression: ca.SX, low: ca.SX, high: ca.SX, name: str) -> list[Limit]:
@@ -43,12 +45,12 @@ def _numeric(expression: ca.SX, low: float, high: float, text: str, name: str) -
     return Limit(expression, low, high, text)
 
 
-def signal_limits(problem: ControlProblem, name: str) -> dict[str, tuple[float, float]]:
+def signal_limits(phase: Phase, name: str) -> dict[str, tuple[float, float]]:
     """Limits of every signal, those that constraints put on it alone included. ModelError if they contradict."""
-    limits = {s.name: (s.min, s.max) for s in problem.signals}
+    limits = {s.name: (s.min, s.max) for s in phase.signals}
     who: dict[tuple[str, int], str] = {}
-    for limit in problem.path_limits:
-        found = bare_limit(limit, problem)
+    for limit in phase.path_limits:
+        found = bare_limit(limit, phase)
         if found is None:
             continue
         signal, *ends = found
@@ -66,13 +68,13 @@ def signal_limits(problem: ControlProblem, name: str) -> dict[str, tuple[float, 
     return limits
 
 
-def bare_limit(limit: Limit, problem: ControlProblem) -> tuple[str, float, float] | None:
+def bare_limit(limit: Limit, phase: Phase) -> tuple[str, float, float] | None:
     """(signal, lower, upper) where a path limit is one on a signal times a number, else None."""
     leaves = ca.symvar(limit.expression)
     if len(leaves) != 1:
         return None
     slope = ca.jacobian(limit.expression, leaves[0])
-    names = {s.symbol.element_hash(): s.name for s in problem.signals}
+    names = {s.symbol.element_hash(): s.name for s in phase.signals}
     if not slope.is_constant() or leaves[0].element_hash() not in names or float(slope) == 0.0:
         return None
     offset = float(ca.substitute(limit.expression, leaves[0], 0))
@@ -80,22 +82,34 @@ def bare_limit(limit: Limit, problem: ControlProblem) -> tuple[str, float, float
     return names[leaves[0].element_hash()], ends[0], ends[1]
 
 
-def sorted_limits(
-    draft: ControlProblem, rows: list[Limit], name: str
-) -> tuple[tuple[Limit, ...], tuple[Limit, ...]]:
-    """Limits on paths and conditions on points, told apart by the symbols in them."""
-    signals = {s.symbol.element_hash() for s in draft.signals} | {draft.time.element_hash()}
-    points = {e.element_hash() for p in draft.points for e in p.symbol.elements()}
-    path, boundary = [], []
+def with_limits(draft: ControlProblem, rows: list[Limit]) -> ControlProblem:
+    """The problem with limits on paths and conditions on points, told apart by the symbols in them."""
+    name = draft.name
+    owners = {
+        s.symbol.element_hash(): k
+        for k, phase in enumerate(draft.phases)
+        for s in (*phase.signals, *phase.courses)
+    }
+    time = draft.time.element_hash()
+    points = {e.element_hash() for p in (*draft.points, *draft.sums) for e in p.symbol.elements()}
+    path: list[list[Limit]] = [[] for _ in draft.phases]
+    boundary: list[Limit] = []
     for row in rows:
         leaves = {leaf.element_hash() for leaf in ca.symvar(row.expression)}
-        if leaves & signals and leaves & points:
+        phases = {owners[h] for h in leaves if h in owners}
+        running = bool(phases) or time in leaves
+        if running and leaves & points:
             raise ModelError(
                 f"{name}: `{row.name}` mixes a signal over the whole path with its value at one time; "
                 "introduce a Free number that equals the value at that time"
             )
-        if leaves & signals:
-            path.append(row)
+        if len(phases) > 1 or (running and not phases and len(draft.phases) > 1):
+            raise ModelError(
+                f"{name}: `{row.name}` joins signals of several phases over their whole paths, expected values at one time; "
+                "write final(...) of one phase and initial(...) of the next"
+            )
+        if running:
+            path[phases.pop() if phases else 0].append(row)
         elif leaves:
             boundary.append(row)
         elif not row.lower - 1e-9 <= float(row.expression) <= row.upper + 1e-9:
@@ -103,7 +117,22 @@ def sorted_limits(
             raise ModelError(
                 f"{name}: `{row.name}` can never hold, its value is always {value:g}; remove or correct it"
             )
-    return tuple(path), _independent(draft, boundary, name)
+    phases = tuple(replace(p, path_limits=tuple(mine)) for p, mine in zip(draft.phases, path, strict=True))
+    return replace(draft, phases=phases, boundary=_independent(draft, boundary, name))
+
+
+Moment = tuple[int, str]  # number of the phase, "initial" or "final"
+
+
+def _meanings(problem: ControlProblem) -> dict[int, tuple[Moment, ca.SX]]:
+    """Moment and expression of every symbol that stands for a value at an end, by hash."""
+    return {
+        s.element_hash(): ((k, p.time), e)
+        for k, phase in enumerate(problem.phases)
+        for p in phase.points
+        if isinstance(p.time, str)
+        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
+    }
 
 
 def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tuple[Limit, ...]:
@@ -112,21 +141,16 @@ def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tup
     On a path the whole position may be given where one coordinate decides it; such repetitions would
     make the derivatives of the conditions depend on each other.
     """
-    states = {s.symbol.element_hash() for s in draft.states}
-    meaning = {
-        s.element_hash(): (p.time, e)
-        for p in draft.points
-        if isinstance(p.time, str)
-        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
-    }
-    fixed: dict[str, dict[int, tuple[ca.SX, float]]] = {"initial": {}, "final": {}}
+    states = {s.symbol.element_hash() for phase in draft.phases for s in phase.states}
+    meaning = _meanings(draft)
+    fixed: dict[Moment, dict[int, tuple[ca.SX, float]]] = {}
     kept: list[Limit] = []
     for row in boundary:
-        when, value = meaning.get(row.expression.element_hash(), ("", row.expression))
-        if row.lower != row.upper or when not in fixed:
+        when, value = meaning.get(row.expression.element_hash(), (None, row.expression))
+        if row.lower != row.upper or when is None:
             kept.append(row)
             continue
-        known = fixed[when]
+        known = fixed.setdefault(when, {})
         leaves = ca.symvar(value)
         if all(leaf.element_hash() in known for leaf in leaves):
             pairs = [known[leaf.element_hash()] for leaf in leaves]
@@ -144,31 +168,29 @@ def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tup
     return tuple(kept)
 
 
-def known_states(problem: ControlProblem) -> dict[str, dict[int, Limit]]:
-    """Conditions that give a state a number at the start or at the end, by the hash of its symbol."""
-    states = {s.symbol.element_hash() for s in problem.states}
-    meaning = {
-        s.element_hash(): (p.time, e.element_hash())
-        for p in problem.points
-        if isinstance(p.time, str)
-        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
-    }
-    found: dict[str, dict[int, Limit]] = {"initial": {}, "final": {}}
+def known_states(problem: ControlProblem) -> dict[Moment, dict[int, Limit]]:
+    """Conditions that give a state a number at the start or at the end of a phase, by the hash of its symbol."""
+    states = {s.symbol.element_hash() for phase in problem.phases for s in phase.states}
+    meaning = _meanings(problem)
+    found: dict[Moment, dict[int, Limit]] = {}
     for row in problem.boundary:
-        when, value = meaning.get(row.expression.element_hash(), ("", 0))
-        if row.lower == row.upper and value in states:
-            found[when][value] = row
+        when, value = meaning.get(row.expression.element_hash(), (None, row.expression))
+        if when is not None and row.lower == row.upper and value.element_hash() in states:
+            found.setdefault(when, {})[value.element_hash()] = row
     return found
 
 
 def check_symbols(draft: ControlProblem, name: str) -> None:
     """ModelError for what the problem needs but neither the model nor the optimiser decides."""
     known = [draft.time, *(s.symbol for s in draft.signals), *(f.symbol for f in draft.free)]
-    known += [e for p in draft.points for e in p.symbol.elements()]
+    known += [c.symbol for phase in draft.phases for c in phase.courses]
+    known += [e for p in (*draft.points, *draft.sums) for e in p.symbol.elements()]
     nodes = {k.element_hash() for k in known}
     everything = ca.vertcat(
-        draft.ode, draft.residuals, draft.integrand, draft.objective, *(p.expression for p in draft.points),
-        *(limit.expression for limit in (*draft.path_limits, *draft.boundary)),
+        draft.objective, *(p.expression for p in (*draft.points, *draft.sums)),
+        *(e for phase in draft.phases for e in (phase.ode, phase.residuals, phase.integrand)),
+        *(limit.expression for phase in draft.phases for limit in phase.path_limits),
+        *(limit.expression for limit in draft.boundary),
     )  # fmt: skip
     for leaf in ca.symvar(everything):
         if leaf.element_hash() not in nodes:
