@@ -121,7 +121,7 @@ def test_a_prototype_in_doubt_says_so(run, tmp_path):
             "robots.py:number is a int, expected a model: a class that inherits from gantrytau.Model",
         ),
         ("", "robots.py holds several models (Cart, Misspelt,"),
-        (":Needy", "Needy needs mass, which the command line cannot give; write `model = Needy(...)`"),
+        (":Needy", "Needy needs mass; give numbers as 'Needy(mass=...)', and write all else in a file: "),
         (":robot(L1)", "robot is ready-made and takes no prototype; leave L1 out"),
     ],
 )
