@@ -14,7 +14,7 @@ from gantrytau.commands.reporting import CommandError, note
 from gantrytau.commands.settings import with_setting
 from gantrytau.commands.values import number, split
 from gantrytau.errors import ModelError
-from gantrytau.model import Model, check_member
+from gantrytau.model import Connector, Model, check_member
 
 FIRST_PROTOTYPE = "L1"
 
@@ -117,6 +117,20 @@ def library() -> dict[str, type[Model]]:
 
     found = {name: getattr(gantrytau_models, name) for name in gantrytau_models.__all__}
     return {name: value for name, value in found.items() if value in MODEL}
+
+
+def parts() -> dict[str, type[Model]]:
+    """Those models of the library that are no whole: they have connectors, or wait for a component of a subclass."""
+    return {name: found for name, found in library().items() if _is_part(found)}
+
+
+def _is_part(found: type[Model]) -> bool:
+    own = [cls for cls in found.__mro__ if issubclass(cls, Model) and cls is not Model]
+    awaited = {
+        name for cls in own for name in vars(cls).get("__annotations__", {}) if not hasattr(found, name)
+    }
+    connectors = (member for member in found.members().values() if isinstance(member, Connector))
+    return bool(awaited) or any(connectors)
 
 
 def prototype_names() -> tuple[str, ...]:
