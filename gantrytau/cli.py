@@ -6,9 +6,11 @@ from typing import Annotated, Any
 
 import typer
 
-from gantrytau.commands import check, equations, library, simulate
+from gantrytau.commands import check, equations, library, optimize, simulate
+from gantrytau.commands.reporting import Commands
 
 app = typer.Typer(
+    cls=Commands,
     help="Acausal models of parallel robots: simulate, optimise, calibrate, export.",
     no_args_is_help=True,
     add_completion=False,
@@ -94,6 +96,9 @@ app.command(epilog="Example: gantrytau check 'GantryTau(D1)'")(check.check)
 app.command(
     epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"
 )(simulate.simulate)
+app.command(
+    epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"
+)(optimize.optimize)
 app.command(
     epilog="Example: gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s"
 )(equations.equations)

@@ -4,7 +4,8 @@ from dataclasses import asdict
 
 import typer
 
-from gantrytau.commands.models import build, source_of
+from gantrytau.commands.choice import source_of
+from gantrytau.commands.models import build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.reporting import FAULT, as_json, busy, fail, reporting
 

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau.commands.models import Chosen, build, source_of
+from gantrytau.commands.choice import source_of
+from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, write_text
 

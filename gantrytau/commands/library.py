@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+from collections.abc import Mapping
 from typing import Any
 
 import typer
@@ -14,9 +15,11 @@ from gantrytau.model import Declared
 
 def library(json: Json = False) -> None:
     """List what the library holds: complete models, components to build your own, and measures of real robots."""
+    parts = models.parts()
+    whole = {name: found for name, found in models.library().items() if name not in parts}
     held = {
-        "models": {name: models.first_sentence(m.__doc__) for name, m in models.library().items()},
-        "components": components(),
+        "models": _explained(whole),
+        "components": {**components(), "gantrytau_models": _explained(parts)},
         "prototypes": models.sources(),
     }
     if json:
@@ -38,13 +41,17 @@ def components() -> dict[str, dict[str, str]]:
             continue
         module = importlib.import_module(info.name)
         classes = {
-            name: models.first_sentence(value.__doc__)
+            name: value
             for name, value in vars(module).items()
             if isinstance(value, type) and issubclass(value, Declared) and _belongs(name, value, module)
         }
         if classes:
-            found[info.name] = classes
+            found[info.name] = _explained(classes)
     return found
+
+
+def _explained(classes: Mapping[str, type]) -> dict[str, str]:
+    return {name: models.first_sentence(found.__doc__) for name, found in classes.items()}
 
 
 def _belongs(name: str, value: type, module: Any) -> bool:

@@ -1,48 +1,42 @@
 """From what stands on the command line to a model: found in the library or in a file, built, modified."""
 
-import difflib
-import importlib
-import importlib.util
 import inspect
-import re
-import sys
 import typing
 import warnings
 from collections.abc import Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from gantrytau.commands.reporting import CommandError, in_words, note, places
+from gantrytau.commands.choice import Choice, source_of
+from gantrytau.commands.loading import import_by_name, load, similar
+from gantrytau.commands.reporting import CommandError, note
 from gantrytau.commands.settings import with_setting
 from gantrytau.commands.values import number, split
-from gantrytau.errors import GantryTauError, did_you_mean
-from gantrytau.model import Model
+from gantrytau.errors import ModelError
+from gantrytau.model import Connector, Model, check_member
 
 FIRST_PROTOTYPE = "L1"
-_PYTHON = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
-_CALL = re.compile(r"(?P<name>.+?)\s*\(\s*(?P<argument>[\w.]*)\s*\)")
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What MODEL says: the class or instance by name, the file it is in, and the prototype in parentheses."""
+class Kind:
+    """What a command works on: classes that inherit from `base`, called `word`, as for example `example`."""
 
-    name: str
-    file: Path | None
-    prototype: str | None
+    base: type[Model]
+    word: str
+    example: str
 
-    @staticmethod
-    def read(text: str) -> "Choice":
-        """`Pendulum`, `GantryTau(D1)`, `package.module.Class`, `robot.py:Robot`, `robot.py`."""
-        call = _CALL.fullmatch(text.strip())
-        place, argument = (call["name"], call["argument"]) if call else (text.strip(), "")
-        found = _PYTHON.fullmatch(place)
-        file = Path(found["file"]).absolute() if found else None
-        name = (found["name"] or "") if found else place.removeprefix("gantrytau_models.")
-        return Choice(name.strip(), file, argument.removeprefix("prototypes.") or None)
+    def __contains__(self, value: Any) -> bool:
+        return isinstance(value, type) and issubclass(value, self.base) and value is not self.base
+
+    def __str__(self) -> str:
+        """What is expected, in words."""
+        package = self.base.__module__.partition(".")[0]
+        return f"a {self.word}: a class that inherits from {package}.{self.base.__name__}"
+
+
+MODEL = Kind(Model, "model", "robot.py:Robot")
 
 
 @dataclass(frozen=True)
@@ -58,26 +52,23 @@ class Chosen:
         return type(self.model).__name__
 
 
-def source_of(text: str) -> Path | None:
-    """The file of the user that MODEL names, if it names one."""
-    return Choice.read(text).file
-
-
-def build(text: str, prototype: str | None = None, settings: Sequence[str] = ()) -> Chosen:
+def build(
+    text: str, prototype: str | None = None, settings: Sequence[str] = (), kind: Kind = MODEL
+) -> Chosen:
     """The model that MODEL, `--prototype` and `--set` describe; CommandError with a remedy if there is none."""
     choice = Choice.read(text)
-    if prototype and choice.prototype and prototype != choice.prototype:
-        raise CommandError(
-            f"found the prototype {choice.prototype} in {text} and --prototype {prototype}; name one of them"
-        )
-    wanted = prototype or choice.prototype
-    found = _in_file(choice.file, choice.name) if choice.file else _in_library(choice.name)
+    wanted = _wanted(choice, text, prototype)
+    found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
     if isinstance(found, Model):
         if wanted:
             raise CommandError(f"{choice.name} is ready-made and takes no prototype; leave {wanted} out")
+        if choice.keywords:
+            raise CommandError(
+                f"{choice.name} is ready-made and takes no arguments; give --set {choice.keywords[0]} instead"
+            )
         chosen = Chosen(found, None)
     else:
-        chosen = _made(found, wanted)
+        chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
     for setting in settings:
         name, value = split("--set", setting)
@@ -85,12 +76,61 @@ def build(text: str, prototype: str | None = None, settings: Sequence[str] = ())
     return Chosen(model, chosen.prototype)
 
 
+def _wanted(choice: Choice, text: str, prototype: str | None) -> str | None:
+    """The prototype that is named, in parentheses or by `--prototype`."""
+    named = choice.prototypes
+    if len(named) > 1:
+        raise CommandError(f"{text}: found {', '.join(named)}, expected one prototype and NAME=VALUE")
+    if prototype and named and prototype != named[0]:
+        raise CommandError(
+            f"found the prototype {named[0]} in {text} and --prototype {prototype}; name one of them"
+        )
+    return prototype or (named[0] if named else None)
+
+
+def _keywords(found: type[Model], choice: Choice) -> dict[str, Any]:
+    """The keyword arguments in parentheses, checked against what the class takes."""
+    values: dict[str, Any] = {}
+    parameters = inspect.signature(found).parameters
+    open_end = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
+    for text in choice.keywords:
+        name, _, value = (part.strip() for part in text.partition("="))
+        where = f"{found.__name__}({text})"
+        if "." in name or "[" in name:
+            raise CommandError(f"{where}: what lies deeper is set by an option, --set {name}={value}")
+        if name not in parameters:
+            if not open_end:
+                raise CommandError(
+                    f"{where}: {found.__name__} takes no '{name}'{similar(name, [*parameters])}"
+                )
+            try:
+                check_member(found, name, found.__name__)
+            except ModelError as error:
+                raise CommandError(f"{where}: {error}") from error
+        values[name] = number(f"{found.__name__}:", name, value)
+    return values
+
+
 def library() -> dict[str, type[Model]]:
     """The models of the library by name."""
     import gantrytau_models
 
     found = {name: getattr(gantrytau_models, name) for name in gantrytau_models.__all__}
-    return {name: value for name, value in found.items() if _is_model(value)}
+    return {name: value for name, value in found.items() if value in MODEL}
+
+
+def parts() -> dict[str, type[Model]]:
+    """Those models of the library that are no whole: they have connectors, or wait for a component of a subclass."""
+    return {name: found for name, found in library().items() if _is_part(found)}
+
+
+def _is_part(found: type[Model]) -> bool:
+    own = [cls for cls in found.__mro__ if issubclass(cls, Model) and cls is not Model]
+    awaited = {
+        name for cls in own for name in vars(cls).get("__annotations__", {}) if not hasattr(found, name)
+    }
+    connectors = (member for member in found.members().values() if isinstance(member, Connector))
+    return bool(awaited) or any(connectors)
 
 
 def prototype_names() -> tuple[str, ...]:
@@ -105,90 +145,68 @@ def first_sentence(text: str | None) -> str:
     return inspect.cleandoc(text or "").partition("\n")[0]
 
 
-def _in_library(name: str) -> Any:
-    """The class of a name: a model of the library, or a class by its full name, `package.module.Class`."""
-    models = library()
+def _by_name(choice: Choice, kind: Kind) -> Any:
+    """The class of a name: a model of the library, or a class by its full name, `package.module:Class`."""
+    name, models = choice.name, library()
     if name in models:
-        return models[name]
+        return _checked(models[name], name, kind)
     path = Path(name.rpartition(":")[0] or name)
     if path.is_file() or len(path.parts) > 1:
-        raise CommandError(f"{name} is no Python file, expected one, as robot.py:Robot")
-    module, dot, last = name.rpartition(".")
-    try:
-        if dot and hasattr(found := importlib.import_module(module), last):
-            return _checked(getattr(found, last), name)
-    except (ImportError, ValueError):
-        pass
+        raise CommandError(f"{name} is no Python file, expected one, as {kind.example}")
+    module = import_by_name(choice.module, source_of(name)) if choice.module else None
+    last = name[len(choice.module) + 1 :]
+    if module is not None and hasattr(module, last):
+        return _checked(getattr(module, last), name, kind)
+    if kind is not MODEL:
+        raise CommandError(f"{name}: there is no {kind.word} of this name; name its file, as {kind.example}")
     raise CommandError(
-        f"{name}: the library has no model of this name{_similar(name, models)}\n"
-        "`gantrytau library` lists the models; one of your own is named by its file, as robot.py:Robot"
+        f"{name}: the library has no model of this name{similar(name, models)}\n"
+        f"`gantrytau library` lists the models; one of your own is named by its file, as {kind.example}"
     )
 
 
-def _in_file(file: Path, name: str) -> Any:
+def _in_file(file: Path, name: str, kind: Kind) -> Any:
     """The class or the instance of that name in a file; without a name, the only class in it."""
-    module = _load(file)
+    module = load(file)
     classes = {
         key: value
         for key, value in vars(module).items()
-        if _is_model(value) and value.__module__ == module.__name__
+        if value in kind and value.__module__ == module.__name__
     }
     if not name:
         if len(classes) == 1:
             return next(iter(classes.values()))
-        what = f"several models ({', '.join(classes)})" if classes else "no model class"
-        raise CommandError(
-            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(classes), 'Robot')}"
-        )
+        what = f"several {kind.word}s ({', '.join(classes)})" if classes else f"no {kind.word} class"
+        example = next(iter(classes), kind.example.rpartition(":")[2])
+        expected = "" if classes or kind is MODEL else f", expected {kind}"
+        raise CommandError(f"{file.name} holds {what}{expected}; name one, as {file.name}:{example}")
     if not hasattr(module, name):
-        raise CommandError(f"{file.name} has no class '{name}'{_similar(name, classes)}")
-    return _checked(getattr(module, name), f"{file.name}:{name}")
+        raise CommandError(f"{file.name} has no class '{name}'{similar(name, classes)}")
+    return _checked(getattr(module, name), f"{file.name}:{name}", kind)
 
 
-def _load(file: Path) -> ModuleType:
-    """The user's file as a module; what it prints goes to stderr, what fails in it is told with its lines."""
-    if not file.is_file():
-        there = sorted(path.name for path in file.parent.glob("*.py")) if file.parent.is_dir() else []
-        raise CommandError(f"{file}: there is no such file{_similar(file.name, there)}")
-    specification = importlib.util.spec_from_file_location(f"{file.stem}__model", file)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[module.__name__] = module
-    sys.path.insert(0, str(file.parent))  # the file may import its neighbours
-    try:
-        with redirect_stdout(sys.stderr):
-            specification.loader.exec_module(module)
-    except GantryTauError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise CommandError(f"{file.name} cannot be loaded. {in_words(error, places(error, file))}") from error
-    finally:
-        sys.path.remove(str(file.parent))
-    return module
-
-
-def _checked(found: Any, name: str) -> Any:
-    if _is_model(found) or isinstance(found, Model):
+def _checked(found: Any, name: str, kind: Kind) -> Any:
+    if found in kind or isinstance(found, kind.base):
         return found
-    kind = f"a class {found.__name__}" if isinstance(found, type) else f"a {type(found).__name__}"
-    raise CommandError(f"{name} is {kind}, expected a model: a class that inherits from gantrytau.Model")
+    what = f"a class {found.__name__}" if isinstance(found, type) else f"a {type(found).__name__}"
+    raise CommandError(f"{name} is {what}, expected {kind}")
 
 
-def _made(found: type[Model], wanted: str | None) -> Chosen:
+def _made(found: type[Model], wanted: str | None, keywords: dict[str, Any]) -> Chosen:
     """An instance of a model class, from a prototype if the class takes one."""
     needed, takes = _arguments(found)
     if wanted and not takes:
         raise CommandError(f"{found.__name__} takes no prototype; leave {wanted} out")
-    if others := [name for name in needed if name != "prototype"]:
+    if others := [name for name in needed if name != "prototype" and name not in keywords]:
         raise CommandError(
-            f"{found.__name__} needs {', '.join(others)}, which the command line cannot give; write "
-            f"`model = {found.__name__}(...)` in a file robot.py and name it as robot.py:model"
+            f"{found.__name__} needs {', '.join(others)}; give numbers as '{found.__name__}({others[0]}=...)', and write "
+            f"all else in a file: `model = {found.__name__}(...)` in robot.py is named as robot.py:model"
         )
     if wanted is None and "prototype" in needed:
         wanted = _first_prototype(found)
         note(f"{found.__name__} takes its measures from prototype {wanted}; choose another with --prototype")
-    return Chosen(found(_prototype(found, wanted)) if wanted else found(), wanted)  # pyright: ignore[reportArgumentType]
+    made: Any = found
+    return Chosen(made(_prototype(found, wanted), **keywords) if wanted else made(**keywords), wanted)
 
 
 def _arguments(found: type[Model]) -> tuple[list[str], bool]:
@@ -239,7 +257,7 @@ def _prototype(found: type[Model], name: str) -> Any:
 
     names, fitting = prototype_names(), _fitting(found)
     if name not in names:
-        raise CommandError(f"--prototype {name}: there is no such robot{_similar(name, names)}")
+        raise CommandError(f"--prototype {name}: there is no such robot{similar(name, names)}")
     if name not in fitting:
         raise CommandError(
             f"--prototype {name}: {found.__name__} cannot take the measures of this kind of robot, "
@@ -251,14 +269,3 @@ def _prototype(found: type[Model], name: str) -> Any:
     for warning in caught:
         note(f"Note: {warning.message}")
     return record
-
-
-def _is_model(value: Any) -> bool:
-    return isinstance(value, type) and issubclass(value, Model) and value is not Model
-
-
-def _similar(wrong: str, names: Sequence[str] | dict[str, Any]) -> str:
-    """The closest name, whatever its capitals, as a question; else all names."""
-    lower = {name.lower(): name for name in names}
-    close = difflib.get_close_matches(wrong.lower(), lower, n=1, cutoff=0.5)
-    return did_you_mean(lower[close[0]] if close else wrong, names)

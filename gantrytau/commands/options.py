@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -30,6 +31,22 @@ Settings = Annotated[
         help="Set a parameter (m=2.5, 'offset=[1,2,3]') or a start value (x.start=0.1). Repeatable.",
         show_default=False,
     ),
+]
+Plotted = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plot", metavar="NAMES", help="Draw these variables, separated by commas.", show_default=False
+    ),
+]
+To = Annotated[
+    str | None,
+    typer.Option(
+        "--to", help="Where to draw: a picture (.png, .pdf, .svg) or 'window'.", show_default="window"
+    ),
+]
+Saved = Annotated[
+    Path | None,
+    typer.Option(help="Save all variables: .csv, .nc, .mat (Dymola) or .parquet.", show_default=False),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]
 

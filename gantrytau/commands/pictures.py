@@ -11,7 +11,19 @@ if TYPE_CHECKING:
 WINDOW = "window"
 
 
-def rehearse(to: str) -> None:
+def place(drawn: tuple[str, ...], to: str | None) -> str | None:
+    """Where to draw, by default in a window, or None if nothing is drawn; CommandError if that cannot be."""
+    if to is not None and not drawn:
+        raise CommandError(
+            f"--to {to}: found no names to draw, expected some; add --plot NAMES, or leave it out"
+        )
+    if not drawn:
+        return None
+    _rehearse(to or WINDOW)
+    return to or WINDOW
+
+
+def _rehearse(to: str) -> None:
     """CommandError if there is no window to draw in, or no picture of that format or in that folder."""
     import matplotlib
 

@@ -1,14 +1,17 @@
 """How commands speak: results and errors as sentences or as JSON, exit codes, lines of the user's own file."""
 
+import errno
 import math
+import os
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from gantrytau.errors import GantryTauError
 
@@ -16,9 +19,36 @@ FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
 INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
+
 
 class CommandError(GantryTauError):
     """The command was called with something that it cannot use."""
+
+
+class Commands(TyperGroup):
+    """All commands; an output that takes no more, as a full disk, ends them with a message instead of a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command, and see to it that all it printed has arrived."""
+        try:
+            try:
+                return super().invoke(ctx)
+            finally:
+                if sys.stdout is not None:  # it may be closed
+                    sys.stdout.flush()
+        except OSError as error:
+            if error.filename is not None or error.errno not in FULL:
+                raise
+            _drop_output()
+            note(f"Cannot write: {error.strerror}; make room, or send the output to another place")
+            raise typer.Exit(MISUSE) from None
+
+
+def _drop_output() -> None:
+    """Let what is left in the buffer of stdout vanish; Python would complain of it at its end."""
+    with suppress(OSError, ValueError, AttributeError):  # stdout need not be a file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

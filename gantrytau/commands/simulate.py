@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from gantrytau.commands import pictures
-from gantrytau.commands.models import Chosen, build, source_of
-from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands import pictures, saving
+from gantrytau.commands.choice import source_of
+from gantrytau.commands.models import Chosen, build
+from gantrytau.commands.options import Json, ModelName, Plotted, PrototypeName, Saved, Settings, To, listed
 from gantrytau.commands.reporting import (
     FAULT,
     INTERRUPTED,
@@ -15,10 +16,9 @@ from gantrytau.commands.reporting import (
     busy,
     fail,
     reporting,
-    writable,
 )
 from gantrytau.commands.values import signal
-from gantrytau.errors import GantryTauError, SolveError
+from gantrytau.errors import SolveError
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
@@ -41,17 +41,9 @@ def simulate(
             show_default=False,
         ),
     ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(help="Save all variables: .csv, .nc, .mat (Dymola) or .parquet.", show_default=False),
-    ] = None,
-    plot: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAMES", help="Draw these variables, separated by commas.", show_default=False),
-    ] = None,
-    to: Annotated[
-        str, typer.Option(help="Where to draw: a picture (.png, .pdf, .svg) or 'window'.")
-    ] = "window",
+    output: Saved = None,
+    plot: Plotted = None,
+    to: To = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
     json: Json = False,
@@ -62,39 +54,22 @@ def simulate(
     """
     with reporting(json, source_of(model)):
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
-        _rehearse(output, to if drawn else None)
+        saving.rehearse(output)
+        place = pictures.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
         dae = _translated(chosen, drawn)
         try:
             result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
         except SolveError as error:
             _stop(error, output, json)
-        files = _save(result, output)
-        if drawn:
-            files += pictures.draw(result, drawn, to)
+        files = saving.save(result, output)
+        if place:
+            files += pictures.draw(result, drawn, place)
         summary = _summary(chosen, dae, result, files)
         if json:
             typer.echo(as_json(summary))
         else:
             _show(summary, dae, result)
-
-
-def _rehearse(output: Path | None, to: str | None) -> None:
-    """Find out before the work whether its result can be saved and drawn."""
-    from gantrytau.result import Result
-
-    if output is not None:
-        trial = output.with_name(f".{output.stem}.trial{output.suffix}")
-        with writable(output):
-            try:
-                Result([0.0], {"x": 0.0}).save(trial)
-            except GantryTauError as error:
-                raise type(error)(str(error).replace(str(trial), str(output))) from error
-            finally:
-                if trial.parent.is_dir():
-                    trial.unlink(missing_ok=True)
-    if to is not None:
-        pictures.rehearse(to)
 
 
 def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
@@ -120,19 +95,12 @@ def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     message = str(error).partition(";")[0] if pressed else str(error)
     files: list[str] = []
     if output is not None and error.result is not None:
-        files = _save(error.result, output)
+        files = saving.save(error.result, output)
         message += f"\nWhat was computed until then is in {output}"
     elif pressed:
         message += "; with --output its result would have been saved"
     code = INTERRUPTED if pressed else FAULT
     fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
-
-
-def _save(result: "Result", output: Path | None) -> list[str]:
-    if output is None:
-        return []
-    with writable(output):
-        return [str(result.save(output))]
 
 
 def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from gantrytau_optimica import optimize
 from gantrytau_optimica.reading import read_problem
 from tests.benchmarks import reference_collocation
 from tests.benchmarks.gta import Task
-from tests.benchmarks.pose_sweep import sweep
 from tests.benchmarks.table import Row, at_most, shown
 from tests.optimica import problems
 
@@ -36,11 +35,6 @@ def rows() -> Iterator[Row]:
         yield at_most(f"GT-A {title}, w = {weight:g}: |T - {expected:g} s|", error, allowed, "s")
     yield from _small_problems()
     yield from _against_peers(free)
-    verdicts = list(sweep(200, seed=0))
-    missed = sum(not verdict.success for verdict in verdicts)
-    yield at_most("pose pairs that do not converge, of 200", missed, 0)
-    median = statistics.median(verdict.seconds for verdict in verdicts)
-    yield shown("pose pairs, median time of one solve", f"{median:.3f} s")
 
 
 def _small_problems() -> Iterator[Row]:

@@ -2,9 +2,12 @@
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
+
+from rich.console import Console
+from rich.table import Table
 
 
 @dataclass(frozen=True)
@@ -42,3 +45,21 @@ def in_turn(programs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, fl
             program()
             times[name].append(time.perf_counter() - begin)
     return {name: statistics.median(found) for name, found in times.items()}
+
+
+def print_table(title: str, parts: Iterable[Iterable[Row]]) -> int:
+    """Measure and print all rows; 1 if a target is missed."""
+    table = Table(title=title)
+    for heading in ("figure", "measured", "target", "met"):
+        table.add_column(heading, justify="left" if heading == "figure" else "right")
+    missed = False
+    screen = Console()
+    with screen.status("measuring") as status:
+        for part in parts:
+            for row in part:
+                status.update(f"measured {row.figure}")
+                verdict = "" if row.met is None else "yes" if row.met else "NO"
+                table.add_row(row.figure, row.measured, row.target, verdict)
+                missed |= row.met is False
+    screen.print(table)
+    return int(missed)

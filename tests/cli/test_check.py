@@ -52,6 +52,22 @@ def test_a_file_may_import_its_neighbours(answer, tmp_path):
     assert answer("check", f"{file}:Long")["mobility"] == 1
 
 
+@pytest.mark.parametrize(
+    ("model", "prototype"),
+    [
+        ("GantryTau(D1, plate_mass=11)", "D1"),
+        ("GantryTau(plate_mass=11)", "L1"),
+        ("gantrytau_models:GantryTau(plate_mass=11, prototypes.D1)", "D1"),
+    ],
+)
+def test_a_prototype_stands_beside_other_arguments(answer, model, prototype):
+    assert answer("check", model)["prototype"] == prototype
+
+
+def test_a_number_is_no_component(fails):
+    assert "tool: found 2 as modification, expected a component" in fails(FAULT, "check", "GantryTau(tool=2)")
+
+
 def test_a_component_has_a_full_name(answer):
     assert answer("check", "gantrytau.mechanics.translational.Mass")["states"] == ["s", "v"]
 
@@ -121,7 +137,7 @@ def test_a_prototype_in_doubt_says_so(run, tmp_path):
             "robots.py:number is a int, expected a model: a class that inherits from gantrytau.Model",
         ),
         ("", "robots.py holds several models (Cart, Misspelt,"),
-        (":Needy", "Needy needs mass, which the command line cannot give; write `model = Needy(...)`"),
+        (":Needy", "Needy needs mass; give numbers as 'Needy(mass=...)', and write all else in a file: "),
         (":robot(L1)", "robot is ready-made and takes no prototype; leave L1 out"),
     ],
 )

@@ -10,7 +10,7 @@ from gantrytau_models import prototypes
 
 def test_the_library_lists_models_components_and_prototypes(answer):
     found = answer("library")
-    assert set(found["models"]) == set(gantrytau_models.__all__) - {"prototypes"}
+    assert set(found["models"]) == set(gantrytau_models.__all__) - {"prototypes", "SerialWrist", "WithWrist"}
     assert Prismatic.__doc__ is not None
     assert found["components"]["gantrytau.mechanics.multibody"]["Prismatic"] in Prismatic.__doc__
     assert found["prototypes"]["L1"] == prototypes.L1.source
@@ -21,6 +21,12 @@ def test_what_is_listed_explains_itself(answer):
     found = answer("library")
     groups = (found["models"], found["prototypes"], *found["components"].values())
     assert [name for group in groups for name, words in group.items() if not words] == []
+
+
+def test_parts_of_robots_are_no_models_of_their_own(answer):
+    found = answer("library")
+    assert "F1WithWrist" in found["models"]
+    assert set(found["components"]["gantrytau_models"]) == {"SerialWrist", "WithWrist"}
 
 
 def test_a_component_is_listed_where_it_is_at_home(answer):
@@ -35,7 +41,7 @@ def test_the_library_is_printed(run):
     assert "Components of gantrytau.mechanics.translational" in lines
 
 
-@pytest.mark.parametrize("command", ["check", "simulate", "equations", "library"])
+@pytest.mark.parametrize("command", ["check", "simulate", "optimize", "equations", "library"])
 def test_each_command_has_help_with_an_example(run, command):
     found = run(command, "--help")
     assert found.exit_code == 0

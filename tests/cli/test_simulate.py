@@ -48,6 +48,11 @@ def test_a_pushed_cart_goes_as_far_as_newton_says(run, answer, robots):
     ]
 
 
+def test_the_mass_may_stand_in_parentheses(answer, robots):
+    found = answer("simulate", f"{robots}:Cart(m=2)", "--input", "f=3", "--stop", "4")
+    assert found["final"]["v"] == pytest.approx(3 / 2 * 4, rel=1e-7)  # ten times the tolerance
+
+
 def test_names_and_units_are_not_taken_for_markup(run, robots):
     found = run("simulate", f"{robots}:Painted", "--stop", "1")
     assert found.exit_code == 0
@@ -142,6 +147,8 @@ def test_without_a_display_the_window_has_a_remedy(fails, monkeypatch):
     [
         (("--plot", "x", "--to", "picture.xyz"), "found the suffix '.xyz', expected 'window' or a picture"),
         (("--plot", "x", "--to", "no_such_folder/a.png"), "the folder 'no_such_folder' does not exist"),
+        (("--to", "a.png"), "--to a.png: found no names to draw, expected some; add --plot NAMES"),
+        (("--to", "window"), "--to window: found no names to draw"),
         (("--output", "result.cvs"), "result.cvs: found the suffix '.cvs'"),
         (("--output", "no_such_folder/a.csv"), "the folder 'no_such_folder' does not exist; create it"),
         (("--input", "f"), "--input f: expected NAME=VALUE, as --input m=2.5"),

@@ -1,0 +1,439 @@
+"""`gantrytau optimize`: problems in files of a user, answers, and what is kept of those that have none."""
+
+import csv
+import inspect
+import io
+import json
+import signal
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import gantrytau_optimica
+from gantrytau.commands.answers import in_options
+from gantrytau.commands.optimize import optimize
+
+FAULT, MISUSE, INTERRUPTED = 1, 2, 130
+
+PROBLEMS = '''\
+"""Problems of a user."""
+from gantrytau import Input, Model, Parameter, Real, der
+from gantrytau_optimica import Free, Optimization, final
+
+print("loading")
+
+class Cart(Model):
+    """A cart that is pushed."""
+
+    m = Parameter(1.0, unit="kg", description="mass")
+    x = Real(unit="m", start=0.0, fixed=True)
+    v = Real(2, unit="m/s", start=[0.0, 0.0], fixed=True)
+    f = Input(unit="N", min=-1.0, max=1.0)
+
+    def equations(self):
+        yield self.v[0] == der(self.x)
+        yield self.m * der(self.v[0]) == self.f
+        yield self.m * der(self.v[1]) == 0 * self.f
+
+class Fastest(Optimization):
+    """From rest to rest with a limited force."""
+
+    cart = Cart()
+    distance = Parameter(1.0, unit="m")
+    final_time = Free(1.5, unit="s", min=0.1, max=20.0, description="duration")
+
+    def objective(self):
+        return self.final_time
+
+    def constraints(self):
+        yield final(self.cart.x) == self.distance
+        yield final(self.cart.v[0]) == 0
+'''
+
+MORE = """
+class Impossible(Fastest):
+    final_time = Free(1.0, unit="s", min=0.1, max=1.5)
+
+class Divided(Fastest):
+    def objective(self):
+        return self.final_time / (1 // 0)
+
+class Misspelt(Fastest):
+    def objective(self):
+        return self.end_time
+
+class Needy(Fastest):
+    def __init__(self, way):
+        super().__init__(distance=way)
+
+far = Fastest(distance=4.0)
+"""
+
+
+@pytest.fixture
+def move(tmp_path):
+    """A file with one problem, and a model beside it."""
+    file = tmp_path / "move.py"
+    file.write_text(PROBLEMS)
+    return file
+
+
+@pytest.fixture
+def moves(tmp_path):
+    """A file with several problems."""
+    file = tmp_path / "moves.py"
+    file.write_text(PROBLEMS + MORE)
+    return file
+
+
+@pytest.fixture
+def unsolved(run):
+    """The record and the message of a problem that is not solved."""
+
+    def call(code, *arguments):
+        spoken, printed = run("optimize", *arguments), run("optimize", *arguments, "--json")
+        assert (spoken.exit_code, printed.exit_code) == (code, code), spoken.output
+        assert spoken.stdout == ""
+        report = json.loads(printed.stdout)
+        assert report["success"] is False
+        assert report["error"] in spoken.stderr
+        assert report["error"] in printed.stderr
+        assert "Traceback" not in spoken.output + printed.output
+        return report
+
+    return call
+
+
+def columns(file):
+    """Header -> values of a CSV file."""
+    with file.open() as opened:
+        rows = list(csv.reader(opened))
+    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
+
+
+def fastest(distance=1.0, mass=1.0):
+    """Full force forth and back: half the way in half the time, with 1 N."""
+    return 2 * np.sqrt(distance * mass / 1.0)
+
+
+def test_the_fastest_motion_takes_two_seconds(run, answer, move):
+    found = answer("optimize", move)
+    assert found["problem"] == "Fastest"
+    assert found["success"] is True
+    assert found["status"] == "solved"
+    assert found["objective"] == found["final_time"] == found["free"]["final_time"]
+    assert found["final_time"] == pytest.approx(
+        fastest(), abs=1e-5
+    )  # solved to 1e-8, limits relaxed by as much
+    assert found["iterations"] > 0
+    assert found["seconds"].keys() == {"build", "solve"}
+    assert found["versions"].keys() == {"gantrytau", "casadi", "python"}
+    assert found["report"][0].startswith("Fastest: solved after ")
+    assert found["files"] == []
+    spoken = run("optimize", move)
+    assert spoken.exit_code == 0
+    assert "Fastest: solved after " in spoken.stdout
+    line = next(line for line in spoken.stdout.splitlines() if line.startswith("  final_time = "))
+    assert float(line.split()[2]) == pytest.approx(fastest(), abs=1e-5)
+    assert line.endswith(" s (duration)")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "distance", "mass"),
+    [
+        (":Fastest", ("--set", "cart.m=4"), 1.0, 4.0),
+        (":Fastest", ("--set", "distance=4", "--set", "cart.m=4"), 4.0, 4.0),
+        (":Fastest(distance=4)", (), 4.0, 1.0),
+        (":Fastest( distance = 4 )", ("--set", "final_time=3"), 4.0, 1.0),  # of a Free number: its guess
+        (":far", ("--set", "cart.m=2.25"), 4.0, 2.25),
+        (":Needy(way=9)", (), 9.0, 1.0),
+    ],
+)
+def test_parameters_are_set(answer, moves, name, options, distance, mass):
+    found = answer("optimize", f"{moves}{name}", *options)
+    assert found["final_time"] == pytest.approx(fastest(distance, mass), rel=1e-5)  # as above
+
+
+def test_a_problem_of_a_module_in_this_folder(answer, move, monkeypatch):
+    (move.parent / "moves_of_a_user.py").write_text(PROBLEMS)
+    monkeypatch.chdir(move.parent)
+    for name in ("moves_of_a_user:Fastest", "moves_of_a_user.Fastest"):
+        assert answer("optimize", name)["final_time"] == pytest.approx(fastest(), abs=1e-5)  # as above
+    assert str(move.parent) not in sys.path
+
+
+def test_the_mesh_and_the_solver_are_chosen(answer, move, monkeypatch):
+    asked = {}
+
+    def recorded(problem, **policy):
+        asked.update(policy)
+        return solve(problem, **{key: value for key, value in policy.items() if key in known})
+
+    solve = gantrytau_optimica.optimize
+    known = [name for name in inspect.signature(solve).parameters if name not in ("refine", "starts")]
+    monkeypatch.setattr(gantrytau_optimica, "optimize", recorded)
+    policy = dict(elements=10, points=2, scheme="gauss", tolerance=1e-6, max_iterations=99, max_time=9.0)
+    options = [text for name, value in policy.items() for text in (f"--{name.replace('_', '-')}", value)]
+    found = answer("optimize", move, *options)
+    assert asked == {**policy, "progress": None}
+    assert found["final_time"] == pytest.approx(fastest(), abs=1e-4)  # a hundred times the tolerance
+    answer("optimize", move, "--refine", "1e-4", "--starts", "3")
+    assert (asked["refine"], asked["starts"]) == (1e-4, 3)
+
+
+def test_what_is_not_said_is_what_python_takes():
+    theirs = inspect.signature(gantrytau_optimica.optimize).parameters
+    ours = inspect.signature(optimize).parameters
+    for name in ("elements", "points", "scheme", "tolerance", "max_iterations", "max_time"):
+        assert ours[name].default == theirs[name].default
+
+
+def test_the_motion_is_saved_and_drawn(run, move, tmp_path):
+    table, picture = tmp_path / "move.csv", tmp_path / "force.png"
+    found = run(
+        "optimize", move, "--save", table, "--plot", "cart.f,der(cart.v),final_time,time", "--to", picture
+    )
+    assert found.exit_code == 0, found.output
+    assert f"Written: {table}\nWritten: {picture}" in found.stdout
+    values = columns(table)
+    assert values["time [s]"][-1] == pytest.approx(fastest(), abs=1e-5)  # as above
+    assert values["cart.x [m]"][-1] == pytest.approx(1.0, abs=1e-6)  # a hundred times the tolerance
+    assert len(np.unique(plt.imread(picture).reshape(-1, 4), axis=0)) > 20  # paper, axes, the lines' colours
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_saved_motion_is_where_the_next_search_starts(answer, move, tmp_path, suffix, monkeypatch):
+    file = tmp_path / f"move{suffix}"
+    answer("optimize", move, "--save", file)
+    given = {}
+    solve = gantrytau_optimica.optimize
+
+    def recorded(problem, **policy):
+        given.update(policy)
+        return solve(problem, **policy)
+
+    monkeypatch.setattr(gantrytau_optimica, "optimize", recorded)
+    found = answer("optimize", move, "--guess", file, "--elements", "20")
+    assert found["final_time"] == pytest.approx(fastest(), abs=1e-5)  # as above
+    assert given["guess"]["cart.v"].shape == (151, 2)  # the start and three points in each of 50 elements
+    assert given["guess"]["cart.x"][-1] == pytest.approx(1.0, abs=1e-6)  # a hundred times the tolerance
+
+
+def test_a_problem_without_a_solution_is_told(unsolved, moves, tmp_path):
+    file = tmp_path / "move.csv"
+    file.write_text("a solution of before\n")
+    report = unsolved(FAULT, f"{moves}:Impossible", "--save", file)
+    assert report["status"].startswith("no solution")
+    assert "`final(cart.x) == distance` is off by" in report["error"]
+    assert "try another --guess." in report["error"]
+    kept = tmp_path / "move.unfinished.csv"
+    assert f"What was reached until then is in {kept}" in report["error"]
+    assert report["files"] == [str(kept)]
+    assert columns(kept)["time [s]"][-1] <= 1.5 + 1e-6  # s, the limit, relaxed by the solver
+    assert file.read_text() == "a solution of before\n"
+
+
+def test_too_few_iterations_can_be_gone_on_from(unsolved, answer, move, tmp_path):
+    file = tmp_path / "move.csv"
+    report = unsolved(FAULT, move, "--max-iterations", "2", "--save", file)
+    assert report["iterations"] == 2
+    kept = tmp_path / "move.unfinished.csv"
+    assert "Allow more with --max-iterations" in report["error"]
+    assert f"; --guess {kept} goes on from there" in report["error"]
+    assert answer("optimize", move, "--guess", kept)["final_time"] == pytest.approx(fastest(), abs=1e-5)
+
+
+def press_ctrl_c(monkeypatch):
+    """Let Ctrl-C be pressed after the third iteration of the solver."""
+    solve = gantrytau_optimica.optimize
+
+    def pressed(problem, **policy):
+        def press(iteration, objective):
+            if iteration == 3:
+                signal.raise_signal(signal.SIGINT)
+
+        return solve(problem, **{**policy, "progress": press})
+
+    monkeypatch.setattr(gantrytau_optimica, "optimize", pressed)
+
+
+def test_ctrl_c_keeps_what_was_found(unsolved, move, tmp_path, monkeypatch):
+    press_ctrl_c(monkeypatch)
+    report = unsolved(INTERRUPTED, move, "--save", tmp_path / "move.csv")
+    kept = tmp_path / "move.unfinished.csv"
+    assert report["status"] == "interrupted"
+    assert f"What was reached until then is in {kept}; --guess {kept} goes on from there" in report["error"]
+    assert ".optimum" not in report["error"]
+    assert columns(kept)["cart.x [m]"].size > 1
+    assert "With --save what was reached would have been kept" in unsolved(INTERRUPTED, move)["error"]
+
+
+def test_what_cannot_be_saved_does_not_hide_why_it_stopped(unsolved, move, tmp_path):
+    (tmp_path / "move.unfinished.csv").mkdir()
+    report = unsolved(FAULT, move, "--max-iterations", "2", "--save", tmp_path / "move.csv")
+    assert "iteration limit reached" in report["error"]
+    assert "What was reached cannot be saved: " in report["error"]
+    assert "is a folder" in report["error"]
+
+
+class Terminal(io.StringIO):
+    """Somebody watches."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_line_of_the_terminal_follows_the_solver(answer, move, monkeypatch, quiet):
+    from gantrytau.commands.optimize import _live
+
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    monkeypatch.setenv("TERM", "xterm")
+    with _live("Fastest", quiet) as progress:
+        assert (progress is None) == quiet
+        if progress:
+            progress(7, 1.25)
+    assert ("Fastest: iteration 7, objective 1.25, 0.0 s" in terminal.getvalue()) != quiet
+
+
+def test_nothing_but_the_user_speaks_on_stderr_without_a_terminal(run, move):
+    found = run("optimize", move, "--json")
+    assert found.stderr == "loading\n"
+    assert json.loads(found.stdout)["success"] is True
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "moves.py holds several problems (Fastest, Impossible, "),
+        (":Fastst", "moves.py has no class 'Fastst'; did you mean 'Fastest'?"),
+        (
+            ":Cart",
+            "moves.py:Cart is a class Cart, expected a problem: "
+            "a class that inherits from gantrytau_optimica.Optimization",
+        ),
+        (":Optimization", "moves.py:Optimization is a class Optimization, expected a problem"),
+        (":far(distance=2)", "far is ready-made and takes no arguments; give --set distance=2 instead"),
+        (":Fastest(distnce=2)", "Fastest(distnce=2): Fastest has no 'distnce'; did you mean 'distance'"),
+        (":Fastest(distance=long)", "Fastest: distance=long: expected a number as 2.5"),
+        (":Fastest(cart.m=2)", "what lies deeper is set by an option, --set cart.m=2"),
+        (":Fastest(D1)", "Fastest takes no prototype; leave D1 out"),
+        (":Fastest(D1, L1)", "found D1, L1, expected one prototype and NAME=VALUE"),
+        (":Needy", "Needy needs way; give numbers as 'Needy(way=...)'"),
+        (":Needy(wy=2)", "Needy(wy=2): Needy takes no 'wy'; did you mean 'way'?"),
+    ],
+)
+def test_what_is_no_problem_of_the_file(fails, moves, name, message):
+    assert message in fails(MISUSE, "optimize", f"{moves}{name}")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Pendulum", "Pendulum is a class Pendulum, expected a problem"),
+        ("Fastest", "Fastest: there is no problem of this name; name its file, as move.py:Fastest"),
+        ("no_such_module:Fastest", "there is no problem of this name"),
+        ("no..module:Fastest", "there is no problem of this name"),
+        ("mov.py:Fastest", "mov.py: there is no such file; did you mean 'move.py'?"),
+        (
+            "broken:Fastest",
+            "broken cannot be loaded. SyntaxError: invalid syntax\n  broken.py, line 1: def f(:",
+        ),
+        ("broken.py", "broken.py cannot be loaded. SyntaxError: invalid syntax"),
+        (
+            "lonely_import:Fastest",
+            "lonely_import cannot be loaded. ModuleNotFoundError: No module named 'nowhere'",
+        ),
+        (
+            "models.py",
+            "models.py holds no problem class, expected a problem: a class that inherits from "
+            "gantrytau_optimica.Optimization; name one, as models.py:Fastest",
+        ),
+    ],
+)
+def test_what_is_no_problem_at_all(fails, move, monkeypatch, name, message):
+    monkeypatch.chdir(move.parent)
+    (move.parent / "broken.py").write_text("def f(:\n")
+    (move.parent / "lonely_import.py").write_text("import nowhere\n")
+    (move.parent / "models.py").write_text("from gantrytau_models import Pendulum\n")
+    assert message in fails(MISUSE, "optimize", name)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Divided", ["Divided.objective: integer division", "line 39: return self.final_time / (1 // 0)"]),
+        ("Misspelt", ["Misspelt has no 'end_time'", "line 43: return self.end_time"]),
+    ],
+)
+def test_a_problem_with_a_fault_is_told_with_the_line(fails, moves, name, words):
+    message = fails(FAULT, "optimize", f"{moves}:{name}")
+    assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ("--plot", "cart.y", "--to", "a.png"),
+            "--plot cart.y: Fastest has no 'cart.y'; did you mean 'cart.x'?",
+        ),
+        (("--plot", "der(cart.z)", "--to", "a.png"), "--plot der(cart.z): Fastest has no 'cart.z'"),
+        (("--to", "a.png"), "--to a.png: found no names to draw, expected some; add --plot NAMES"),
+        (("--plot", "cart.x", "--to", "a.xyz"), "found the suffix '.xyz'"),
+        (("--save", "a.cvs"), "a.cvs: found the suffix '.cvs'"),
+        (("--set", "cart.mm=2"), "--set cart.mm: Fastest.cart has no 'mm'"),
+        (
+            ("--guess", "a.mat"),
+            "--guess a.mat: found the suffix '.mat', expected a result saved as .csv or .nc",
+        ),
+        (("--guess", "a.csv"), "--guess a.csv: there is no such file; check its path"),
+    ],
+)
+def test_misuse_is_told_before_the_work(fails, move, monkeypatch, options, message):
+    monkeypatch.setattr(gantrytau_optimica, "optimize", None)
+    assert message in fails(MISUSE, "optimize", move, *options)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.csv", "", "found no 'time', expected a result over time"),
+        ("a.csv", "times,x\n0,1\n1,1\n", "found no 'time'"),
+        ("a.csv", "time [s],x\n0,1\n", "found 1 times, expected a motion over some time"),
+        ("a.csv", "time [s],x\n0,1\n1,much\n", "cannot be read as a result (could not convert"),
+        ("a.csv", "time [s],x\n0,1\n1\n", "cannot be read as a result (setting an array"),
+        (
+            "a.csv",
+            "time [s],x\n1,1\n0,1\n",
+            "cannot be read as a result (a.csv: time has shape (2,) or decreases",
+        ),
+        ("a.nc", "no netCDF", "cannot be read as a result ("),
+    ],
+)
+def test_a_guess_that_is_no_result(fails, move, tmp_path, name, text, message):
+    file = tmp_path / name
+    file.write_text(text)
+    assert message in fails(MISUSE, "optimize", move, "--guess", file)
+
+
+def test_a_guess_of_another_model(fails, move, tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("time [s],x\n0,1\n1,1\n")
+    assert "the given solution has no cart." in fails(FAULT, "optimize", move, "--guess", file)
+
+
+def test_what_is_missing_to_read_netcdf_is_told(fails, move, tmp_path, monkeypatch):
+    (tmp_path / "a.nc").write_text("")
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    message = fails(MISUSE, "optimize", move, "--guess", tmp_path / "a.nc")
+    assert "pip install 'gantrytau[results]'" in message
+
+
+def test_remedies_speak_of_options():
+    assert in_options("Try another guess=, more elements=, or look at .optimum.") == (
+        "Try another --guess, more --elements, or look at what --save keeps."
+    )
+    assert in_options("more max_iterations=; `guess==2`") == "more --max-iterations; `guess==2`"
