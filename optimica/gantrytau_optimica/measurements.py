@@ -126,6 +126,10 @@ class Samples:
             self.times[1:][np.diff(self.values[:, column]) != 0] if self.kind == "constant" else np.zeros(0)
         )
 
+    def kinks(self) -> np.ndarray:
+        """Times in s at which the course is not smooth."""
+        return self.times[1:-1] if self.kind == "linear" else self.times[1:]
+
 
 def _numbers(what: str, values: Any) -> np.ndarray:
     try:

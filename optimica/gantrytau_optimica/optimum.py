@@ -12,6 +12,7 @@ from gantrytau.symbols import split_derivative
 from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
 from gantrytau_optimica.ipopt import Solution
+from gantrytau_optimica.playback import Playback, play_back
 from gantrytau_optimica.program import Program
 from gantrytau_optimica.reporting import report
 from gantrytau_optimica.trajectory import Trajectory
@@ -198,9 +199,15 @@ class Optimum:
         """Save all variables over time, as Result.save."""
         return self.result.save(path)
 
+    @cached_property
+    def playback(self) -> Playback:
+        """The model driven anew by the inputs found, with all limits and conditions looked at between the nodes."""
+        return play_back(self)
+
     def report(self) -> str:
-        """How it ended, and what remains violated or binds, in the model's words."""
-        return report(self.program, self.solution, list(self.phases.values()))
+        """How it ended, what remains violated or binds, and what becomes of it when played back, in the model's words."""
+        found = report(self.program, self.solution, list(self.phases.values()))
+        return f"{found}\n{self.playback}" if self.success else found
 
     def _values(self, names: Sequence[str], phase: Trajectory, times: np.ndarray) -> np.ndarray:
         """Values (names, times) of scalars of the model."""

@@ -44,12 +44,14 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A symbol whose values are known: value(times (n,) in s) -> (n,); jumps: times in s at which it is not smooth."""
+    """A symbol whose values are known: value(times (n,) in s) -> (n,); jumps: times in s at which it jumps;
+    kinks: at which it is not smooth."""
 
     name: str
     symbol: ca.SX
     value: Callable[[np.ndarray], np.ndarray]
     jumps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    kinks: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)

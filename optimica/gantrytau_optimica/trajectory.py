@@ -84,7 +84,7 @@ class Trajectory:
             times = self.times(self.mesh.borders[element] + place * self.mesh.widths[element])
         rows = [track.values(self.w, element, place) for track in self.layout.tracks]
         rows += [course.value(times) for course in self.phase.courses]
-        return np.array(rows).reshape(-1, times.size)
+        return np.array(rows).reshape(len(rows), times.size)
 
     def function(self, expressions: ca.SX, name: str = "values") -> ca.Function:
         """(times (1, n), signals (k, n)) -> expressions (m, n), with the free numbers of this solution."""
