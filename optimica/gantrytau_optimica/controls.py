@@ -17,7 +17,7 @@ def read_controls(read: ReadProblem, controls: Any) -> dict[str, Pieces]:
     """Pieces by scalar name from `{name: dict(kind=..., elements=..., max_step=..., step_penalty=...)}`."""
     if not isinstance(controls, Mapping):
         raise ModelError(
-            f"controls={controls!r}: expected {{name of an input: dict(kind='constant' | 'linear', ...)}}"
+            f"controls={controls!r}: expected {{name of an input: dict(kind='constant' | 'linear' | 'ramps', ...)}}"
         )
     found: dict[str, Pieces] = {}
     for name, wanted in controls.items():
@@ -36,13 +36,15 @@ def _pieces(name: str, wanted: Any) -> Pieces:
     if isinstance(wanted, str):
         wanted = dict(kind=wanted)
     if not isinstance(wanted, Mapping):
-        raise ModelError(f"controls {name}: found {wanted!r}, expected dict(kind='constant' | 'linear', ...)")
+        raise ModelError(f"controls {name}: found {wanted!r}, expected dict(kind='constant' | 'linear' | 'ramps', ...)")
     for key in wanted:
         if key not in KEYS:
             raise ModelError(f"controls {name}: there is no '{key}'{did_you_mean(str(key), KEYS)}")
     kind = wanted.get("kind", "constant")
-    if kind not in ("constant", "linear"):
-        raise ModelError(f"controls {name}: found kind={kind!r}, expected 'constant' or 'linear'")
+    if kind not in ("constant", "linear", "ramps"):
+        raise ModelError(f"controls {name}: found kind={kind!r}, expected 'constant', 'linear' or 'ramps'")
+    if kind == "ramps" and len(wanted) > 1:
+        raise ModelError(f"controls {name}: ramps jump at every border, expected no other setting beside kind='ramps'")
     elements = wanted.get("elements", 1)
     if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or elements < 1:
         raise ModelError(
@@ -61,4 +63,5 @@ def _pieces(name: str, wanted: Any) -> Pieces:
             raise ModelError(
                 f"controls {name}: found {key}={value!r}, expected a number that is not negative"
             )
-    return Pieces(kind, int(elements), None if step is None else float(step), float(penalty))
+    step = None if step is None else float(step)
+    return Pieces(kind, int(elements), max_step=step, step_penalty=float(penalty))

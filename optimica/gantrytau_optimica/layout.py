@@ -213,19 +213,27 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
     for i, signal in enumerate(phase.inputs, nx + nz):
         if signal.pieces.kind == "free":
             continue
-        tracks[i], new = _piecewise(signal, mesh, first + owner.size)
-        chains[i] = first + owner.size + np.arange(new.size)
+        tracks[i], new = _pieces(signal, mesh, first + owner.size)
+        if signal.pieces.kind != "ramps":
+            chains[i] = first + owner.size + np.arange(new.size)
         owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
     ordered = tuple(tracks[i] for i in range(len(phase.signals)))
     return Layout(phase, mesh, scheme, first, first + np.arange(m), starts, ordered, chains, owner, moment)
 
 
-def _piecewise(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
-    """Track of a piecewise input, and the shares of the horizon of its values: middles or ends of the pieces."""
-    n, borders, each = mesh.elements, mesh.borders, signal.pieces.elements
-    group = np.arange(n) // each
-    ends = np.append(borders[::each][: group[-1] + 1], borders[-1])
-    if signal.pieces.kind == "constant":
+def _pieces(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
+    """Track of an input made of pieces, and the shares of the horizon of its values: middles or ends of the pieces."""
+    n, borders, pieces = mesh.elements, mesh.borders, signal.pieces
+    if pieces.kind == "ramps":
+        unknowns = first + np.arange(2 * n).reshape(n, 2)
+        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), np.column_stack([borders[:-1], borders[1:]]).ravel()
+    if pieces.borders:
+        ends = np.array(pieces.borders)
+        group = np.clip(np.searchsorted(ends, (borders[:-1] + borders[1:]) / 2) - 1, 0, ends.size - 2)
+    else:
+        group = np.arange(n) // pieces.elements
+        ends = np.append(borders[:: pieces.elements][: group[-1] + 1], borders[-1])
+    if pieces.kind == "constant":
         return Track(np.full((n, 1), 0.5), first + group[:, None]), (ends[:-1] + ends[1:]) / 2
     pair = np.column_stack([ends[group], ends[group + 1]])
     nodes = (pair - borders[:-1, None]) / mesh.widths[:, None]

@@ -53,7 +53,7 @@ class Mesh:
     def placed(self, borders: np.ndarray) -> "Mesh":
         """The mesh with the moving borders where `borders` (m,) says, and the others between them."""
         matrix, offset = self.shares()
-        return Mesh(matrix @ borders + offset, self.moving, self.shortest)
+        return Mesh(matrix @ borders + offset, self.moving, self.shortest)  # shares stay
 
     def locate(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Element and place in it, 0 to 1, of shares of the horizon; a border belongs to the element before it."""

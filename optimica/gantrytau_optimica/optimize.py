@@ -19,6 +19,7 @@ from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import Program, check_freedom, transcribe
 from gantrytau_optimica.reach import out_of_reach, reach_text
+from gantrytau_optimica.refinement import refined, with_ramps
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import FreeNumber, Phase
 from gantrytau_optimica.scheme import collocation
@@ -44,6 +45,7 @@ def optimize(
     lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
     controls: Mapping[str, Any] | None = None,
+    refine: float | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
     max_time: float = 300.0,
@@ -66,6 +68,7 @@ def optimize(
         lengths=lengths,
         guess=guess,
         controls=controls,
+        refine=refine,
         tolerance=tolerance,
         max_iterations=max_iterations,
         max_time=max_time,
@@ -83,6 +86,7 @@ def prepare(
     lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
     controls: Mapping[str, Any] | None = None,
+    refine: float | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
     max_time: float = 300.0,
@@ -93,6 +97,7 @@ def prepare(
     The other keywords are those of `optimize`.
     """
     _check(tolerance, max_iterations, max_time, progress)
+    _check_refine(refine)
     grid = collocation(scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
@@ -100,13 +105,15 @@ def prepare(
     guess = _guesses(guess, read)
     held = [n for name in names(parameters) for n in _parameter(read, name)]
     built = build(read, guess, held, read_controls(read, controls or {}))
+    if refine is not None:
+        built = replace(built, problem=with_ramps(built.problem))
     if static(read.dae):
         grid, mesh = collocation("radau", 1), mesh_of(1)
     meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
     program = transcribe(built.problem, meshes, grid)
     check_freedom(program)
     policy = Policy(tolerance, max_iterations, max_time, progress)
-    return Prepared(built, program, Solver(program, policy), guess, time.perf_counter() - begin)
+    return Prepared(built, program, Solver(program, policy), guess, time.perf_counter() - begin, refine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +125,7 @@ class Prepared:
     solver: Solver
     guess: Mapping[str, Any]
     build_time: float
+    refine: float | None = None
 
     def __repr__(self) -> str:
         size, rows = self.program.places.size, self.program.assembled.rows
@@ -142,13 +150,23 @@ class Prepared:
                 equations=[x.equation for x in lost],
                 optimum=Optimum(read.name, built, program, unsolved, self.build_time),
             )
-        solution = self.solver.solve(program, _first(program, built))
+        optimum = self._solved(built, program, self.solver, _first(program, built))
+        if self.refine is None:
+            return optimum
+        again = replace(self.solver.policy, warm=True)
+        return refined(
+            optimum, self.refine, again, lambda p, w: self._solved(built, p, Solver(p, again), w)
+        )
+
+    def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
+        """The optimum of a program from a first guess of its unknowns. Raises SolveError if there is none."""
+        solution = solver.solve(program, first)
         for _ in range(ROUNDS):
             if not solution.success or not program.astray(solution.w):
                 break
             program = _relocated(program, solution.w)
-            solution = Solver(program, self.solver.policy).solve(program, solution.w)
-        optimum = Optimum(read.name, built, program, solution, self.build_time)
+            solution = Solver(program, solver.policy).solve(program, solution.w)
+        optimum = Optimum(built.read.name, built, program, solution, self.build_time)
         if not solution.success:
             remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
             raise SolveError(f"{optimum.report()}\n{remedy}", optimum=optimum)
@@ -201,6 +219,11 @@ def _with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
         return mesh
     start, final = float(phase.start_time), float(phase.final_time)
     return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
+
+
+def _check_refine(refine: Any) -> None:
+    if refine is not None and (not isinstance(refine, float) or not 0 < refine < 1):
+        raise ModelError(f"refine={refine!r}: expected a relative accuracy between 0 and 1, as 1e-6")
 
 
 def _check(tolerance: Any, max_iterations: Any, max_time: Any, progress: Any) -> None:

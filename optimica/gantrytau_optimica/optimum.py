@@ -32,6 +32,7 @@ class Optimum:
     program: Program
     solution: Solution
     build_time: float
+    refinement: Any = None  # how it was refined, if it was
 
     @property
     def dae(self) -> Dae:
@@ -207,7 +208,8 @@ class Optimum:
     def report(self) -> str:
         """How it ended, what remains violated or binds, and what becomes of it when played back, in the model's words."""
         found = report(self.program, self.solution, list(self.phases.values()))
-        return f"{found}\n{self.playback}" if self.success else found
+        lines = [found, str(self.playback)] if self.success else [found]
+        return "\n".join([*lines, *([str(self.refinement)] if self.refinement else [])])
 
     def _values(self, names: Sequence[str], phase: Trajectory, times: np.ndarray) -> np.ndarray:
         """Values (names, times) of scalars of the model."""

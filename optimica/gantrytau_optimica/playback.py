@@ -34,10 +34,11 @@ class Violation:
 
 @dataclass(frozen=True)
 class Defect:
-    """By how much a condition on values at single times is missed, in its unit."""
+    """By how much a condition on values at single times is missed, in its unit, and the size of what it is about."""
 
     name: str
     amount: float
+    size: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,9 +179,19 @@ def _at_points(optimum: "Optimum", phases: list[Replayed]) -> tuple[float, list[
     multipliers = solution.multipliers[program.assembled.rows - count :]
     for limit, value, multiplier in zip(problem.boundary, found[1:], multipliers, strict=True):
         amount = value - limit.upper if value > limit.upper else min(value - limit.lower, 0.0)
-        defects.append(Defect(limit.name, float(amount)))
+        defects.append(Defect(limit.name, float(amount), _size(problem, limit)))
         error += multiplier * amount
     return float(found[0] + running), defects, float(error)
+
+
+def _size(problem: ControlProblem, limit: Limit) -> float:
+    """The typical size of what a condition compares: of the signals in it, or its bounds."""
+    leaves = {leaf.element_hash() for leaf in ca.symvar(limit.expression)}
+    inside = [p.expression for p in problem.points if any(e.element_hash() in leaves for e in p.symbol.elements())]
+    names = {leaf.element_hash() for e in inside for leaf in ca.symvar(e)}
+    sizes = [s.nominal for s in problem.signals if s.symbol.element_hash() in names]
+    sizes += [abs(b) for b in (limit.lower, limit.upper) if np.isfinite(b) and b != 0.0]
+    return max(sizes, default=1.0)
 
 
 def _point(played: Replayed, expression: ca.SX, time: str | ca.SX) -> np.ndarray:

@@ -16,14 +16,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Pieces:
-    """How an input is made: free at every point, or constant or linear over groups of elements.
+    """How an input is made.
 
-    elements: in each group; max_step: largest change from one value to the next; step_penalty: weight of the
-    squares of these changes in the objective.
+    kind: "free" at every point, "ramps" (a straight line in each element, which may jump at borders), or "constant" or
+    "linear" (and continuous) over groups of elements; elements: in each group; borders: of the groups, shares of the
+    horizon, instead; max_step: largest change from one value to the next; step_penalty: weight of the squares of these
+    changes in the objective.
     """
 
-    kind: Literal["free", "constant", "linear"] = "free"
+    kind: Literal["free", "ramps", "constant", "linear"] = "free"
     elements: int = 1
+    borders: tuple[float, ...] = ()
     max_step: float | None = None
     step_penalty: float = 0.0
 

@@ -1,0 +1,111 @@
+"""`refine=`: solve, play back, improve the mesh, and solve again until the answer holds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gantrytau_optimica.carrying import carried
+from gantrytau_optimica.ipopt import Policy, Solver
+from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.program import transcribe
+from gantrytau_optimica.records import ControlProblem, Phase, Pieces
+from gantrytau_optimica.remeshing import better_mesh
+from gantrytau_optimica.switching import Switch
+
+MOST_ROUNDS = 12
+MOST_ELEMENTS = 2000
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one round of refinement found: elements, objective, largest violation and defect relative to their sizes."""
+
+    elements: int
+    objective: float
+    violation: float
+    defect: float
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How an answer was refined: wanted accuracy, all rounds, the switches at the end, and whether it was reached."""
+
+    accuracy: float
+    rounds: tuple[Round, ...]
+    switches: tuple[Switch, ...]
+    reached: bool
+
+    def __str__(self) -> str:
+        first, last = self.rounds[0], self.rounds[-1]
+        word = "Refined to" if self.reached else "NOT refined to"
+        change = abs(self.rounds[-1].objective - self.rounds[-2].objective) if len(self.rounds) > 1 else 0.0
+        return (
+            f"{word} {self.accuracy:g} in {len(self.rounds)} rounds, {first.elements} to {last.elements} elements, "
+            f"{len(self.switches)} switches; the last round changed the objective by {change:.2g}"
+        )
+
+
+def with_ramps(problem: ControlProblem) -> ControlProblem:
+    """The problem with its free inputs as straight lines in each element: what keeps to limits at both ends keeps to
+    them between."""
+
+    def changed(phase: Phase) -> Phase:
+        inputs = tuple(
+            replace(s, pieces=Pieces("ramps")) if s.pieces.kind == "free" else s for s in phase.inputs
+        )
+        return replace(phase, inputs=inputs)
+
+    return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
+
+
+def refined(optimum: Optimum, accuracy: float, policy: Policy, solve: Callable[..., Optimum]) -> Optimum:
+    """The optimum on better and better meshes until it holds when played back."""
+    rounds: list[Round] = [_round(optimum)]
+    roughness = False
+    while True:
+        switches = tuple(s for t in optimum.phases.values() for s in _switches(t))
+        done = _holds(rounds, accuracy)
+        if done or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
+            return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done))
+        stands = len(rounds) > 1 and max(rounds[-1].violation, rounds[-1].defect) <= accuracy
+        better = [
+            better_mesh(played, accuracy, _movable(played.trajectory.phase), roughness=stands)
+            for played in optimum.playback.phases.values()
+        ]
+        roughness = stands
+        layouts = optimum.program.places.layouts
+        trajectories = list(optimum.phases.values())
+        located = (trajectories[0].numbers, [b.mesh.borders for b in better])
+        program = transcribe(optimum.program.problem, [b.mesh for b in better], layouts[0].scheme, located)
+        optimum = solve(program, carried(trajectories, program))
+        rounds.append(_round(optimum))
+
+
+def _switches(trajectory) -> list[Switch]:
+    from gantrytau_optimica.switching import switches
+
+    return switches(trajectory)
+
+
+def _round(optimum: Optimum) -> Round:
+    played = optimum.playback
+    elements = sum(layout.mesh.elements for layout in optimum.program.places.layouts)
+    defect = max((abs(d.amount) / d.size for d in played.defects), default=0.0)
+    if not played.complete:
+        defect = np.inf
+    return Round(elements, optimum.objective, played.violation, defect, optimum.iterations)
+
+
+def _holds(rounds: list[Round], accuracy: float) -> bool:
+    """Whether limits and conditions hold and the objective stands still."""
+    last = rounds[-1]
+    if len(rounds) < 2 or max(last.violation, last.defect) > accuracy:
+        return False
+    return abs(last.objective - rounds[-2].objective) <= accuracy * max(abs(last.objective), 1e-6)
+
+
+def _movable(phase: Phase) -> bool:
+    """Whether borders may move: not where samples tie values to times, nor where the caller chose the pieces."""
+    return not phase.courses and not phase.sums and all(s.pieces.kind == "ramps" for s in phase.inputs)
