@@ -5,16 +5,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gantrytau import SolveError
 from gantrytau_optimica.carrying import carried
 from gantrytau_optimica.ipopt import Policy, Solver
+from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import transcribe
 from gantrytau_optimica.records import ControlProblem, Phase, Pieces
 from gantrytau_optimica.remeshing import better_mesh
 from gantrytau_optimica.switching import Switch
+from gantrytau_optimica.switching import switches as switches_of
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
+SMALL = 30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
 
 
 @dataclass(frozen=True)
@@ -63,30 +67,44 @@ def with_ramps(problem: ControlProblem) -> ControlProblem:
 def refined(optimum: Optimum, accuracy: float, policy: Policy, solve: Callable[..., Optimum]) -> Optimum:
     """The optimum on better and better meshes until it holds when played back."""
     rounds: list[Round] = [_round(optimum)]
-    roughness = False
+    moving = True
     while True:
-        switches = tuple(s for t in optimum.phases.values() for s in _switches(t))
+        switches = tuple(s for t in optimum.phases.values() for s in switches_of(t))
         done = _holds(rounds, accuracy)
         if done or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
             return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done))
-        stands = len(rounds) > 1 and max(rounds[-1].violation, rounds[-1].defect) <= accuracy
-        better = [
-            better_mesh(played, accuracy, _movable(played.trajectory.phase), roughness=stands)
-            for played in optimum.playback.phases.values()
-        ]
-        roughness = stands
-        layouts = optimum.program.places.layouts
-        trajectories = list(optimum.phases.values())
-        located = (trajectories[0].numbers, [b.mesh.borders for b in better])
-        program = transcribe(optimum.program.problem, [b.mesh for b in better], layouts[0].scheme, located)
-        optimum = solve(program, carried(trajectories, program))
+        moving = moving and rounds[-1].defect < SMALL * accuracy
+        better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, moving), solve) if moving else None
+        moving = moving and better is not None
+        if better is None:
+            better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, False), solve)
+        if better is None:
+            return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, False))
+        optimum = better
         rounds.append(_round(optimum))
 
 
-def _switches(trajectory) -> list[Switch]:
-    from gantrytau_optimica.switching import switches
+def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, moving: bool) -> list[Mesh]:
+    """The next meshes; where limits and conditions hold already, finer where inputs are rough."""
+    stands = len(rounds) > 1 and max(rounds[-1].violation, rounds[-1].defect) <= accuracy
+    return [
+        better_mesh(played, accuracy, moving and _movable(played.trajectory.phase), roughness=stands).mesh
+        for played in optimum.playback.phases.values()
+    ]
 
-    return switches(trajectory)
+
+def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimum]) -> Optimum | None:
+    """The solution on other meshes, from this one, or None if it is not found."""
+    trajectories = list(optimum.phases.values())
+    located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
+    scheme = optimum.program.places.layouts[0].scheme
+    program = transcribe(optimum.program.problem, meshes, scheme, located)
+    try:
+        return solve(program, carried(trajectories, program))
+    except SolveError as error:
+        if error.optimum is not None and error.optimum.status == "interrupted":
+            raise
+        return None
 
 
 def _round(optimum: Optimum) -> Round:

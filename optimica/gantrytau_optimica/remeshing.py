@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.mesh import Mesh
@@ -28,7 +29,7 @@ class Better:
 def better_mesh(played: Replayed, accuracy: float, movable: bool, roughness: bool) -> Better:
     """The next mesh for `accuracy`, relative to sizes of states and ranges of limits.
 
-    movable: whether borders may move; roughness: whether to divide where ramps fit a curved input badly.
+    movable: whether borders at jumps of inputs may move; roughness: whether to divide where ramps fit a curved input badly.
     """
     trajectory = played.trajectory
     borders = trajectory.mesh.borders
@@ -44,7 +45,9 @@ def better_mesh(played: Replayed, accuracy: float, movable: bool, roughness: boo
         near = NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2])
         kept = kept[np.abs(kept - knot) > near]
     every = np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
-    moving = tuple(int(k) for k in np.searchsorted(every, knots)) if movable else ()
+    jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
+    jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
+    moving = tuple(int(k) for k in np.searchsorted(every, jumps))
     return Better(Mesh(every, moving), tuple(changes), int(parts.sum() - parts.size))
 
 
@@ -72,13 +75,14 @@ def _parts(played: Replayed, accuracy: float) -> np.ndarray:
     np.maximum.at(passed, owner, _passed(played))
     ratio = np.maximum(error / wanted, passed / accuracy)
     parts = np.ceil(np.maximum(ratio, 1.0) ** (1 / (ORDER + 1)))
-    return np.clip(np.where(ratio > 1, np.maximum(parts, 2), 1), 1, MOST_PARTS).astype(int)
+    parts = np.clip(np.where(ratio > 1, np.maximum(parts, 2), 1), 1, MOST_PARTS).astype(int)
+    # what errs may move into a neighbour, once it costs nothing there
+    beside = np.maximum(np.append(parts[1:], 1), np.insert(parts[:-1], 0, 1))
+    return np.maximum(parts, np.minimum(beside, 2))
 
 
 def _passed(played: Replayed) -> np.ndarray:
     """By how much limits are passed in every piece, relative to their range."""
-    import casadi as ca
-
     limits = limits_of(played.trajectory.phase)
     if not limits:
         return np.zeros(len(played.pieces))
