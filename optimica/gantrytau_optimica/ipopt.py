@@ -27,9 +27,6 @@ WORDS = {
     "Not_Enough_Degrees_Of_Freedom": "more conditions than unknowns",
 }
 
-# Started next to a solution, the barrier begins where it would end, and the guess is hardly pushed off its limits.
-WARM = {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6, "slack_bound_push": 1e-6}
-
 Progress = Callable[[int, float], None]  # iteration, objective
 
 
@@ -56,7 +53,6 @@ class Policy:
     max_iterations: int = 1000
     max_time: float = 300.0
     progress: Progress | None = None
-    warm: bool = False  # whether first guesses are solutions of nearly the same program
 
 
 class Solver:
@@ -80,8 +76,6 @@ class Solver:
                 "max_wall_time": policy.max_time,
             },
         }
-        if policy.warm:
-            options["ipopt"] |= WARM
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
 

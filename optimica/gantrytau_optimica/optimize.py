@@ -26,7 +26,7 @@ from gantrytau_optimica.scheme import collocation
 
 Problem = Optimization | type[Optimization] | ReadProblem
 Guesses = Mapping[str, Any] | Result | Optimum
-MOST_AGAIN = 150  # iterations of a solve that starts from a solution on another mesh
+MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 ROUNDS = 5  # of solving again with points at moving times read from other elements
 
 REMEDIES = {
@@ -155,7 +155,7 @@ class Prepared:
         if self.refine is None:
             return optimum
         policy = self.solver.policy
-        again = replace(policy, warm=True, max_iterations=min(policy.max_iterations, MOST_AGAIN))
+        again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
         return refined(
             optimum, self.refine, again, lambda p, w: self._solved(built, p, Solver(p, again), w)
         )

@@ -74,23 +74,28 @@ def refined(optimum: Optimum, accuracy: float, policy: Policy, solve: Callable[.
         if done or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
             return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done))
         moving = moving and rounds[-1].defect < SMALL * accuracy
-        better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, moving), solve) if moving else None
-        moving = moving and better is not None
-        if better is None:
-            better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, False), solve)
-        if better is None:
+        for how in [*(["moving"] if moving else []), "switches", "divided"]:
+            better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
+            if better is not None:
+                break
+            moving = False
+        else:
             return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, False))
         optimum = better
         rounds.append(_round(optimum))
 
 
-def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, moving: bool) -> list[Mesh]:
-    """The next meshes; where limits and conditions hold already, finer where inputs are rough."""
+def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, how: str) -> list[Mesh]:
+    """The next meshes; where limits and conditions hold already, finer where inputs are rough.
+
+    how: borders at switches "moving" or fixed ("switches"), or the old borders with elements "divided" only.
+    """
     stands = len(rounds) > 1 and max(rounds[-1].violation, rounds[-1].defect) <= accuracy
-    return [
-        better_mesh(played, accuracy, moving and _movable(played.trajectory.phase), roughness=stands).mesh
-        for played in optimum.playback.phases.values()
-    ]
+    meshes = []
+    for played in optimum.playback.phases.values():
+        movable = how == "moving" and _movable(played.trajectory.phase)
+        meshes.append(better_mesh(played, accuracy, movable, roughness=stands, structure=how != "divided"))
+    return meshes
 
 
 def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimum]) -> Optimum | None:

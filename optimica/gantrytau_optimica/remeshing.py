@@ -1,54 +1,45 @@
 """A better mesh from a solution: borders at the switches, which the optimiser may move, and finer where it errs."""
 
-from dataclasses import dataclass
-
 import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.playback import limits_of, range_of
 from gantrytau_optimica.replay import PLACES, Replayed
-from gantrytau_optimica.switching import Switch, switches
+from gantrytau_optimica.switching import switches
 from gantrytau_optimica.trajectory import Trajectory
 
 ORDER = 5  # of the error that an element adds, with three points
 MOST_PARTS = 4
-NEAR = 0.25  # of an element: borders that are closer to a switch give way to it
+NEAR = 0.02  # of an element: borders that are closer to a switch give way to it
+LEAST = 5e-4  # of the horizon: shorter elements hardly move the objective, and the solver crawls
 SAME = 1e-4  # of the horizon: switches that are closer count as one
 
 
-@dataclass(frozen=True)
-class Better:
-    """The next mesh of a phase, with the switches it was made for and whether anything changed."""
-
-    mesh: Mesh
-    switches: tuple[Switch, ...]
-    parts: int  # elements added
-
-
-def better_mesh(played: Replayed, accuracy: float, movable: bool, roughness: bool) -> Better:
+def better_mesh(
+    played: Replayed, accuracy: float, movable: bool, roughness: bool, structure: bool = True
+) -> Mesh:
     """The next mesh for `accuracy`, relative to sizes of states and ranges of limits.
 
-    movable: whether borders at jumps of inputs may move; roughness: whether to divide where ramps fit a curved input badly.
+    movable: whether borders at jumps of inputs may move; roughness: whether to divide where ramps fit a curved input
+    badly; structure: whether switches become borders.
     """
     trajectory = played.trajectory
     borders = trajectory.mesh.borders
-    changes = switches(trajectory)
+    changes = switches(trajectory) if structure else []
     knots = _apart(np.array([s.share for s in changes]))
     parts = _parts(played, accuracy)
     if roughness:
         parts = np.maximum(parts, np.where(_rough(trajectory) > np.sqrt(accuracy), 2, 1))
-    divided = _divided(borders, parts)
-    kept = divided[1:-1]
+    kept = _divided(borders, parts)[1:-1]
     for knot in knots:
         element = int(np.clip(np.searchsorted(borders, knot) - 1, 0, borders.size - 2))
-        near = NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2])
+        near = max(LEAST, NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2]))
         kept = kept[np.abs(kept - knot) > near]
     every = np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
     jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
     jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
-    moving = tuple(int(k) for k in np.searchsorted(every, jumps))
-    return Better(Mesh(every, moving), tuple(changes), int(parts.sum() - parts.size))
+    return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
 
 
 def _apart(knots: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from gantrytau_optimica.sorting import bare_limit, signal_limits
 from gantrytau_optimica.trajectory import Trajectory
 
 AT_LIMIT = 1e-4  # of its range, from which on a limit counts as reached
+MIXED = 3  # elements between opposite limits that are taken for one switch, not for an arc of its own
 
 
 @dataclass(frozen=True)
@@ -61,26 +62,26 @@ def _sides(values: np.ndarray, low: float, high: float) -> np.ndarray:
 def _changes(
     name: str, side: np.ndarray, ends: np.ndarray, limits: tuple[float, float], borders: np.ndarray
 ) -> list[Switch]:
-    """Switches of one input. An element that is mixed between two that are not holds one in its inside."""
+    """Switches of one input. A few mixed elements between two opposite limits hold one switch: where their mean says."""
     whole = np.where(side[:, 0] == side[:, 1], side[:, 0], 0)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(whole)) + 1])
+    stops = np.append(starts[1:], whole.size)
     found: list[Switch] = []
-    k, n = 0, whole.size
-    while k < n - 1:
-        if whole[k] == whole[k + 1]:
-            k += 1
+    skip = False
+    for k in range(starts.size - 1):
+        if skip:
+            skip = False
             continue
-        before, after = int(whole[k]), int(whole[k + 1])
-        share = borders[k + 1]
-        if before and not after and k + 2 < n and whole[k + 2] and whole[k + 2] != before:
-            # one element on the way from one limit to the other: the switch is where its mean lies between them
-            after = int(whole[k + 2])
-            low, high = limits
-            mean = np.clip((ends[k + 1].mean() - low) / (high - low), 0.02, 0.98)
-            part = mean if before > 0 else 1 - mean
-            share = borders[k + 1] + part * (borders[k + 2] - borders[k + 1])
-            k += 1
+        before, after = int(whole[starts[k]]), int(whole[starts[k + 1]])
+        share = borders[starts[k + 1]]
+        mixed = stops[k + 1] - starts[k + 1]
+        if before and not after and mixed <= MIXED and k + 2 < starts.size and whole[starts[k + 2]] == -before:
+            after, skip = -before, True
+            widths = np.diff(borders)[starts[k + 1] : stops[k + 1]]
+            mean = float(widths @ ends[starts[k + 1] : stops[k + 1]].mean(axis=1)) / float(widths.sum())
+            part = np.clip((mean - limits[0]) / (limits[1] - limits[0]), 0.02, 0.98)
+            share += (part if before > 0 else 1 - part) * widths.sum()
         found.append(Switch(float(share), name, SIDES[before], SIDES[after]))
-        k += 1
     return found
 
 
