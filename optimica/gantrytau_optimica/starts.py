@@ -1,0 +1,142 @@
+"""`starts=`: several first guesses around the default one, and the branches of solutions they lead to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau_optimica.guesses import Guess, horizon
+from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.records import ControlProblem, FreeNumber, Phase, Signal
+from gantrytau_optimica.sorting import signal_limits
+
+SEED = 20121
+SAME = 1e-3  # relative: objectives that are closer count as one branch
+WAVES = 3  # half waves in the deviation of a guess
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Solutions with the same objective: how many first guesses led there, and how the best of them ended."""
+
+    objective: float
+    count: int
+    status: str
+
+    def __str__(self) -> str:
+        times = "once" if self.count == 1 else f"{self.count} times"
+        return f"objective {self.objective:.8g}, found {times}"
+
+
+@dataclass(frozen=True)
+class Search:
+    """All branches, the best first, and how many guesses did not lead to a solution."""
+
+    starts: int
+    branches: tuple[Branch, ...]
+    failures: int
+
+    def __str__(self) -> str:
+        lines = [f"{self.starts} first guesses led to {len(self.branches)} branches, {self.failures} to no solution:"]
+        return "\n".join([*lines, *(f"  {branch}" for branch in self.branches[:8])])
+
+
+def searched(solve: Callable[[ControlProblem], Optimum | None], problem: ControlProblem, starts: int) -> Optimum | None:
+    """The best optimum from `starts` first guesses, the default one first, or None if none leads to a solution.
+
+    Every state that is not itself a derivative is bent by a few half waves, which vanish at the ends; those that are its
+    derivatives follow; free numbers and inputs are drawn from their limits or around their guess. The seed is fixed.
+    """
+    random = np.random.default_rng(SEED)
+    found: list[Optimum] = []
+    for k in range(starts):
+        optimum = solve(problem if k == 0 else bent(problem, random))
+        if optimum is not None:
+            found.append(optimum)
+    if not found:
+        return None
+    found.sort(key=lambda o: o.objective)
+    branches: list[Branch] = []
+    for optimum in found:
+        if branches and optimum.objective - branches[-1].objective <= SAME * max(abs(optimum.objective), 1e-9):
+            branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
+        else:
+            branches.append(Branch(optimum.objective, 1, optimum.status))
+    return replace(found[0], search=Search(starts, tuple(branches), starts - len(found)))
+
+
+def bent(problem: ControlProblem, random: np.random.Generator) -> ControlProblem:
+    """The problem with other first guesses, drawn around those it has."""
+    free = tuple(_drawn(number, random) for number in problem.free)
+    changed = replace(problem, free=free)
+    try:
+        spans = [horizon(changed, phase) for phase in changed.phases]
+    except Exception:  # times out of order: keep those of the guess
+        changed, spans = problem, [horizon(problem, phase) for phase in problem.phases]
+    phases = tuple(
+        _bent(phase, span, problem.name, random) for phase, span in zip(changed.phases, spans, strict=True)
+    )
+    return replace(changed, phases=phases)
+
+
+def _drawn(number: FreeNumber, random: np.random.Generator) -> FreeNumber:
+    if number.held:
+        return number
+    factor = float(np.exp(random.uniform(-0.5, 0.5)))
+    guess = number.guess * factor if number.guess else random.uniform(-0.5, 0.5)
+    return replace(number, guess=float(np.clip(guess, number.min, number.max)))
+
+
+def _bent(phase: Phase, span: tuple[float, float], name: str, random: np.random.Generator) -> Phase:
+    limits = signal_limits(phase, name)
+    states = {s.symbol.name(): s for s in phase.states}
+    guesses: dict[str, Guess] = {}
+    for key, state in states.items():
+        base, order = split_derivative(key)
+        if order and derivative_name(base, order - 1) in states:
+            continue
+        weights = random.normal(size=WAVES) / (1 + np.arange(WAVES)) * _extent(state, limits[state.name])
+        duration = span[1] - span[0]
+        guesses[key] = _wave(state.guess, weights, limits[state.name])
+        above = derivative_name(base, order + 1)
+        if above in states:
+            guesses[above] = _slope(states[above].guess, weights / duration)
+    inputs = tuple(replace(u, guess=_level(u, limits[u.name], random)) for u in phase.inputs)
+    bent_states = tuple(replace(s, guess=guesses.get(s.symbol.name(), s.guess)) for s in phase.states)
+    return replace(phase, states=bent_states, inputs=inputs)
+
+
+def _extent(state: Signal, limits: tuple[float, float]) -> float:
+    """How far a guess is bent: a share of the limits, else of the way it goes, else of its size."""
+    if np.isfinite(limits).all():
+        return 0.25 * (limits[1] - limits[0])
+    way = float(np.ptp(state.guess(np.linspace(0.0, 1.0, 21))))
+    return max(0.3 * way, 0.1 * state.nominal)
+
+
+def _wave(guess: Guess, weights: np.ndarray, limits: tuple[float, float]) -> Guess:
+    def bent_guess(share: np.ndarray) -> np.ndarray:
+        share = np.asarray(share, dtype=float)
+        waves = np.sin(np.pi * np.outer(np.atleast_1d(share), 1 + np.arange(weights.size))) @ weights
+        return np.clip(guess(share) + waves, *limits)
+
+    return bent_guess
+
+
+def _slope(guess: Guess, weights: np.ndarray) -> Guess:
+    def bent_guess(share: np.ndarray) -> np.ndarray:
+        share = np.asarray(share, dtype=float)
+        k = np.pi * (1 + np.arange(weights.size))
+        return guess(share) + np.cos(np.outer(np.atleast_1d(share), k)) @ (k * weights)
+
+    return bent_guess
+
+
+def _level(signal: Signal, limits: tuple[float, float], random: np.random.Generator) -> Guess:
+    """A constant input between its limits, else the guess as it is."""
+    level = random.uniform(-0.5, 0.5)
+    if not np.isfinite(limits).all():
+        return signal.guess
+    value = 0.5 * (limits[0] + limits[1]) + level * (limits[1] - limits[0])
+    return lambda share: np.full(np.shape(share), value)
