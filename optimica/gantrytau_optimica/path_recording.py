@@ -14,22 +14,28 @@ from gantrytau import ModelError
 from gantrytau_optimica.path_fitting import Array, Curve, Pieces, by_length, nearest
 from gantrytau_optimica.path_points import SHARP
 
+FEWEST = 8  # points of a recording
+MOST_SPANS = 300  # of the spline through a recording
+PATIENCE = 12  # spans more without a better score, after which the best is taken
+MANY = 4000  # points that are fitted: of longer recordings, means of as many neighbours as that leaves
+PASSES = 4  # of fitting and measuring along the fitted path
+STILL = 20.0  # extent over noise below which nothing but noise was recorded
+FINEST = 15.0  # length of a span over noise: finer ones would draw the noise of a pause
+STRAY = (
+    12.0  # distance over noise from the points recorded before and after, beyond which a point is left out
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A recording as a path; noise: standard deviation of a coordinate in m; far: which point is the furthest off."""
+    """A recording as a path; what is said of it: see Deviation. left_out: rows that were not followed."""
 
     pieces: Pieces
     largest: float
     rms: float
-    far: int
+    row: int
     noise: float
-
-
-FEWEST = 8  # points of a recording
-MOST_SPANS = 80  # of the spline through a recording
-PATIENCE = 8  # spans more without a better score, after which the best is taken
-PASSES = 4  # of fitting and measuring along the fitted path
+    left_out: tuple[int, ...]
 
 
 def noise_of(points: Array) -> float:
@@ -47,33 +53,61 @@ def thinned(points: Array, step: float) -> NDArray[np.int64]:
     return np.array(kept)
 
 
+def strays(points: Array, noise: float) -> NDArray[np.int64]:
+    """Rows of single points that are far from the median of the points around them, as where a sensor failed."""
+    padded = np.pad(points, ((3, 3), (0, 0)), mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, 7, axis=0)
+    away = np.linalg.norm(points - np.median(around, axis=2), axis=1)
+    step = np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    # a quick part of a recording has long steps, but all of its points are about one step from the median
+    usual = np.median(
+        np.lib.stride_tricks.sliding_window_view(np.pad(away, 3, mode="edge"), 7, axis=0), axis=1
+    )
+    return np.flatnonzero(away > STRAY * max(noise, 1e-12) + 3 * step + 6 * usual)
+
+
 def smoothed(points: Array, tolerance: float | None, accuracy: float, name: str) -> Smoothed:
     """The spline of degree 5 with few spans near a recording (n, d).
 
-    With a tolerance the fewest spans that keep every point that near; without, the number that generalised
-    cross-validation finds best, n RSS / (n - p)^2 with p coefficients (Craven and Wahba, 1979).
+    With a tolerance few spans that keep every point that near; without, the number that generalised cross-validation
+    finds best, n RSS / (n - p)^2 with p coefficients (Craven and Wahba, 1979).
     """
-    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
     noise = noise_of(points)
-    rows = thinned(points, float(np.clip(6 * noise, 1e-3 * extent, 0.05 * extent)))
-    along = _first_lengths(points, rows)
-    # the first pass follows lengths that the noise falsifies: it only has to lead close enough
+    left_out = strays(points, noise)
+    kept = _means(np.delete(points, left_out, axis=0))
+    extent = float(np.linalg.norm(np.ptp(kept, axis=0)))
+    if extent <= STILL * noise:
+        raise ModelError(
+            f"{name}: all points lie within {extent:.3g} m, with a noise of about {noise:.2g} m, expected a way that is "
+            "long against the noise; record a motion"
+        )
+    along = _first_lengths(kept, thinned(kept, float(np.clip(6 * noise, 1e-3 * extent, 0.05 * extent))))
+    finest = max(FINEST * noise, 1e-3 * extent)
     pieces, fits = Pieces(np.zeros(0), np.zeros(0)), True
+    # the first pass follows lengths that the noise falsifies: it only has to lead close enough
     for _ in range(PASSES):
-        found, fits = _fit(points, along, tolerance)
+        found, fits = _fit(kept, along, tolerance, finest)
         pieces = by_length(found, accuracy, name)
-        total = along.max()
-        along = nearest(pieces, points, along * pieces.knots[-1] / total)
+        along = nearest(pieces, kept, along * pieces.knots[-1] / along.max())
     distance = np.linalg.norm(points - pieces.derivative(nearest(pieces, points)), axis=1)
-    far = int(np.argmax(distance))
-    if tolerance is not None and not (fits and distance[far] <= tolerance):
+    row = int(np.argmax(np.where(np.isin(np.arange(len(points)), left_out), 0.0, distance)))
+    followed = np.delete(distance, left_out)
+    if tolerance is not None and not (fits and distance[row] <= tolerance):
         best = smoothed(points, None, accuracy, name)
         raise ModelError(
             f"{name}: tolerance={tolerance:g} m is too small for this recording, whose noise is about {noise:.2g} m: "
-            f"found no spline of at most {MOST_SPANS} spans that near; expected at least {best.largest:.3g} m, which "
-            "tolerance=None reaches, as it chooses by the noise"
+            f"no spline of moderate size is that near; expected at least {best.largest:.3g} m, which tolerance=None "
+            "reaches, as it chooses by the noise"
         )
-    return Smoothed(pieces, float(distance[far]), float(np.sqrt(np.mean(distance**2))), far, noise)
+    rms = float(np.sqrt(np.mean(followed**2)))
+    return Smoothed(pieces, float(distance[row]), rms, row, noise, tuple(left_out.tolist()))
+
+
+def _means(points: Array) -> Array:
+    """The mean of every so many successive points."""
+    every = -(-len(points) // MANY)
+    begins = np.arange(0, len(points), every)
+    return np.add.reduceat(points, begins, axis=0) / np.diff(np.append(begins, len(points)))[:, None]
 
 
 def _first_lengths(points: Array, rows: NDArray[np.int64]) -> Array:
@@ -87,8 +121,8 @@ def _first_lengths(points: Array, rows: NDArray[np.int64]) -> Array:
     return starts[chord] + np.clip(share, 0.0, 1.0) * sizes[chord]
 
 
-def _fit(points: Array, along: Array, tolerance: float | None) -> tuple[Curve, bool]:
-    """A least-squares spline over the given lengths, and whether it is as near as asked."""
+def _fit(points: Array, along: Array, tolerance: float | None, finest: float) -> tuple[Curve, bool]:
+    """A least-squares spline over the given lengths, with no span below `finest`, and whether it is as near as asked."""
     order = np.argsort(along, kind="stable")
     u, wanted = along[order] - along.min(), points[order]
     breaks, best = np.array([0.0, u[-1]]), (np.inf, np.array([0.0, u[-1]]))
@@ -99,9 +133,13 @@ def _fit(points: Array, along: Array, tolerance: float | None) -> tuple[Curve, b
         near = tolerance is not None and float(np.max(np.linalg.norm(off, axis=1))) <= tolerance
         if near or (tolerance is None and score < best[0]):
             best = (score, breaks)
-        split = _split(u, off, breaks, tolerance is not None)
-        patience = tolerance is None and size > len(best[1]) + 4 + PATIENCE
-        if near or patience or split is None or len(breaks) > MOST_SPANS:
+        impatient = tolerance is None and len(breaks) > len(best[1]) + PATIENCE + len(best[1]) // 4
+        split = (
+            None
+            if near or impatient or len(breaks) > MOST_SPANS
+            else _split(u, off, breaks, tolerance, finest)
+        )
+        if split is None:
             breaks = best[1] if near or tolerance is None else breaks
             return _curve(_least_squares(u, wanted, breaks), breaks), near or tolerance is None
         breaks = split
@@ -117,32 +155,38 @@ def _least_squares(u: Array, points: Array, breaks: Array) -> interpolate.BSplin
     return interpolate.make_lsq_spline(u, points, knots, k=5)
 
 
-def _split(u: Array, off: Array, breaks: Array, furthest: bool) -> Array | None:
-    """The breaks with the worst span halved, or None where no span has points enough.
+def _split(u: Array, off: Array, breaks: Array, tolerance: float | None, finest: float) -> Array | None:
+    """The breaks with the worst spans halved, or None where none is long and full enough.
 
-    The worst has the furthest point, or the most of what neighbours are off in common: noise has nothing in common.
+    The worst have the furthest points, or the most of what neighbours are off in common: noise has nothing in common.
     """
-    span = np.clip(np.searchsorted(breaks, u, side="right") - 1, 0, len(breaks) - 2)
-    if furthest:
-        score = np.zeros(len(breaks) - 1)
-        np.maximum.at(score, span, np.linalg.norm(off, axis=1))
+    count = len(breaks) - 1
+    span = np.clip(np.searchsorted(breaks, u, side="right") - 1, 0, count - 1)
+    if tolerance is None:
+        score = np.bincount(span[1:], np.sum(off[1:] * off[:-1], axis=1), minlength=count)
     else:
-        score = np.bincount(span[1:], np.sum(off[1:] * off[:-1], axis=1), minlength=len(breaks) - 1)
+        score = np.zeros(count)
+        np.maximum.at(score, span, np.linalg.norm(off, axis=1))
     middles = (breaks[1:] + breaks[:-1]) / 2
     # the normal equations need different points in every span
     different = np.unique(u)
-    left = np.searchsorted(different, middles) - np.searchsorted(different, breaks[:-1])
-    right = np.searchsorted(different, breaks[1:]) - np.searchsorted(different, middles)
-    score = np.where(np.minimum(left, right) >= 6, score, -np.inf)
-    worst = int(np.argmax(score))
-    return np.insert(breaks, worst + 1, middles[worst]) if np.isfinite(score[worst]) else None
+    places = [np.searchsorted(different, at) for at in (breaks[:-1], middles, breaks[1:])]
+    possible = (np.minimum(places[1] - places[0], places[2] - places[1]) >= 3) & (
+        np.diff(breaks) >= 2 * finest
+    )
+    score = np.where(possible, score, -np.inf)
+    worst = np.flatnonzero(possible & (score >= 0.5 * score.max()))
+    worst = (
+        worst[np.argsort(-score[worst])][: 1 + count // 10] if worst.size else np.flatnonzero(possible)[:1]
+    )
+    return np.sort(np.append(breaks, middles[worst])) if worst.size else None
 
 
 def corner_rows(points: Array, noise: float) -> list[tuple[int, float]]:
     """Rows of a recording at which it turns sharply, and by how much, in rad; seen at twenty times its noise."""
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
-    rows = thinned(points, float(np.clip(20 * noise, 5e-3 * extent, 0.05 * extent)))
-    if len(rows) < 7:
+    rows = thinned(points, max(20 * noise, 5e-3 * extent))
+    if len(rows) < 7 or 20 * noise > 0.05 * extent:
         return []
     # directions before and behind three points, as the corner lies between two of them
     ways = points[rows[2:]] - points[rows[:-2]]

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 
 STRAIGHT = 1e-6  # rad: a polyline that turns by less goes straight on
 BACK = np.radians(170.0)  # a corner that turns back further cannot be rounded
+CRAMPED = 0.01  # share of the blend below which a corner counts as driven through
 ACCURACY = 1e-7  # m: how far the pieces may be from the curve they stand for
 
 
@@ -75,13 +76,15 @@ class Corner:
 @dataclass(frozen=True)
 class Deviation:
     """How far a recording is from its path. largest, rms: distance in m; row: of the point that is the furthest
-    off; noise: standard deviation of a coordinate as differences of successive points show it, in m.
+    off; noise: standard deviation of a coordinate as differences of successive points show it, in m; left_out: rows
+    of single points that are far from their neighbours, not followed and not counted.
     """
 
     largest: float
     rms: float
     row: int
     noise: float
+    left_out: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,11 +206,13 @@ class Path:
             raise ModelError(f"{name}: all {len(found)} points are the same, expected a way; record a motion")
         made = smoothed(found, tolerance, ACCURACY, name)
         corners = []
-        for row, angle in corner_rows(found, made.noise):
+        for row, angle in corner_rows(np.delete(found, made.left_out, axis=0), made.noise):
+            row += sum(out <= row for out in made.left_out)
             s = float(nearest(made.pieces, found[row : row + 1])[0])
             gap = float(np.linalg.norm(found[row] - made.pieces.derivative(np.array([s]))[0]))
             corners.append(Corner(row, tuple(found[row].tolist()), angle, s, gap))
-        return cls(made.pieces, tuple(corners), Deviation(made.largest, made.rms, made.far, made.noise))
+        off = Deviation(made.largest, made.rms, made.row, made.noise, made.left_out)
+        return cls(made.pieces, tuple(corners), off)
 
     @classmethod
     def _rounded(
@@ -232,6 +237,14 @@ class Path:
                 "the way back a path of its own"
             )
         pieces, places, gaps = rounded(arcs, distance, ACCURACY, name)
+        small = int(np.argmin(gaps))
+        if gaps[small] < CRAMPED * distance:
+            row = inner[small]
+            raise ModelError(
+                f"{name}: beside points[{row}] = {words(points[row])} the way is too short to round the corner to more "
+                f"than {gaps[small]:.2g} m, expected about blend={distance:g} m; leave out that point or its neighbour, "
+                "or choose a smaller blend"
+            )
         corners = [
             Corner(row, tuple(points[row].tolist()), float(angles[row - 1]), s, gap)
             for row, s, gap in zip(inner, places, gaps, strict=True)

@@ -206,6 +206,25 @@ def test_a_recording_that_repeats_its_points_and_has_no_noise():
     assert path.corners == ()
 
 
+def test_a_point_that_is_far_off_is_not_followed():
+    _, recorded = recording()
+    stray = recorded.copy()
+    stray[1200] += [0.0, 0.2, 0.0]
+    path = Path.recorded(stray)
+    assert deviation(path).left_out == (1200,)
+    assert path.length == pytest.approx(Path.recorded(recorded).length, abs=NOISE)
+    assert deviation(path).largest < 6 * NOISE
+
+
+def test_a_long_recording_and_one_that_starts_slowly_are_not_drawn_with_their_noise():
+    u = np.linspace(0.0, 1.0, 12000)[:, None] ** 4
+    way = np.hstack([np.cos(2 * u), np.sin(2 * u), 0.3 * u])
+    path = Path.recorded(way + np.random.default_rng(8).normal(0.0, NOISE, way.shape))
+    assert path.length == pytest.approx(np.hypot(2.0, 0.3), abs=10 * NOISE)
+    # 4 / (4 + 0.09): a spline that follows the noise bends a thousand times as much
+    assert np.abs(path.curvature(np.linspace(0.0, path.length, 2000)) - 0.978).max() < 0.3
+
+
 def test_a_corner_in_a_recording_is_listed():
     u = np.linspace(0, 1, 1500)
     way = np.vstack([np.column_stack([u, 0 * u, 0 * u]), np.column_stack([0 * u + 1, u, 0 * u])])
