@@ -194,7 +194,7 @@ class Path:
         """A recording (n, 3) or (n, 2) in m, as a robot that is led by hand makes it: with noise, pauses, and
         points that repeat; smoothed.
 
-        tolerance: the path has as few pieces as possible and is at every point nearer than this, in m; None: it is as
+        tolerance: the path has few pieces and is nearer than this to every point, in m; None: it is as
         smooth as the noise suggests, by generalised cross-validation. `.deviation` says how near it is; corners are
         rounded, and listed in `.corners`. Raises ModelError where no spline of moderate size is that near.
         """

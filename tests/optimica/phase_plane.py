@@ -25,6 +25,7 @@ from scipy.integrate import solve_ivp
 root: Any = optimize.brentq
 GRAVITY = np.array([0.0, 0.0, -9.81])
 TOLERANCE = 1e-11
+HIGHEST = 20.0  # m/s, above all speeds
 
 
 @dataclass(frozen=True)
@@ -46,41 +47,86 @@ class OnPath:
     length: float
     limit: float
 
-    def forces(self, s: float, v: float) -> tuple[np.ndarray, np.ndarray]:
-        """Actuator forces as mass * s.. + rest, (3,) in kg and N."""
+    def coefficients(self, s: float) -> tuple[np.ndarray, ...]:
+        """What the forces depend on at s, (3,) each: f = mass s.. + square s.^2 + weight + friction(q1 s.)."""
         p = self.prototype
         place, first, second = self.derivatives(s)
         anchor = np.array([arm.offset for arm in p.arms])
         axis = np.array([arm.direction for arm in p.arms])
         length = np.array([arm.length for arm in p.arms])
         ahead = np.sum((place - anchor) * axis, axis=1)
-        square = np.sum(axis**2, axis=1)
+        norm = np.sum(axis**2, axis=1)
         away = np.sum((place - anchor) ** 2, axis=1)
         # the tool is ahead of the carts: the smaller of the two solutions of |D| = length
-        q = (ahead - np.sqrt(ahead**2 - square * (away - length**2))) / square
+        q = (ahead - np.sqrt(ahead**2 - norm * (away - length**2))) / norm
         link = place - anchor - q[:, None] * axis
         reach = np.sum(link * axis, axis=1)
         q1 = link @ first / reach
         q2 = (np.sum((first - axis * q1[:, None]) ** 2, axis=1) + link @ second) / reach
-        pull = np.linalg.solve(link.T, np.column_stack([first, second * v**2 - GRAVITY])) * p.plate_mass
+        pull = (
+            p.plate_mass
+            * np.linalg.solve(link.T, np.column_stack([first, second, -GRAVITY]))
+            * reach[:, None]
+        )
         mass = np.array(p.cart_masses)
-        friction = np.array(p.coulomb) * np.tanh(q1 * v / 0.05) + np.array(p.viscous) * q1 * v
-        return mass * q1 + pull[:, 0] * reach, mass * q2 * v**2 + friction + pull[:, 1] * reach
+        return mass * q1 + pull[:, 0], mass * q2 + pull[:, 1], pull[:, 2], q1
+
+    def forces(self, s: float, v: float) -> tuple[np.ndarray, np.ndarray]:
+        """Actuator forces as mass * s.. + rest, (3,) in kg and N."""
+        mass, square, weight, q1 = self.coefficients(s)
+        return mass, square * v**2 + weight + self._friction(q1 * v)
+
+    def _friction(self, speed: np.ndarray) -> np.ndarray:
+        return (
+            np.array(self.prototype.coulomb) * np.tanh(speed / 0.05)
+            + np.array(self.prototype.viscous) * speed
+        )
 
     def interval(self, s: float, v: float) -> tuple[float, float]:
         """The least and the largest acceleration along the path that all limits allow, in m/s2."""
-        mass, rest = self.forces(s, v)
+        return self._interval(self.coefficients(s), v)
+
+    def _interval(self, coefficients: tuple[np.ndarray, ...], v: float) -> tuple[float, float]:
+        mass, square, weight, q1 = coefficients
+        rest = square * v**2 + weight + self._friction(q1 * v)
         one, other = (-self.limit - rest) / mass, (self.limit - rest) / mass
         return float(np.max(np.minimum(one, other))), float(np.min(np.maximum(one, other)))
 
-    def limit_speed(self, s: float, highest: float = 50.0) -> float:
-        """The speed above which no acceleration is allowed: the limit curve, in m/s."""
+    def duration_by_reach(self, steps: int) -> float:
+        """The same for any number of switches, to first order in 1 / steps: s.. is constant on each part of s.
+
+        Backwards, the largest speeds from which the end is reached with no limit violated; then forwards, as fast as
+        the limits and those speeds allow (Pham and Pham, 2018, without their assumption that forces are linear in s.^2).
+        """
+        u = np.linspace(0.0, 1.0, steps + 1)
+        grid = (
+            self.length * u**2 * (3 - 2 * u)
+        )  # finer towards both ends, where speeds grow with the root of s
+        h = np.diff(grid)
+        known = [self.coefficients(s) for s in grid]
+        reachable = np.zeros(steps + 1)  # squares of speeds
+        for i in range(steps - 1, -1, -1):
+            reachable[i] = self._slowed(known[i], float(reachable[i + 1]), h[i])
+        square, duration = 0.0, 0.0
+        for i in range(steps):
+            _, most = self._interval(known[i], np.sqrt(square))
+            after = min(square + 2 * h[i] * most, float(reachable[i + 1]))
+            duration += 2 * h[i] / (np.sqrt(square) + np.sqrt(after))
+            square = after
+        return float(duration)
+
+    def _slowed(self, coefficients: tuple[np.ndarray, ...], after: float, h: float) -> float:
+        """The largest square of a speed, below the limit curve, from which a step leads to at most `after`."""
 
         def margin(v: float) -> float:
-            low, high = self.interval(s, v)
+            low, high = self._interval(coefficients, v)
             return high - low
 
-        return highest if margin(highest) > 0 else float(root(margin, 0.0, highest, xtol=1e-12))
+        def over(v: float) -> float:
+            return v**2 + 2 * h * self._interval(coefficients, v)[0] - after
+
+        top = HIGHEST if margin(HIGHEST) > 0.0 else float(root(margin, 0.0, HIGHEST, xtol=1e-13))
+        return top**2 if over(top) <= 0.0 else float(root(over, 0.0, top, xtol=1e-13)) ** 2
 
     def fastest(self) -> Fastest:
         """From rest to rest, for motions that speed up once and slow down once. ValueError for others."""

@@ -1,9 +1,11 @@
 """Motions of the three-link robot along paths, against the exact answer in the phase plane."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Bounds, Real, StateSelect, between, translate
+from gantrytau import Bounds, Real, StateSelect, between, der, translate
+from gantrytau.functions import dot
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
 from gantrytau_optimica.paths import Path, Way
@@ -68,6 +70,47 @@ def test_a_spline_takes_the_exact_time_to_the_accuracy_of_the_mesh():
     # limits hold at the collocation points only, so the time may be too short as well as too long
     assert abs(errors[0]) < 5e-4
     assert abs(errors[1]) < abs(errors[0]) / 4
+
+
+def extrapolated(exact, steps):
+    """The time by reachable speeds, whose error is of first order in the step, without that order."""
+    coarse, fine = (exact.duration_by_reach(count) for count in (steps, 2 * steps))
+    return 2 * fine - coarse
+
+
+def test_two_ways_in_the_phase_plane_agree():
+    exact = phase_plane(Path.through(ARC))
+    # what extrapolation leaves shrinks with the square of the step; measured: 3e-7 s
+    assert extrapolated(exact, 500) == pytest.approx(exact.fastest().duration, abs=1e-6)
+
+
+def test_more_than_a_turn_of_a_circle_with_several_switches():
+    """The way meets itself, the tool turns back in every coordinate, and the limit curve is in the way."""
+    path = Path.of(
+        lambda u: (0.7 + 0.5 * ca.cos(u), 2.9 + 0.5 * ca.sin(u), -0.7 + 0.2 * ca.sin(u)), np.pi, 2.6 * np.pi
+    )
+    exact = phase_plane(path)
+    with pytest.raises(ValueError, match="more switches than one"):
+        exact.fastest()
+    # measured: 4e-5 s on this mesh, 1e-5 s on twice as many elements
+    assert optimize(along(path), elements=100).final_time == pytest.approx(
+        extrapolated(exact, 1000), abs=1e-4
+    )
+
+
+def test_the_tools_whole_acceleration_is_limited():
+    path = Path.through(ARC)
+
+    class Gentle(along(path)):
+        def constraints(self):
+            yield from super().constraints()
+            yield dot(der(self.robot.tool.v), der(self.robot.tool.v)) <= 3.0**2
+
+    found = optimize(Gentle)
+    whole = np.linalg.norm(found["der(robot.tool.v)"], axis=1)
+    assert whole[1:].max() < 3.0 * (1 + 1e-6)
+    # from rest to rest with 3 m/s2 on a straight line; a curve takes longer
+    assert 2 * np.sqrt(path.length / 3.0) < found.final_time < 2.2 * np.sqrt(path.length / 3.0)
 
 
 def test_a_symbol_of_ones_own_is_a_way_along_a_path():
