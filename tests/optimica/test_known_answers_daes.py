@@ -234,7 +234,9 @@ def test_swing_up_in_the_plane():
     guess = {"bob.x": lambda t: np.sin(turn(t)), "bob.y": lambda t: -np.cos(turn(t))}
     by_angle = optimize(UpByAngle, elements=40, guess={"swing.phi": turn}).objective
     # the pendulum passes the level, where either coordinate alone cannot be a state
-    assert optimize(UpInPlane, elements=40, guess=guess, max_iterations=200).objective == pytest.approx(by_angle, rel=1e-4)
+    assert optimize(UpInPlane, elements=40, guess=guess, max_iterations=200).objective == pytest.approx(
+        by_angle, rel=1e-4
+    )
 
 
 def test_a_fixed_angle_of_the_pendulum_in_the_plane():
