@@ -54,7 +54,10 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class FreeNumber:
-    """A number that is chosen, or held at its guess for one solve and changed for the next."""
+    """A number that is chosen, or held at its guess for one solve and changed for the next.
+
+    nominal: its typical size, where the guess does not tell it.
+    """
 
     name: str
     symbol: ca.SX
@@ -62,6 +65,7 @@ class FreeNumber:
     max: float
     guess: float
     held: bool = False
+    nominal: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
