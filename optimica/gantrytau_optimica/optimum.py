@@ -1,7 +1,7 @@
 """The answer of an optimisation, looked up by the model's own names."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
 from gantrytau_optimica.ipopt import Solution
 from gantrytau_optimica.program import Program
+from gantrytau_optimica.relaxation import Relaxed, relax
 from gantrytau_optimica.reporting import report
 from gantrytau_optimica.trajectory import Trajectory
 
@@ -200,7 +201,17 @@ class Optimum:
 
     def report(self) -> str:
         """How it ended, and what remains violated or binds, in the model's words."""
-        return report(self.program, self.solution, list(self.phases.values()))
+        return report(self.built, self.program, self.solution, list(self.phases.values()))
+
+    @cached_property
+    def relaxed(self) -> Relaxed:
+        """Which limits and conditions would have to give for a solution, and by how much; takes some seconds."""
+        return relax(self.built, self.program, self.solution)
+
+    @property
+    def nearest(self) -> "Optimum":
+        """The motion of the model that violates limits and conditions least, as a guess or to look at."""
+        return replace(self, solution=self.relaxed.solution)
 
     def _values(self, names: Sequence[str], phase: Trajectory, times: np.ndarray) -> np.ndarray:
         """Values (names, times) of scalars of the model."""
