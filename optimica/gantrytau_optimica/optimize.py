@@ -21,6 +21,7 @@ from gantrytau_optimica.program import Program, check_freedom, transcribe
 from gantrytau_optimica.reach import out_of_reach, reach_text
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import FreeNumber, Phase
+from gantrytau_optimica.relaxation import worth_relaxing
 from gantrytau_optimica.scheme import collocation
 
 Problem = Optimization | type[Optimization] | ReadProblem
@@ -151,7 +152,8 @@ class Prepared:
         optimum = Optimum(read.name, built, program, solution, self.build_time)
         if not solution.success:
             remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
-            raise SolveError(f"{optimum.report()}\n{remedy}", optimum=optimum)
+            ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
+            raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
         return optimum
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
