@@ -1,5 +1,6 @@
 """First guesses: what the caller gives, else a straight line between given ends, else the start values."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -99,7 +100,7 @@ def _one(
 
     def guess(fraction: np.ndarray) -> np.ndarray:
         try:
-            if isinstance(value, _Stretched):
+            if isinstance(value, Stretched):
                 raw = value.at(fraction)[:, None]
             elif callable(value):
                 raw = np.array(
@@ -120,9 +121,17 @@ def _one(
     return guess
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretched:
+class Stretched(ABC):
     """A signal of another solution, given over shares of its own horizon."""
+
+    @abstractmethod
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        """Values at shares (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretched(Stretched):
+    """Straight lines between samples."""
 
     share: np.ndarray
     values: np.ndarray
