@@ -57,6 +57,13 @@ class Estimate:
         return self.chi_square / self.freedom if self.freedom > 0 else np.nan
 
     @property
+    def noise(self) -> float:
+        """Standard deviation of the residuals, of a robust fit 1.4826 times the median of their amounts."""
+        if self.loss == "robust":
+            return 1.4826 * float(np.median(np.abs(self.errors)))
+        return float(np.sqrt(self.variance))
+
+    @property
     def probability(self) -> float:
         """That noise of the given deviations leaves as large a chi_square; NaN where none were given."""
         return (

@@ -72,18 +72,19 @@ def plan(
     return Plan(read, tuple(change.numbers), experiments, still)
 
 
-def path_of(read: ReadProblem, experiment: Experiment) -> str:
-    """Path of the model of an experiment within the problem."""
-    return f"{experiment.name}.model"
-
-
 def _phase(model: Model, experiment: Experiment, factor: float) -> Optimization:
     """The phase of one experiment, not yet with free parameters."""
 
     def objective(self: Any) -> Any:
         total = 0.0
         for name, samples in experiment.measured.items():
-            total = total + factor * sum_of_squares(member(self.model, name), samples)
+            found = member(self.model, name)
+            columns = samples.values.shape[1]
+            if found.numel() != columns:
+                raise ModelError(
+                    f"measured {name}: found samples of {columns} columns, expected {found.numel()}"
+                )
+            total = total + factor * sum_of_squares(found, samples)
         return total
 
     begin, stop = experiment.horizon
@@ -145,6 +146,8 @@ class _Change:
                 place = self._find(found, experiment, name, "start")
                 values = self._values(f"{prefix}start({name})", found[place[0]], place[1], value)
                 self._set_start(found, place, values, experiment)
+            for name in experiment.inputs:
+                self._find(found, experiment, name, "inputs")
         parameters = tuple(found[p.name] for p in flat.parameters)
         return replace(
             flat,

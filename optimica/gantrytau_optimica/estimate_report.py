@@ -12,7 +12,7 @@ def report_fit(fit: "Estimate") -> str:
     """Parameters with deviations and 95 % intervals, correlations, residuals and warnings."""
     deviations = fit.deviations
     intervals = fit.intervals(0.95)
-    width = max(9, *(len(n) for n in fit.parameters))
+    width = max(len(n) for n in (*fit.parameters, "parameter"))
     count = len(fit.experiments)
     lines = [
         f"{fit.name}: {len(fit.parameters)} numbers from {fit.errors.size} values of {count} "
@@ -37,6 +37,11 @@ def report_fit(fit: "Estimate") -> str:
 
 
 def _fit_words(fit: "Estimate") -> str:
+    if fit.loss == "robust":
+        return (
+            f"{int(np.sum(fit.weights < 1))} values count less than others, the least {np.min(fit.weights):.2g}; deviation "
+            f"of the noise by the median: {fit.noise:.4g}"
+        )
     if fit.known:
         return (
             f"chi-square {fit.chi_square:.6g} for {fit.freedom} degrees of freedom (probability {fit.probability:.3g}); "
@@ -44,7 +49,7 @@ def _fit_words(fit: "Estimate") -> str:
         )
     return (
         f"sum of squares {fit.chi_square:.6g}; deviation of the noise, estimated from {fit.freedom} degrees of freedom: "
-        f"{np.sqrt(fit.variance):.4g}"
+        f"{fit.noise:.4g}"
     )
 
 

@@ -215,11 +215,6 @@ def _answer(
             if abs(parameters[number.name] - bound) <= AT_BOUND * number.size:
                 at_bounds[number.name] = bound
     inner = [k for k, name in enumerate(order) if name not in at_bounds]
-    if not inner:
-        raise SolveError(
-            f"{read.read.name}: all estimated numbers stand at their limits ({', '.join(at_bounds)}); widen these",
-            optimum=optimum,
-        )
     slopes = found.jacobian(w)[:, inner]
     scales = np.concatenate([s.deviations for s in found.program.problem.sums])
     measured = np.concatenate([s.values for s in found.program.problem.sums])
@@ -242,6 +237,8 @@ def _refuse_lost(
     values = w[free][inner]
     sizes = np.array([max(abs(v), 1e-3 * size[n]) for n, v in zip(names, values, strict=True)])
     point = Point(slopes, values)
+    if not inner:
+        return
     silent = without_influence(point, sizes, measured)
     kept = [k for k in range(len(inner)) if k not in silent]
 
@@ -259,8 +256,9 @@ def _refuse_lost(
             [names[k] for k in kept], Point(slopes[:, kept], values[kept]), sizes[kept], elsewhere
         )
     if words:
+        remedy = "Leave it out" if len(words) == len(silent) == 1 else "Take one of each as known"
         raise SolveError(
-            f"{read.read.name}: {'; '.join(words)}. Give one of them as known, or add measured variables or "
-            "experiments that tell them apart.",
+            f"{read.read.name}: {'; '.join(words)}. {remedy}, or add measured variables or experiments in which they "
+            "show.",
             optimum=optimum,
         )

@@ -13,8 +13,7 @@ from scipy.linalg import qr
 
 RANK = 1e-7  # of the largest singular value of normed columns: below it parameters cannot be told apart
 SILENT = 1e-10  # of the measured values: a parameter that moves them less, when doubled, has no influence
-SIMPLE = (1.0, 2.0, 0.5, 3.0, 1 / 3, 1.5, 2 / 3)
-EXPONENTS = {1.0: "", 2.0: "^2", 0.5: "^(1/2)", 3.0: "^3", 1 / 3: "^(1/3)", 1.5: "^(3/2)", 2 / 3: "^(2/3)"}
+EXPONENTS = {1.0: "", 2.0: "^2", 3.0: "^3", 4.0: "^4", 1.5: "^(3/2)"}  # of simple laws
 SURE = 1e-3  # how closely a ratio of changes is to be a simple number
 
 
@@ -89,21 +88,22 @@ def _sentence(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> 
     relative = relative / relative[np.argmax(np.abs(relative))]
     if len(points) == 2 and np.allclose(relative, 1.0, atol=SURE):
         return f"{together}: they are determined up to a common factor only"
-    steps = ", ".join(f"{n} by {100 * r:+.3g} %" for n, r in zip(names, relative, strict=True))
+    steps = ", ".join(f"{n} by {r:+.3g} %" for n, r in zip(names, relative, strict=True))
     return f"{together}: changing {steps} changes nothing"
 
 
 def _pair(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> str:
     """The ratio, product, difference or sum of two that is determined; "" if it is none of these."""
-    a, b = names
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = [(c[1] / v[1]) / (c[0] / v[0]) for c, v in points]  # d ln b / d ln a
-        absolute = [c[1] / c[0] for c, _ in points]
-    for power in SIMPLE:
-        if all(abs(r - power) < SURE for r in relative):
-            return f"{b} / {a}{EXPONENTS[power]}" if power != 1.0 else f"{a} / {b}"
-        if all(abs(r + power) < SURE for r in relative):
-            return f"{b} * {a}{EXPONENTS[power]}" if power != 1.0 else f"{a} * {b}"
-    if all(abs(r - 1) < SURE for r in absolute):
-        return f"{a} - {b}"
-    return f"{a} + {b}" if all(abs(r + 1) < SURE for r in absolute) else ""
+        relative = np.array([(c / v)[1] / (c / v)[0] for c, v in points])  # d ln b / d ln a
+        absolute = np.array([c[1] / c[0] for c, _ in points])
+        a, b = names
+        if np.all(np.abs(relative) < 1 - SURE):  # so that the exponent is not below one
+            a, b, relative = b, a, 1 / relative
+    for power, text in EXPONENTS.items():
+        for sign, word in ((1, "/"), (-1, "*")):
+            if np.all(np.abs(relative - sign * power) < SURE):
+                return f"{b} {word} {a}{text}" if text else f"{names[0]} {word} {names[1]}"
+    if np.all(np.abs(absolute - 1) < SURE):
+        return f"{names[0]} - {names[1]}"
+    return f"{names[0]} + {names[1]}" if np.all(np.abs(absolute + 1) < SURE) else ""
