@@ -17,6 +17,7 @@ from gantrytau_optimica.trajectory import Trajectory
 from gantrytau_optimica.wording import definition_words, motion_words
 
 KINDS = ("value", "derivative", "curvature")
+TINY = 1e-100  # whose negative powers, as in derivatives of roots, are beyond all numbers
 LONG = 60  # characters of an operand that are still read
 
 
@@ -238,7 +239,7 @@ def _operations(expression: ca.SX, symbols: ca.SX) -> Iterator[tuple[int, ca.SX,
 def _root(a: float, b: float, first: bool, second: bool) -> str:
     if a < 0:
         return "the square root of {}"
-    return "the square root of {}, infinitely steep there" if first and a == 0 else ""
+    return "the square root of {}, infinitely steep there" if first and a < TINY else ""
 
 
 def _logarithm(a: float, b: float, first: bool, second: bool) -> str:

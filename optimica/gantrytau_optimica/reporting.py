@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,7 @@ from gantrytau_optimica.trajectory import Trajectory
 
 ORDER = ("boundary", "path", "step", "border", "continuity", "algebraic", "dynamics")
 MET = 1e-6  # of its size: what is violated by less is met
+NEAR = 1e-5  # of its typical size: an unknown that is closer to a border is meant to be there
 END = re.compile(r"^(initial|final)\((.*)\)$")
 STUCK = tuple(
     WORDS[word]
@@ -90,7 +92,19 @@ def _numbers_lost(
         ]
     if found:
         return _list("Not finite where it stopped:", [str(one) for one in found], 6)
-    return []
+    snapped = _snapped(program, solution.w)
+    beside = [replace(phase, w=snapped, numbers=snapped[program.places.free]) for phase in phases]
+    return _list("It stopped close to where:", [str(one) for one in not_finite(built, beside)], 6)
+
+
+def _snapped(program: Program, w: np.ndarray) -> np.ndarray:
+    """Unknowns with those that are almost zero, or almost at a limit, put there: where roots and logarithms end."""
+    scale = program.places.scale
+    w = np.where(np.abs(w) < NEAR * scale, 0.0, w)
+    for bound in (program.lbw * scale, program.ubw * scale):
+        with np.errstate(invalid="ignore"):
+            w = np.where(np.abs(w - bound) < NEAR * scale, bound, w)
+    return w
 
 
 def _runaways(program: Program, solution: Solution, meanings: Meanings) -> list[str]:
