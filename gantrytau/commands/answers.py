@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gantrytau.commands.models import Chosen
+from gantrytau.commands.reporting import CommandError
+from gantrytau.symbols import split_derivative
 
 if TYPE_CHECKING:
     from gantrytau.flat_model import FlatModel
@@ -58,14 +60,26 @@ def show(optimum: Any, flat: "FlatModel", files: list[str]) -> None:
 
 
 def selected(optimum: Any, names: tuple[str, ...]) -> "Result":
-    """The variables to draw as a result: derivatives and free numbers, too."""
+    """The variables to draw as a result: derivatives and free numbers, too.
+
+    CommandError for a derivative that the equations do not determine, as that of an input.
+    """
     from gantrytau.result import Result
     from gantrytau.trajectories import labels
 
     elements = [element for name in names for element in optimum.dae.expand(name)]
     units, words = labels(optimum.dae)
-    values = {element: optimum[element] for element in elements if element != "time"}
+    values = {element: _values(optimum, element) for element in elements if element != "time"}
     return Result(optimum.time, values, units=units, descriptions=words, title=optimum.result.title)
+
+
+def _values(optimum: Any, name: str) -> Any:
+    try:
+        return optimum[name]
+    except RuntimeError as error:  # CasADi's, of symbols without values
+        raise CommandError(
+            f"--plot {name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
+        ) from error
 
 
 def in_options(message: str) -> str:

@@ -14,7 +14,7 @@ from gantrytau.commands.choice import source_of
 from gantrytau.commands.guesses import FORMATS, read_result
 from gantrytau.commands.models import Chosen, Kind, build
 from gantrytau.commands.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
-from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, note, reporting
+from gantrytau.commands.reporting import FAULT, INTERRUPTED, MISUSE, CommandError, as_json, note, reporting
 from gantrytau.errors import GantryTauError, SolveError, did_you_mean
 
 if TYPE_CHECKING:
@@ -80,13 +80,15 @@ def optimize(
             optimum = _solved(chosen, quiet, policy)
         except SolveError as error:
             _leave(error, chosen, save, json)
-        files = saving.save(optimum.result, save)
-        if place:
-            files += pictures.draw(answers.selected(optimum, drawn), drawn, place)
+        files, wrong = _written(optimum, save, drawn, place)
         if json:
-            typer.echo(as_json(answers.summary(chosen, optimum, files)))
+            found = answers.summary(chosen, optimum, files)
+            typer.echo(as_json({**found, "error": wrong} if wrong else found))
         else:
             answers.show(optimum, flat, files)
+        if wrong:
+            note(wrong)
+            raise typer.Exit(MISUSE)
 
 
 def _flat(chosen: Chosen, drawn: tuple[str, ...]) -> "FlatModel":
@@ -129,6 +131,23 @@ def _live(name: str, quiet: bool) -> Iterator[Callable[[int, float], None] | Non
                 f"{name}: iteration {iteration}, objective {objective:.6g}, {time.perf_counter() - begin:.1f} s"
             )
         )
+
+
+def _written(
+    optimum: Any, save: Path | None, drawn: tuple[str, ...], place: str | None
+) -> tuple[list[str], str]:
+    """The files of a solution, and why some are not written, which does not cost the answer."""
+    files: list[str] = []
+    wrong: list[str] = []
+    try:
+        files += saving.save(optimum.result, save)
+    except GantryTauError as error:
+        wrong.append(str(error))
+    try:
+        files += pictures.draw(answers.selected(optimum, drawn), drawn, place) if place else []
+    except GantryTauError as error:
+        wrong.append(str(error))
+    return files, "\n".join(wrong)
 
 
 def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> NoReturn:

@@ -149,7 +149,13 @@ class _Split:
             elif not isinstance(course, ca.SX):
                 samples, column = course
                 courses.append(
-                    Course(name, symbol, partial(samples.at, column=column), samples.jumps(column), samples.kinks())
+                    Course(
+                        name,
+                        symbol,
+                        partial(samples.at, column=column),
+                        samples.jumps(column),
+                        samples.kinks(),
+                    )
                 )
         return Phase(
             name=self.read.phases[number].name,

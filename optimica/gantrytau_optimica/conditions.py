@@ -125,7 +125,9 @@ def with_targets(
 
 
 def _course(symbol: ca.SX, samples: Samples, column: int) -> Course:
-    return Course(symbol.name(), symbol, lambda times: samples.at(times, column), samples.jumps(column), samples.kinks())
+    return Course(
+        symbol.name(), symbol, lambda times: samples.at(times, column), samples.jumps(column), samples.kinks()
+    )
 
 
 def _horizon(read: ReadProblem, phase: Phase, target: Target) -> tuple[float, float]:

@@ -36,7 +36,9 @@ def _pieces(name: str, wanted: Any) -> Pieces:
     if isinstance(wanted, str):
         wanted = dict(kind=wanted)
     if not isinstance(wanted, Mapping):
-        raise ModelError(f"controls {name}: found {wanted!r}, expected dict(kind='constant' | 'linear' | 'ramps', ...)")
+        raise ModelError(
+            f"controls {name}: found {wanted!r}, expected dict(kind='constant' | 'linear' | 'ramps', ...)"
+        )
     for key in wanted:
         if key not in KEYS:
             raise ModelError(f"controls {name}: there is no '{key}'{did_you_mean(str(key), KEYS)}")
@@ -44,7 +46,9 @@ def _pieces(name: str, wanted: Any) -> Pieces:
     if kind not in ("constant", "linear", "ramps"):
         raise ModelError(f"controls {name}: found kind={kind!r}, expected 'constant', 'linear' or 'ramps'")
     if kind == "ramps" and len(wanted) > 1:
-        raise ModelError(f"controls {name}: ramps jump at every border, expected no other setting beside kind='ramps'")
+        raise ModelError(
+            f"controls {name}: ramps jump at every border, expected no other setting beside kind='ramps'"
+        )
     elements = wanted.get("elements", 1)
     if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or elements < 1:
         raise ModelError(

@@ -1,7 +1,8 @@
 """First guesses: what the caller gives, else a straight line between given ends, else the start values."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -40,6 +41,22 @@ def first_guesses(built: "Built", given: Mapping[str, Any]) -> dict[str, Guess]:
             symbols[course.symbol.name()] = _course(course, span)
         found.update(_algebraics(built, phase, symbols, own, span))
     return found
+
+
+def with_algebraics(built: "Built", problem: ControlProblem) -> ControlProblem:
+    """The problem with algebraics guessed anew from the guesses of its other signals, where these give them outright."""
+    built = replace(built, problem=problem)
+    phases = []
+    for phase in problem.phases:
+        span = horizon(problem, phase)
+        symbols = {s.symbol.name(): s.guess for s in (*phase.states, *phase.inputs)}
+        symbols |= {c.symbol.name(): _course(c, span) for c in phase.courses}
+        own = {a.symbol.name(): a.guess for a in phase.algebraics if a.name not in built.closed}
+        found = _algebraics(built, phase, symbols, own, span)
+        phases.append(
+            replace(phase, algebraics=tuple(replace(a, guess=found[a.name]) for a in phase.algebraics))
+        )
+    return replace(problem, phases=tuple(phases))
 
 
 def horizon(problem: ControlProblem, phase: Phase) -> tuple[float, float]:
@@ -99,7 +116,7 @@ def _one(
 
     def guess(fraction: np.ndarray) -> np.ndarray:
         try:
-            if isinstance(value, _Stretched):
+            if isinstance(value, Stretched):
                 raw = value.at(fraction)[:, None]
             elif callable(value):
                 raw = np.array(
@@ -120,9 +137,17 @@ def _one(
     return guess
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretched:
+class Stretched(ABC):
     """A signal of another solution, given over shares of its own horizon."""
+
+    @abstractmethod
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        """Values at shares (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretched(Stretched):
+    """Straight lines between samples."""
 
     share: np.ndarray
     values: np.ndarray

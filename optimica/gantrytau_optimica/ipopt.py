@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -26,6 +26,10 @@ WORDS = {
     "Invalid_Number_Detected": "stuck: an expression is not finite",
     "Not_Enough_Degrees_Of_Freedom": "more conditions than unknowns",
 }
+NOT_BEGUN = "not begun: an expression is not finite at the first guess"
+PUSH = 1e-2  # Ipopt's bound_push and bound_frac: how far a guess is moved inside of its limits
+
+FAR = 1e5  # typical sizes that an unknown moves from its guess when it runs away
 
 Progress = Callable[[int, float], None]  # iteration, objective
 
@@ -61,10 +65,11 @@ class Solver:
     def __init__(self, program: Program, policy: Policy):
         assembled = program.assembled
         self.policy = policy
-        self.watch = _Watch(assembled.variables, assembled.rows, policy.progress)
+        self.watch = Watch(assembled.variables, assembled.rows, policy.progress)
         options = {
             "iteration_callback": self.watch,
             "print_time": False,
+            "show_eval_warnings": False,
             "calc_lam_p": False,
             "ipopt": {
                 "print_level": 0,
@@ -98,6 +103,9 @@ class Solver:
     def solve(self, program: Program, guess: np.ndarray) -> Solution:
         """Solve the program, with its limits as they are now, from unknowns `guess` (unscaled)."""
         begin = time.perf_counter()
+        first = pushed(program, guess)
+        if not finite(program, first):
+            return replace(self.unsolved(program, first), status=NOT_BEGUN)
         self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
         with on_interrupt(self.watch.ask_to_stop):
             found = self.nlpsol(
@@ -111,6 +119,9 @@ class Solver:
             raise self.watch.error
         stats: dict[str, Any] = self.nlpsol.stats()
         word = str(stats["return_status"])
+        moved = np.abs(np.array(found["x"]).ravel() - first / program.places.scale)
+        if word.startswith("Maximum") and np.max(moved, initial=0.0) > FAR:
+            word = "Diverging_Iterates"
         return Solution(
             w=np.array(found["x"]).ravel() * program.places.scale,
             multipliers=np.array(found["lam_g"]).ravel(),
@@ -124,7 +135,25 @@ class Solver:
         )
 
 
-class _Watch(ca.Callback):
+def pushed(program: Program, guess: np.ndarray) -> np.ndarray:
+    """The guess (unscaled) where Ipopt begins: some way inside of its limits."""
+    scale, lower, upper = program.places.scale, program.lbw, program.ubw
+    x, width = guess / scale, upper - lower
+    with np.errstate(invalid="ignore"):
+        low = lower + np.minimum(PUSH * np.maximum(1.0, np.abs(lower)), PUSH * width)
+        high = upper - np.minimum(PUSH * np.maximum(1.0, np.abs(upper)), PUSH * width)
+    x = np.where(np.isfinite(lower), np.maximum(x, low), x)
+    return np.where(np.isfinite(upper), np.minimum(x, high), x) * scale
+
+
+def finite(program: Program, w: np.ndarray) -> bool:
+    """Whether objective, conditions and their first derivatives are finite numbers at unknowns w (unscaled)."""
+    x, none, assembled = w / program.places.scale, ca.DM(0, 1), program.assembled
+    parts = [*assembled.nlp(x, none), assembled.grad_f(x, none)[1], assembled.jac_g(x, none)[1]]
+    return all(np.all(np.isfinite(np.array(part.nonzeros()))) for part in parts)
+
+
+class Watch(ca.Callback):
     """Called by Ipopt after every iteration: reports progress, and stops when Ctrl-C was pressed."""
 
     def __init__(self, unknowns: int, constraints: int, progress: Progress | None):

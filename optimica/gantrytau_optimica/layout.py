@@ -171,7 +171,7 @@ def lay_out(problem: ControlProblem, meshes: tuple[Mesh, ...], scheme: Collocati
     """Number the unknowns: free numbers, then element after element, so that what belongs together stands together."""
     layouts: list[Layout] = []
     size = len(problem.free)
-    scales = [np.array([max(abs(n.guess), 1e-3) for n in problem.free])]
+    scales = [np.array([n.nominal or max(abs(n.guess), 1e-3) for n in problem.free])]
     for phase, mesh in zip(problem.phases, meshes, strict=True):
         layout = _lay_out(phase, mesh, scheme, size)
         size += layout.size
@@ -226,7 +226,9 @@ def _pieces(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
     n, borders, pieces = mesh.elements, mesh.borders, signal.pieces
     if pieces.kind == "ramps":
         unknowns = first + np.arange(2 * n).reshape(n, 2)
-        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), np.column_stack([borders[:-1], borders[1:]]).ravel()
+        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), np.column_stack(
+            [borders[:-1], borders[1:]]
+        ).ravel()
     if pieces.borders:
         ends = np.array(pieces.borders)
         group = np.clip(np.searchsorted(ends, (borders[:-1] + borders[1:]) / 2) - 1, 0, ends.size - 2)

@@ -13,10 +13,10 @@ class Samples:
     """Measured values of k signals at n times.
 
     times: (n,) in s, rising; values: (n,) or (n, k) in the unit of what they are compared with; deviation: standard
-    deviation of one value, a number, (k,) or (n, k); kind: "linear" or "constant" (each value holds until the next)
-    between samples; largest_gap: s, distance of two samples beyond which the course between them is unknown
-    (default: ten times the median distance). Raises ModelError for NaN, for repeated or unsorted times, and for shapes
-    that do not fit.
+    deviation of one value, a number, (k,) or (n, k); 1 where it is not known, which `weighted` tells; kind: "linear"
+    or "constant" (each value holds until the next) between samples; largest_gap: s, distance of two samples beyond
+    which the course between them is unknown (default: ten times the median distance). Raises ModelError for NaN, for
+    repeated or unsorted times, and for shapes that do not fit.
     """
 
     def __init__(
@@ -24,7 +24,7 @@ class Samples:
         times: Any,
         values: Any,
         *,
-        deviation: Any = 1.0,
+        deviation: Any = None,
         kind: Literal["linear", "constant"] = "linear",
         largest_gap: float | None = None,
     ):
@@ -46,7 +46,8 @@ class Samples:
             raise ModelError(f"Samples: found kind={kind!r}, expected 'linear' or 'constant'")
         self.kind = kind
         self._check()
-        self.deviations = self._deviations(deviation)
+        self.weighted = deviation is not None
+        self.deviations = self._deviations(1.0 if deviation is None else deviation)
         self.largest_gap = largest_gap
 
     def __repr__(self) -> str:

@@ -1,7 +1,7 @@
 """The answer of an optimisation, looked up by the model's own names."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ from gantrytau_optimica.building import Built
 from gantrytau_optimica.ipopt import Solution
 from gantrytau_optimica.playback import Playback, play_back
 from gantrytau_optimica.program import Program
+from gantrytau_optimica.relaxation import Relaxed, relax
 from gantrytau_optimica.reporting import report
 from gantrytau_optimica.trajectory import Trajectory
 
@@ -33,6 +34,7 @@ class Optimum:
     solution: Solution
     build_time: float
     refinement: Any = None  # how it was refined, if it was
+    search: Any = None  # the branches found from several first guesses, if there were several
 
     @property
     def dae(self) -> Dae:
@@ -207,9 +209,20 @@ class Optimum:
 
     def report(self) -> str:
         """How it ended, what remains violated or binds, and what becomes of it when played back, in the model's words."""
-        found = report(self.program, self.solution, list(self.phases.values()))
+        found = report(self.built, self.program, self.solution, list(self.phases.values()))
         lines = [found, str(self.playback)] if self.success else [found]
-        return "\n".join([*lines, *([str(self.refinement)] if self.refinement else [])])
+        more = [str(x) for x in (self.refinement, self.search) if x is not None]
+        return "\n".join([*lines, *more])
+
+    @cached_property
+    def relaxed(self) -> Relaxed:
+        """Which limits and conditions would have to give for a solution, and by how much; takes some seconds."""
+        return relax(self.built, self.program, self.solution)
+
+    @property
+    def nearest(self) -> "Optimum":
+        """The motion of the model that violates limits and conditions least, as a guess or to look at."""
+        return replace(self, solution=self.relaxed.solution)
 
     def _values(self, names: Sequence[str], phase: Trajectory, times: np.ndarray) -> np.ndarray:
         """Values (names, times) of scalars of the model."""

@@ -103,7 +103,9 @@ class Playback:
             lines.append("all limits hold between the nodes as well")
         worst = sorted(self.defects, key=lambda d: -abs(d.amount))
         lines += [f"`{d.name}` is missed by {abs(d.amount):.3g}" for d in worst[:4] if abs(d.amount) > 1e-12]
-        lines.append(f"the objective becomes {self.objective:.8g}; its estimated error is {self.objective_error:.2g}")
+        lines.append(
+            f"the objective becomes {self.objective:.8g}; its estimated error is {self.objective_error:.2g}"
+        )
         return lines
 
     def __str__(self) -> str:
@@ -150,7 +152,9 @@ def _violations(problem: ControlProblem, played: Replayed) -> list[Violation]:
         amount = np.where(np.isfinite(amount), amount, -np.inf)
         worst = int(np.argmax(amount))
         size = max(float(amount[worst]), 0.0)
-        found.append(Violation(limit.name, phase.name, size, float(played.times[worst]), range_of(limit, row)))
+        found.append(
+            Violation(limit.name, phase.name, size, float(played.times[worst]), range_of(limit, row))
+        )
     return found
 
 
@@ -187,7 +191,9 @@ def _at_points(optimum: "Optimum", phases: list[Replayed]) -> tuple[float, list[
 def _size(problem: ControlProblem, limit: Limit) -> float:
     """The typical size of what a condition compares: of the signals in it, or its bounds."""
     leaves = {leaf.element_hash() for leaf in ca.symvar(limit.expression)}
-    inside = [p.expression for p in problem.points if any(e.element_hash() in leaves for e in p.symbol.elements())]
+    inside = [
+        p.expression for p in problem.points if any(e.element_hash() in leaves for e in p.symbol.elements())
+    ]
     names = {leaf.element_hash() for e in inside for leaf in ca.symvar(e)}
     sizes = [s.nominal for s in problem.signals if s.symbol.element_hash() in names]
     sizes += [abs(b) for b in (limit.lower, limit.upper) if np.isfinite(b) and b != 0.0]

@@ -330,7 +330,9 @@ def check_freedom(program: Program) -> None:
     if unknowns == 0:
         raise ModelError(f"{name}: nothing is free; declare a Free number or an Input")
     if equalities > unknowns:
+        from gantrytau_optimica.dependence import decided_text
+
         raise ModelError(
             f"{name}: {equalities} conditions for {unknowns} unknowns on this mesh, expected no more conditions than "
-            "unknowns; remove some at the ends or along the path, or free a number"
+            f"unknowns; remove some at the ends or along the path, or free a number{decided_text(program)}"
         )

@@ -1,12 +1,13 @@
 """Ends that the model cannot reach, found before solving: a square root of what is negative there."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.building import Built
+from gantrytau_optimica.records import Limit
 from gantrytau_optimica.sorting import known_states
 
 WORDS = {"initial": "start", "final": "end"}
@@ -20,6 +21,7 @@ class OutOfReach:
     equation: str
     conditions: tuple[str, ...]
     missing: float  # how much its square falls short
+    nearest: str = ""  # what is in reach instead, in words
 
 
 def reach_text(lost: Sequence[OutOfReach]) -> str:
@@ -30,6 +32,7 @@ def reach_text(lost: Sequence[OutOfReach]) -> str:
     return "; ".join(
         f"the {when} is out of reach: {', '.join(f'`{c}`' for c in conditions)} leave no solution of "
         + ", nor of ".join(f"{x.equation} (the square there would be {-x.missing:.4g})" for x in found)
+        + (f"; the nearest in reach: {found[0].nearest}" if found[0].nearest else "")
         for (when, conditions), found in groups.items()
     )
 
@@ -42,6 +45,8 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
     for (number, when), states in known_states(problem).items():
         phase = problem.phases[number]
         values = {h: (row.lower, row.name) for h, row in states.items()}
+        radicands: list[ca.SX] = []
+        lost: list[OutOfReach] = []
         for k, algebraic in enumerate(phase.algebraics):
             if algebraic.name not in built.closed or algebraic.min != 0.0:
                 continue
@@ -55,8 +60,34 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
                 if leaves
                 else 0.0
             )
+            radicands.append(_with_held(radicand, held))
             if value < -1e-9 * max(1.0, float(np.max(np.abs(numbers), initial=0.0)) ** 2):
                 names = tuple(values[h][1] for leaf in leaves if (h := leaf.element_hash()) in values)
                 where = f"{WORDS[when]} of {phase.name}" if phase.name else WORDS[when]
-                found.append(OutOfReach(where, phase.residual_names[k].rstrip(","), names, -value))
+                lost.append(OutOfReach(where, phase.residual_names[k].rstrip(","), names, -value))
+        if lost:
+            near = _nearest(radicands, states)
+            found += [replace(one, nearest=near) for one in lost]
     return found
+
+
+def _with_held(expression: ca.SX, held: Mapping[int, float]) -> ca.SX:
+    leaves = [leaf for leaf in ca.symvar(expression) if leaf.element_hash() in held]
+    numbers = ca.DM([held[leaf.element_hash()] for leaf in leaves])
+    return ca.substitute(expression, ca.vertcat(*leaves), numbers) if leaves else expression
+
+
+def _nearest(radicands: Sequence[ca.SX], states: Mapping[int, Limit]) -> str:
+    """The values nearest to those demanded (least squares) at which no square is negative, in words; "" if not found."""
+    leaves = {leaf.element_hash(): leaf for leaf in ca.symvar(ca.vertcat(*radicands))}
+    rows = [states[h] for h in leaves]
+    wanted = np.array([row.lower for row in rows])
+    x = ca.vertcat(*leaves.values())
+    nlp = {"x": x, "f": ca.sumsqr(x - wanted), "g": ca.vertcat(*radicands)}
+    ipopt = {"print_level": 0, "sb": "yes", "max_wall_time": 1.0, "max_iter": 200}
+    solver = ca.nlpsol("nearest", "ipopt", nlp, {"print_time": False, "ipopt": ipopt})
+    found = np.array(solver(x0=wanted, lbg=0.0)["x"]).ravel()
+    if not solver.stats()["success"]:
+        return ""
+    moved = [(row, value) for row, value in zip(rows, found, strict=True) if abs(value - row.lower) > 5e-5]
+    return ", ".join(f"{row.name.split(' == ')[0]} = {value:.4f}" for row, value in moved)

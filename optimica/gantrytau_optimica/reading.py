@@ -91,8 +91,13 @@ class ReadProblem:
         return found.pop()
 
 
-def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
-    """Read a problem class or instance. Raises ModelError with the place of what is written wrongly."""
+def read_problem(
+    problem: Optimization | type[Optimization], change: Callable[[FlatModel], FlatModel] | None = None
+) -> ReadProblem:
+    """Read a problem class or instance. Raises ModelError with the place of what is written wrongly.
+
+    change: applied to the model once it is written out, before it is translated.
+    """
     if isinstance(problem, type) and issubclass(problem, Optimization):
         problem = problem()
     if not isinstance(problem, Optimization):
@@ -102,7 +107,7 @@ def read_problem(problem: Optimization | type[Optimization]) -> ReadProblem:
     instance = instantiate(problem)
     root = instance.root
     name = type(root).__name__
-    flat = write_out(instance)
+    flat = write_out(instance) if change is None else change(write_out(instance))
     known = set(flat.derivatives)
     stages = _stages(name, instance)
     for _, one in stages:

@@ -48,7 +48,8 @@ class Signal:
 @dataclass(frozen=True, eq=False)
 class Course:
     """A symbol whose values are known: value(times (n,) in s) -> (n,); jumps: times in s at which it jumps;
-    kinks: at which it is not smooth."""
+    kinks: at which it is not smooth.
+    """
 
     name: str
     symbol: ca.SX
@@ -59,7 +60,10 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class FreeNumber:
-    """A number that is chosen, or held at its guess for one solve and changed for the next."""
+    """A number that is chosen, or held at its guess for one solve and changed for the next.
+
+    nominal: its typical size, where the guess does not tell it.
+    """
 
     name: str
     symbol: ca.SX
@@ -67,6 +71,7 @@ class FreeNumber:
     max: float
     guess: float
     held: bool = False
+    nominal: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau import SolveError
 from gantrytau_optimica.carrying import carried
-from gantrytau_optimica.ipopt import Policy, Solver
 from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import transcribe
@@ -18,7 +16,9 @@ from gantrytau_optimica.switching import switches as switches_of
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
-SMALL = 30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
+SMALL = (
+    30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
+)
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ class Refinement:
 
 def with_ramps(problem: ControlProblem) -> ControlProblem:
     """The problem with its free inputs as straight lines in each element: what keeps to limits at both ends keeps to
-    them between."""
+    them between.
+    """
 
     def changed(phase: Phase) -> Phase:
         inputs = tuple(
@@ -64,15 +65,21 @@ def with_ramps(problem: ControlProblem) -> ControlProblem:
     return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
 
 
-def refined(optimum: Optimum, accuracy: float, policy: Policy, solve: Callable[..., Optimum]) -> Optimum:
-    """The optimum on better and better meshes until it holds when played back."""
+def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum]) -> Optimum:
+    """The optimum on better and better meshes until it holds when played back.
+
+    solve: (program, first guess of its unknowns) -> Optimum, which need not be a success.
+    """
+    search = optimum.search
     rounds: list[Round] = [_round(optimum)]
     moving = True
     while True:
         switches = tuple(s for t in optimum.phases.values() for s in switches_of(t))
         done = _holds(rounds, accuracy)
         if done or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
-            return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done))
+            return replace(
+                optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done), search=search
+            )
         moving = moving and rounds[-1].defect < SMALL * accuracy
         for how in [*(["moving"] if moving else []), "switches", "divided"]:
             better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
@@ -80,7 +87,9 @@ def refined(optimum: Optimum, accuracy: float, policy: Policy, solve: Callable[.
                 break
             moving = False
         else:
-            return replace(optimum, refinement=Refinement(accuracy, tuple(rounds), switches, False))
+            return replace(
+                optimum, refinement=Refinement(accuracy, tuple(rounds), switches, False), search=search
+            )
         optimum = better
         rounds.append(_round(optimum))
 
@@ -104,12 +113,8 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     scheme = optimum.program.places.layouts[0].scheme
     program = transcribe(optimum.program.problem, meshes, scheme, located)
-    try:
-        return solve(program, carried(trajectories, program))
-    except SolveError as error:
-        if error.optimum is not None and error.optimum.status == "interrupted":
-            raise
-        return None
+    better = solve(program, carried(trajectories, program))
+    return better if better.success else None
 
 
 def _round(optimum: Optimum) -> Round:

@@ -14,11 +14,12 @@ import numpy as np
 
 from gantrytau_optimica.building import Built, known
 from gantrytau_optimica.layout import lagrange
-from gantrytau_optimica.records import Phase
 from gantrytau_optimica.trajectory import Trajectory
 
 TOLERANCE = 1e-10
-PLACES = 0.5 - 0.5 * np.cos(np.pi * np.arange(17) / 16)  # Chebyshev's extremes: interpolation between them converges
+PLACES = 0.5 - 0.5 * np.cos(
+    np.pi * np.arange(17) / 16
+)  # Chebyshev's extremes: interpolation between them converges
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +182,10 @@ class _System:
     def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
         """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
         found = self.integrator(x0=state / sizes, z0=guess[self.kept], p=p)
-        x = np.hstack([(state / sizes)[:, None], np.array(found["xf"]).reshape(state.size, PLACES.size - 1)]) * sizes[:, None]
+        x = (
+            np.hstack([(state / sizes)[:, None], np.array(found["xf"]).reshape(state.size, PLACES.size - 1)])
+            * sizes[:, None]
+        )
         if not np.all(np.isfinite(x)):
             raise RuntimeError("not finite")
         kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size - 1)
@@ -198,7 +202,11 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     forms = iter(given)
     closed = [(i, next(forms)) for i, a in enumerate(phase.algebraics) if a.name in built.closed]
     kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]
-    everything = [phase.ode, phase.residuals[kept] if kept else ca.SX(0, 1), ca.vertcat(ca.SX(0, 1), *symbols)]
+    everything = [
+        phase.ode,
+        phase.residuals[kept] if kept else ca.SX(0, 1),
+        ca.vertcat(ca.SX(0, 1), *symbols),
+    ]
     if closed:
         outputs = ca.vertcat(*everything)
         _, (outputs,) = ca.substitute_inplace(
@@ -226,7 +234,9 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
         del dae["z"], dae["alg"]
     method = "idas" if kept else "cvodes"
     integrator = ca.integrator("replay", method, dae, 0.0, PLACES[1:].tolist(), options)
-    return _System(integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)]))
+    return _System(
+        integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
+    )
 
 
 def _basis(nodes: np.ndarray, place: ca.SX) -> ca.SX:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau.symbols import derivative_name, split_derivative
-from gantrytau_optimica.guesses import Guess, horizon
+from gantrytau_optimica.building import Built
+from gantrytau_optimica.guesses import Guess, horizon, with_algebraics
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.records import ControlProblem, FreeNumber, Phase, Signal
 from gantrytau_optimica.sorting import signal_limits
@@ -18,11 +19,11 @@ WAVES = 3  # half waves in the deviation of a guess
 
 @dataclass(frozen=True)
 class Branch:
-    """Solutions with the same objective: how many first guesses led there, and how the best of them ended."""
+    """Solutions with the same objective: how many first guesses led there, and the best of them."""
 
     objective: float
     count: int
-    status: str
+    optimum: Optimum
 
     def __str__(self) -> str:
         times = "once" if self.count == 1 else f"{self.count} times"
@@ -38,32 +39,36 @@ class Search:
     failures: int
 
     def __str__(self) -> str:
-        lines = [f"{self.starts} first guesses led to {len(self.branches)} branches, {self.failures} to no solution:"]
+        lines = [
+            f"{self.starts} first guesses led to {len(self.branches)} branches, {self.failures} to no solution:"
+        ]
         return "\n".join([*lines, *(f"  {branch}" for branch in self.branches[:8])])
 
 
-def searched(solve: Callable[[ControlProblem], Optimum | None], problem: ControlProblem, starts: int) -> Optimum | None:
-    """The best optimum from `starts` first guesses, the default one first, or None if none leads to a solution.
+def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: int) -> Optimum:
+    """The best optimum from `starts` first guesses, the default one first; if none is found, where that one ended.
 
     Every state that is not itself a derivative is bent by a few half waves, which vanish at the ends; those that are its
     derivatives follow; free numbers and inputs are drawn from their limits or around their guess. The seed is fixed.
     """
     random = np.random.default_rng(SEED)
-    found: list[Optimum] = []
+    tried: list[Optimum] = []
     for k in range(starts):
-        optimum = solve(problem if k == 0 else bent(problem, random))
-        if optimum is not None:
-            found.append(optimum)
+        tried.append(solve(built.problem if k == 0 else with_algebraics(built, bent(built.problem, random))))
+        if tried[-1].status == "interrupted":
+            break
+    found = sorted((o for o in tried if o.success), key=lambda o: o.objective)
     if not found:
-        return None
-    found.sort(key=lambda o: o.objective)
+        return tried[0]
     branches: list[Branch] = []
     for optimum in found:
-        if branches and optimum.objective - branches[-1].objective <= SAME * max(abs(optimum.objective), 1e-9):
+        if branches and optimum.objective - branches[-1].objective <= SAME * max(
+            abs(optimum.objective), 1e-9
+        ):
             branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
         else:
-            branches.append(Branch(optimum.objective, 1, optimum.status))
-    return replace(found[0], search=Search(starts, tuple(branches), starts - len(found)))
+            branches.append(Branch(optimum.objective, 1, optimum))
+    return replace(found[0], search=Search(starts, tuple(branches), len(tried) - len(found)))
 
 
 def bent(problem: ControlProblem, random: np.random.Generator) -> ControlProblem:

@@ -75,7 +75,13 @@ def _changes(
         before, after = int(whole[starts[k]]), int(whole[starts[k + 1]])
         share = borders[starts[k + 1]]
         mixed = stops[k + 1] - starts[k + 1]
-        if before and not after and mixed <= MIXED and k + 2 < starts.size and whole[starts[k + 2]] == -before:
+        if (
+            before
+            and not after
+            and mixed <= MIXED
+            and k + 2 < starts.size
+            and whole[starts[k + 2]] == -before
+        ):
             after, skip = -before, True
             widths = np.diff(borders)[starts[k + 1] : stops[k + 1]]
             mean = float(widths @ ends[starts[k + 1] : stops[k + 1]].mean(axis=1)) / float(widths.sum())

@@ -31,6 +31,28 @@ def algebraic_words(dae: Dae) -> dict[str, tuple[str, str]]:
     return found
 
 
+def definition_words(dae: Dae) -> dict[str, str]:
+    """For each symbol that the blocks solve for: which equation of the model it follows from."""
+    found: dict[str, str] = {}
+    for block in dae.blocks:
+        names = [dae.equation_name(key) for key in block.equations]
+        others = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        for symbol in (*block.tears, *(inner for inner, _ in block.inner)):
+            name = symbol.name()
+            found[name] = f"the equation of {spoken(dae, name)} ({names[0]}{others})"
+    return found
+
+
+def motion_words(dae: Dae) -> dict[str, str]:
+    """For each state what its derivative follows from: the equation, or nothing but that it moves."""
+    words = definition_words(dae)
+    rates = (derivative_name(base, order + 1) for base, order in map(split_derivative, dae.choice.states))
+    return {
+        state: words.get(rate, f"the motion of {state}")
+        for state, rate in zip(dae.states, rates, strict=True)
+    }
+
+
 def spoken(dae: Dae, name: str) -> str:
     """A derivative by the model's own name: der(tool.v[0]) for der(der(tool.r[0]))."""
     base, order = split_derivative(name)

@@ -203,6 +203,29 @@ def test_the_motion_is_saved_and_drawn(run, move, tmp_path):
     assert len(np.unique(plt.imread(picture).reshape(-1, 4), axis=0)) > 20  # paper, axes, the lines' colours
 
 
+def test_what_cannot_be_drawn_does_not_cost_the_answer(run, fails, move, tmp_path):
+    table, picture = tmp_path / "move.csv", tmp_path / "rate.png"
+    arguments = ("optimize", move, "--save", table, "--plot", "der(cart.f)", "--to", picture)
+    message = fails(MISUSE, *arguments)
+    assert message == "--plot der(cart.f): the equations do not determine this derivative; draw 'cart.f'"
+    found = json.loads(run(*arguments, "--json").stdout)
+    assert found["success"] is True
+    assert found["files"] == [str(table)]
+    assert not picture.exists()
+    assert "Fastest: solved after " in run(*arguments).stdout
+
+
+def test_a_full_disk_does_not_cost_the_answer(fails, run, move, tmp_path, monkeypatch):
+    def full(result, path):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("gantrytau.commands.saving.rehearse", lambda file: None)
+    monkeypatch.setattr("gantrytau.result.Result.save", full)
+    arguments = ("optimize", move, "--save", tmp_path / "move.csv")
+    assert "Cannot write" in fails(MISUSE, *arguments)
+    assert json.loads(run(*arguments, "--json").stdout)["final_time"] == pytest.approx(fastest(), abs=1e-5)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_a_saved_motion_is_where_the_next_search_starts(answer, move, tmp_path, suffix, monkeypatch):
     file = tmp_path / f"move{suffix}"
@@ -235,6 +258,13 @@ def test_a_problem_without_a_solution_is_told(unsolved, moves, tmp_path):
     assert file.read_text() == "a solution of before\n"
 
 
+def test_of_a_problem_out_of_time_before_the_first_step_nothing_is_kept(unsolved, move, tmp_path):
+    report = unsolved(FAULT, move, "--max-time", "1e-9", "--save", tmp_path / "move.csv")
+    assert report["iterations"] == 0
+    assert "Allow more with --max-time" in report["error"]
+    assert [path.name for path in tmp_path.iterdir() if path.suffix == ".csv"] == []
+
+
 def test_too_few_iterations_can_be_gone_on_from(unsolved, answer, move, tmp_path):
     file = tmp_path / "move.csv"
     report = unsolved(FAULT, move, "--max-iterations", "2", "--save", file)
@@ -243,6 +273,18 @@ def test_too_few_iterations_can_be_gone_on_from(unsolved, answer, move, tmp_path
     assert "Allow more with --max-iterations" in report["error"]
     assert f"; --guess {kept} goes on from there" in report["error"]
     assert answer("optimize", move, "--guess", kept)["final_time"] == pytest.approx(fastest(), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("--scheme", "midpoint"), "scheme='midpoint': expected one of radau, gauss"),
+        (("--tolerance", "2"), "tolerance=2.0: expected a number between 0 and 1"),
+        (("--max-time", "-1"), "max_time=-1.0: expected seconds above 0"),
+    ],
+)
+def test_what_the_solver_does_not_take(fails, move, option, message):
+    assert message in fails(FAULT, "optimize", move, *option)
 
 
 def press_ctrl_c(monkeypatch):

@@ -148,6 +148,7 @@ def test_inputs_without_any_derivative():
 
 def test_objective_of_inputs_at_a_time():
     class Pick(Optimization):
+        mass = Mass(u=0.0)  # what moves has two ends
         u = Input(min=-3.0, max=3.0)
 
         def objective(self):

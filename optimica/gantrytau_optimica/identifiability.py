@@ -1,0 +1,109 @@
+"""Which parameters the data can tell apart: the rank of the slopes of the residuals, and its reason in words.
+
+Slopes are taken per relative change of each parameter and normed column by column. A vanishing singular value means a
+combined change that no sample notices; where it keeps a ratio, a product, a sum or a difference at two different
+points, only that is determined. Golub, Van Loan (2013), Matrix Computations, section 5.5.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+RANK = 1e-7  # of the largest singular value of normed columns: below it parameters cannot be told apart
+SILENT = 1e-10  # of the measured values: a parameter that moves them less, when doubled, has no influence
+EXPONENTS = {1.0: "", 2.0: "^2", 3.0: "^3", 4.0: "^4", 1.5: "^(3/2)"}  # of simple laws
+SURE = 1e-3  # how closely a ratio of changes is to be a simple number
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Slopes of the residuals (N, k) with respect to parameters, and their values (k,), at one point."""
+
+    jacobian: np.ndarray
+    values: np.ndarray
+
+
+def without_influence(point: Point, sizes: np.ndarray, measured: float) -> list[int]:
+    """Numbers of the parameters that no residual depends on; measured: norm of the values in deviations."""
+    moved = np.linalg.norm(point.jacobian * sizes, axis=0)
+    return np.flatnonzero(moved <= SILENT * max(measured, np.max(moved, initial=0.0))).tolist()
+
+
+def silent_changes(point: Point, sizes: np.ndarray) -> np.ndarray:
+    """Combined changes that no residual notices, relative to `sizes`, each with as few parameters as possible, (k, d)."""
+    slopes = point.jacobian * sizes
+    norms = np.linalg.norm(slopes, axis=0)
+    _, singular, right = np.linalg.svd(slopes / norms, full_matrices=True)
+    singular = np.concatenate([singular, np.zeros(norms.size - singular.size)])
+    null = right[singular <= RANK * singular[0]].T
+    if not null.shape[1]:
+        return null
+    pivots = qr(null.T, pivoting=True, mode="r")[1][: null.shape[1]]
+    null = null @ np.linalg.inv(null[pivots])
+    null[np.abs(null) < 1e-5] = 0.0
+    changes = null / norms[:, None]
+    return changes / np.max(np.abs(changes), axis=0)
+
+
+def told_apart(
+    names: Sequence[str], point: Point, sizes: np.ndarray, elsewhere: Callable[[], Point | None]
+) -> list[str]:
+    """A sentence for each group that cannot be told apart; [] if all can. elsewhere: slopes at another point."""
+    changes = silent_changes(point, sizes)
+    if not changes.shape[1]:
+        return []
+    other = elsewhere()
+    again = None if other is None else silent_changes(other, sizes)
+    if again is not None and again.shape != changes.shape:
+        again = None
+    found = []
+    for d in range(changes.shape[1]):
+        mine = np.flatnonzero(changes[:, d])
+        pairs = [(changes[:, d] * sizes, point.values)]
+        if other is not None and again is not None:
+            pairs.append((again[:, _same(again, mine, d)] * sizes, other.values))
+        found.append(_sentence([names[i] for i in mine], [(c[mine], v[mine]) for c, v in pairs]))
+    return found
+
+
+def _same(changes: np.ndarray, mine: np.ndarray, otherwise: int) -> int:
+    """The change that concerns the same parameters."""
+    for d in range(changes.shape[1]):
+        if np.array_equal(np.flatnonzero(changes[:, d]), mine):
+            return d
+    return otherwise
+
+
+def _sentence(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> str:
+    """points: changes and values of these parameters at one or two points."""
+    together = f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart by these data"
+    if len(names) == 2:
+        only = _pair(names, points)
+        if only:
+            return f"{together}: only {only} is determined"
+    change, value = points[0]
+    relative = change / np.where(value == 0.0, 1.0, value)
+    relative = relative / relative[np.argmax(np.abs(relative))]
+    if len(points) == 2 and np.allclose(relative, 1.0, atol=SURE):
+        return f"{together}: they are determined up to a common factor only"
+    steps = ", ".join(f"{n} by {r:+.3g} %" for n, r in zip(names, relative, strict=True))
+    return f"{together}: changing {steps} changes nothing"
+
+
+def _pair(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> str:
+    """The ratio, product, difference or sum of two that is determined; "" if it is none of these."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.array([(c / v)[1] / (c / v)[0] for c, v in points])  # d ln b / d ln a
+        absolute = np.array([c[1] / c[0] for c, _ in points])
+        a, b = names
+        if np.all(np.abs(relative) < 1 - SURE):  # so that the exponent is not below one
+            a, b, relative = b, a, 1 / relative
+    for power, text in EXPONENTS.items():
+        for sign, word in ((1, "/"), (-1, "*")):
+            if np.all(np.abs(relative - sign * power) < SURE):
+                return f"{b} {word} {a}{text}" if text else f"{names[0]} {word} {names[1]}"
+    if np.all(np.abs(absolute - 1) < SURE):
+        return f"{names[0]} - {names[1]}"
+    return f"{names[0]} + {names[1]}" if np.all(np.abs(absolute + 1) < SURE) else ""

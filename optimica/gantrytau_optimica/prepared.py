@@ -1,0 +1,169 @@
+"""A problem ready to be solved, again and again, with other parameters and guesses."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError, Result, SolveError
+from gantrytau_optimica.building import Built, with_guesses
+from gantrytau_optimica.guesses import guess_of, number_guess
+from gantrytau_optimica.ipopt import Solver
+from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.program import Program, transcribe
+from gantrytau_optimica.reach import out_of_reach, reach_text
+from gantrytau_optimica.reading import ReadProblem
+from gantrytau_optimica.records import ControlProblem, FreeNumber
+from gantrytau_optimica.refinement import refined
+from gantrytau_optimica.relaxation import worth_relaxing
+from gantrytau_optimica.starts import searched
+
+Guesses = Mapping[str, Any] | Result | Optimum
+MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
+ROUNDS = 5  # of solving again with points at moving times read from other elements
+
+REMEDIES = {
+    "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
+    "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
+    "time limit reached": "Allow more with max_time=, or try another guess=.",
+    "interrupted": "What was reached so far is in .optimum.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A problem ready to be solved, again and again. build_time: s."""
+
+    built: Built
+    program: Program
+    solver: Solver
+    guess: Mapping[str, Any]
+    build_time: float
+    refine: float | None = None
+    starts: int = 1
+
+    def __repr__(self) -> str:
+        size, rows = self.program.places.size, self.program.assembled.rows
+        return f"<Prepared {self.built.read.name}: {size} unknowns, {rows} conditions>"
+
+    def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
+        """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
+        read = self.built.read
+        given = self.guess if guess is None else read_guesses(guess, read)
+        values = self._values(parameters or {})
+        free = tuple(self._number(n, values, given) for n in self.built.problem.free)
+        built = replace(self.built, problem=replace(self.built.problem, free=free))
+        if parameters or guess is not None:
+            built = replace(built, problem=with_guesses(built, given))
+        program = self.program.with_numbers(built.problem)
+        lost = out_of_reach(built)
+        if lost:
+            unsolved = self.solver.unsolved(program, _first(program, built))
+            raise SolveError(
+                f"{read.name}: no solution: {reach_text(lost)}. Correct these conditions, or the "
+                "parameters of the model.",
+                equations=[x.equation for x in lost],
+                optimum=Optimum(read.name, built, program, unsolved, self.build_time),
+            )
+        optimum = self._best(built, program)
+        if self.refine is None:
+            return optimum
+        policy = self.solver.policy
+        again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
+        return refined(optimum, self.refine, lambda p, w: self._solved(optimum.built, p, Solver(p, again), w))
+
+    def _best(self, built: Built, program: Program) -> Optimum:
+        """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
+
+        def solve(problem: ControlProblem) -> Optimum:
+            changed = replace(built, problem=problem)
+            return self._solved(changed, program, self.solver, _first(program, changed))
+
+        optimum = searched(solve, built, self.starts) if self.starts > 1 else solve(built.problem)
+        return solved_or_raise(optimum)
+
+    def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
+        """Where the solver ends from a first guess of the unknowns of a program."""
+        solution = solver.solve(program, first)
+        for _ in range(ROUNDS):
+            if not solution.success or not program.astray(solution.w):
+                break
+            program = _relocated(program, solution.w)
+            solution = Solver(program, solver.policy).solve(program, solution.w)
+        return Optimum(built.read.name, built, program, solution, self.build_time)
+
+    def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
+        found: dict[str, float] = {}
+        held = [n.name for n in self.built.problem.free if n.held]
+        for name, value in parameters.items():
+            elements = parameter_names(self.built.read, name)
+            numbers = np.asarray(value, dtype=float).ravel(order="F")
+            if any(element not in held for element in elements):
+                raise ModelError(
+                    f"{name}: was not named in prepare(parameters=[...]), expected one of {held}"
+                )
+            if numbers.size != len(elements) or not np.all(np.isfinite(numbers)):
+                raise ModelError(f"{name}: found {value!r}, expected {len(elements)} finite numbers")
+            found.update(zip(elements, numbers.tolist(), strict=True))
+        return found
+
+    def _number(
+        self, number: FreeNumber, values: Mapping[str, float], guess: Mapping[str, Any]
+    ) -> FreeNumber:
+        if not number.held:
+            return replace(number, guess=number_guess(number.name, guess, number.guess))
+        value = values.get(number.name, self.built.read.dae.table.values[number.name])
+        return replace(number, guess=value, min=value, max=value)
+
+
+def solved_or_raise(optimum: Optimum) -> Optimum:
+    """The optimum if it is one; else SolveError with the report, and what would have to give."""
+    solution, program = optimum.solution, optimum.program
+    if solution.success:
+        return optimum
+    remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
+    ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
+    raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
+
+
+def _relocated(program: Program, w: np.ndarray) -> Program:
+    """The program with the points at moving times read from the elements in which they now lie."""
+    layouts = program.places.layouts
+    borders = [layout.placed(w).borders for layout in layouts]
+    located = (w[program.places.free], borders)
+    return transcribe(program.problem, [layout.mesh for layout in layouts], layouts[0].scheme, located)
+
+
+def read_guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:
+    """Guesses by name, from those of the caller or from another solution. Raises ModelError for unknown names."""
+    if isinstance(guess, (Result, Optimum)):
+        return guess_of(guess, read.dae)
+    if guess is not None and not isinstance(guess, Mapping):
+        raise ModelError(
+            f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum"
+        )
+    for name in guess or {}:
+        read.dae.expand(name)
+    return dict(guess or {})
+
+
+def parameter_names(read: ReadProblem, name: str) -> tuple[str, ...]:
+    """Scalar names of a parameter; ModelError if it is none."""
+    elements = read.dae.expand(name)
+    if elements[0] not in read.dae.table.symbols:
+        raise ModelError(f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter")
+    return tuple(elements)
+
+
+def _first(program: Program, built: Built) -> np.ndarray:
+    """The guess as unknowns of the program, inside of their bounds."""
+    places = program.places
+    w = np.zeros(places.size)
+    w[places.free] = [number.guess for number in built.problem.free]
+    for layout, phase in zip(places.layouts, built.problem.phases, strict=True):
+        w[layout.knots] = layout.mesh.borders[list(layout.mesh.moving)]
+        for number, signal in enumerate(phase.signals):
+            mine = layout.of(number)
+            w[mine] = signal.guess(layout.moment[mine - layout.first])
+    return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)
