@@ -22,10 +22,11 @@ from gantrytau_optimica.reach import out_of_reach, reach_text
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import FreeNumber, Phase
 from gantrytau_optimica.relaxation import worth_relaxing
+from gantrytau_optimica.saved import SavedOptimum
 from gantrytau_optimica.scheme import collocation
 
 Problem = Optimization | type[Optimization] | ReadProblem
-Guesses = Mapping[str, Any] | Result | Optimum
+Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 ROUNDS = 5  # of solving again with points at moving times read from other elements
 
 REMEDIES = {
@@ -219,6 +220,8 @@ def _check(tolerance: Any, max_iterations: Any, max_time: Any, progress: Any) ->
 def _guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:
     if isinstance(guess, (Result, Optimum)):
         return guess_of(guess, read.dae)
+    if isinstance(guess, SavedOptimum):
+        return guess.guesses(read.dae)
     if guess is not None and not isinstance(guess, Mapping):
         raise ModelError(
             f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum"
