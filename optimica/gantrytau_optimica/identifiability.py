@@ -7,6 +7,7 @@ points, only that is determined. Golub, Van Loan (2013), Matrix Computations, se
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -40,7 +41,8 @@ def silent_changes(point: Point, sizes: np.ndarray) -> np.ndarray:
     null = right[singular <= RANK * singular[0]].T
     if not null.shape[1]:
         return null
-    pivots = qr(null.T, pivoting=True, mode="r")[1][: null.shape[1]]
+    found: Any = qr(null.T, pivoting=True, mode="r")
+    pivots = found[1][: null.shape[1]]
     null = null @ np.linalg.inv(null[pivots])
     null[np.abs(null) < 1e-5] = 0.0
     changes = null / norms[:, None]
@@ -84,8 +86,8 @@ def _sentence(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> 
         if only:
             return f"{together}: only {only} is determined"
     change, value = points[0]
-    relative = change / np.where(value == 0.0, 1.0, value)
-    relative = relative / relative[np.argmax(np.abs(relative))]
+    relative = np.asarray(change) / np.where(value == 0.0, 1.0, value)
+    relative = relative / relative[int(np.argmax(np.abs(relative)))]
     if len(points) == 2 and np.allclose(relative, 1.0, atol=SURE):
         return f"{together}: they are determined up to a common factor only"
     steps = ", ".join(f"{n} by {r:+.3g} %" for n, r in zip(names, relative, strict=True))
