@@ -224,7 +224,7 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
         if len(elements) != 1:
             raise ModelError(f"along {label}: {inner} has {len(elements)} elements, expected one; name it")
         if kind == "integral":
-            return (lambda o: o.integral(elements[0])), ""
+            return (lambda o: o.integral(elements[0])), f"{known[inner]}.s" if inner in known else ""
         return (lambda o: float(o.final(elements[0]))), known.get(inner, "")
     if what in dae.variables or what in dae.vectors:
         raise ModelError(

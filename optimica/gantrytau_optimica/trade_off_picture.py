@@ -30,10 +30,18 @@ def draw(found: "TradeOff", file: str | os.PathLike[str] | None) -> "Figure":
         axis.plot(x[order], y[order], "-", color="0.7", zorder=1)
         axis.plot(x, y, "o", color="C0", markersize=4)
         for k, weight in enumerate(found.weights):
-            axis.annotate(f"{weight:.3g}", (x[k], y[k]), (5, 4), textcoords="offset points", fontsize="small")
+            axis.annotate(
+                f"{weight:.3g}",
+                (x[k], y[k]),
+                (4, 4),
+                textcoords="offset points",
+                fontsize="small",
+                rotation=40,  # neighbours at the knee stand close
+                rotation_mode="anchor",
+            )
         axis.set_xlabel(_label(found, other))
         axis.set_ylabel(_label(found, first))
-        axis.margins(0.08)
+        axis.margins(0.1)
         axis.grid(alpha=0.3)
     figure.suptitle(f"{found.name}: points labelled with their {found.weight}")
     if file is not None:
