@@ -112,9 +112,9 @@ def member(model: Any, name: str) -> Any:
             )
         found = vars(found)[match[1]]
         if match[2]:
-            index: tuple[int, ...] = tuple(int(i) for i in match[2][1:-1].split(","))
+            index = [int(i) for i in match[2][1:-1].split(",")]
             try:
-                found = found[index if len(index) > 1 else index[0]]
+                found = found[tuple(index) if len(index) > 1 else index[0]]
             except (IndexError, RuntimeError, TypeError):
                 raise ModelError(f"measured {name}: there is no element {match[2]} of {match[1]}") from None
     if not isinstance(found, ca.SX):

@@ -245,6 +245,17 @@ def test_friction_of_the_gantry_from_a_motion():
         assert fit.deviations[name] < 1e-3 * value
 
 
+def test_a_coarse_mesh_is_told_with_what_it_costs():
+    y = noisy(2.0 * np.exp(-7.0 * TIMES), 1e-5)
+    experiment = Experiment({"y": Samples(TIMES, y, deviation=1e-5)})
+    coarse, fine = (estimate(Decay, {"k": 5.0}, experiment, elements=n) for n in (10, 100))
+    moved = fine.parameters["k"] - coarse.parameters["k"]
+    assert abs(moved) > 10 * fine.deviations["k"]
+    assert coarse.mesh_shift["k"] == pytest.approx(moved, rel=0.2)  # most of it, by the first halving
+    assert "on twice the elements k moves by" in coarse.warnings[0]
+    assert fine.warnings == ()
+
+
 def test_report_repr_and_figure(tanks, tmp_path):
     words = tanks.report()
     assert "a1" in words
