@@ -24,6 +24,7 @@ from gantrytau_optimica.records import FreeNumber, Phase
 from gantrytau_optimica.relaxation import worth_relaxing
 from gantrytau_optimica.saved import SavedOptimum
 from gantrytau_optimica.scheme import collocation
+from gantrytau_optimica.shooting import shoot
 
 Problem = Optimization | type[Optimization] | ReadProblem
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
@@ -54,7 +55,7 @@ def optimize(
     """Solve an optimal-control problem by direct collocation.
 
     problem: a subclass of Optimization or an instance; elements, points: of the mesh, points per element (1 to 9);
-    scheme: "radau" or "gauss"; guess: name -> number, array or function of time, or another solution; default: a
+    scheme: "radau", "gauss", or "shooting" with points Runge-Kutta steps per element; guess: name -> number, array or function of time, or another solution; default: a
     straight line between given initial and final values, else start values. tolerance: of Ipopt; max_time: s;
     progress: called with (iteration, objective).
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
@@ -95,7 +96,8 @@ def prepare(
     The other keywords are those of `optimize`.
     """
     _check(tolerance, max_iterations, max_time, progress)
-    grid = collocation(scheme, points)
+    shooting = scheme == "shooting"
+    grid = collocation("radau" if shooting else scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     begin = time.perf_counter()
@@ -103,9 +105,9 @@ def prepare(
     held = [n for name in names(parameters) for n in _parameter(read, name)]
     built = build(read, guess, held, read_controls(read, controls or {}))
     if static(read.dae):
-        grid, mesh = collocation("radau", 1), mesh_of(1)
+        grid, mesh, shooting = collocation("radau", 1), mesh_of(1), False
     meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
-    program = transcribe(built.problem, meshes, grid)
+    program = shoot(built.problem, meshes, points) if shooting else transcribe(built.problem, meshes, grid)
     check_freedom(program)
     policy = Policy(tolerance, max_iterations, max_time, progress)
     return Prepared(built, program, Solver(program, policy), guess, time.perf_counter() - begin)
