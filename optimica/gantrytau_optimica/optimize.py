@@ -55,9 +55,9 @@ def optimize(
     """Solve an optimal-control problem by direct collocation.
 
     problem: a subclass of Optimization or an instance; elements, points: of the mesh, points per element (1 to 9);
-    scheme: "radau", "gauss", or "shooting" with points Runge-Kutta steps per element; guess: name -> number, array or function of time, or another solution; default: a
-    straight line between given initial and final values, else start values. tolerance: of Ipopt; max_time: s;
-    progress: called with (iteration, objective).
+    scheme: "radau", "gauss", or "shooting" (points: Runge-Kutta steps per element); guess: name -> number, array or
+    function of time, or another solution; default: a straight line between given initial and final values, else start
+    values. tolerance: of Ipopt; max_time: s; progress: called with (iteration, objective).
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
