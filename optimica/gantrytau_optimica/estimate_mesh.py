@@ -20,7 +20,8 @@ def mesh_shift(
 ) -> np.ndarray:
     """What the parameters of the columns of `jacobian` (N, k) change on a mesh of half the lengths, about; (k,).
 
-    problem: that of the optimum with deviations as they were given; errors: its residuals (N,). NaN where the motion on the other mesh is not found.
+    problem: that of the optimum with deviations as they were given; errors: its residuals (N,). The result is NaN
+    where the motion on the other mesh is not found.
     """
     program = optimum.program
     meshes = [_halved(layout.mesh) for layout in program.places.layouts]
