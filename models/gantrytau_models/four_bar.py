@@ -117,7 +117,10 @@ class FourBar(Model):
             for name, bar in dict(crank=crank, coupler=coupler, rocker=rocker).items()
         }
         found = [bar.modifications if isinstance(bar, Bar) else bar for bar in bars.values()]
-        lengths = [_number(ground), *(_number(bar.get("length", 1.0)) for bar in found)]
+        own = [getattr(type(self), name).modifications.get("length", 1.0) for name in bars]
+        lengths = [
+            _number(ground), *(_number(bar.get("length", one)) for bar, one in zip(found, own, strict=True))
+        ]
         _refuse_open(type(self).__name__, lengths)
         _refuse_parallel(type(self).__name__, modifications)
         angles = _closed(lengths, [_start(bar.get("phi")) for bar in found])

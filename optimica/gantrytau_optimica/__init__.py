@@ -1,5 +1,8 @@
 """Optimisation of models written with gantrytau, in the style of Optimica."""
 
+from gantrytau_optimica.estimate import Estimate
+from gantrytau_optimica.estimation import estimate
+from gantrytau_optimica.experiments import Experiment
 from gantrytau_optimica.measurements import Samples
 from gantrytau_optimica.optimization import (
     Free,
@@ -13,19 +16,43 @@ from gantrytau_optimica.optimization import (
 )
 from gantrytau_optimica.optimize import Prepared, optimize, prepare
 from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.pareto import TradeOff, pareto
+from gantrytau_optimica.paths import Corner, Deviation, Path, Way
+from gantrytau_optimica.run_record import compare_records, run_record, write_record
+from gantrytau_optimica.saved import MissingGuess, SavedOptimum
+from gantrytau_optimica.saving import load_optimum, save_optimum
+from gantrytau_optimica.sensitivities import Sensitivities, sensitivities
 
 __all__ = [
+    "Corner",
+    "Deviation",
+    "Estimate",
+    "Experiment",
     "Free",
+    "MissingGuess",
     "Optimization",
     "Optimum",
+    "Path",
     "Prepared",
     "Samples",
+    "SavedOptimum",
+    "Sensitivities",
+    "TradeOff",
+    "Way",
     "at",
+    "compare_records",
+    "estimate",
     "final",
     "initial",
     "integral_of_squares",
     "link",
+    "load_optimum",
     "optimize",
+    "pareto",
     "prepare",
+    "run_record",
+    "save_optimum",
+    "sensitivities",
     "sum_of_squares",
+    "write_record",
 ]

@@ -13,10 +13,19 @@ from gantrytau.flat_model import FlatVariable
 from gantrytau.symbols import split_derivative, time
 from gantrytau.system import System
 from gantrytau_optimica.conditions import link_conditions, start_conditions, with_targets
-from gantrytau_optimica.guesses import first_guesses, number_guess, typical_size
+from gantrytau_optimica.guesses import first_guesses, horizon, number_guess, typical_size
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint, ReadProblem
-from gantrytau_optimica.records import ControlProblem, Course, FreeNumber, Phase, Pieces, PointValue, Signal
+from gantrytau_optimica.records import (
+    ControlProblem,
+    Course,
+    FreeNumber,
+    Limit,
+    Phase,
+    Pieces,
+    PointValue,
+    Signal,
+)
 from gantrytau_optimica.sorting import check_symbols, limit_rows, signal_limits, with_limits
 from gantrytau_optimica.wording import algebraic_words
 
@@ -80,6 +89,7 @@ def build(
             integrand=integrand,
             points=tuple(PointValue(points[i].symbol, values[i], times[i]) for i in mine),
         )
+        _check_courses(read, k, phase)
         phases.append(with_targets(read, k, phase, targets, objective))
     integrated = [t.symbol for t in read.targets if t.integrated]
     if integrated:
@@ -89,12 +99,42 @@ def build(
     sorted_rows = [
         row for c in limits for row in limit_rows(c, next(found), next(found), next(found), read.name)
     ]
-    draft = with_limits(draft, sorted_rows)
+    draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
     check_symbols(draft, read.name)
     names = [a.name for a in system.algebraics if a.closed is not None]
     forms = known([a.closed for a in system.algebraics if a.closed is not None], read, {})
     built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
     return replace(built, problem=_with_sizes(with_guesses(built, guess)))
+
+
+def _check_courses(read: ReadProblem, number: int, phase: Phase) -> None:
+    """ModelError for samples of inputs that do not cover the phase or have gaps."""
+    if not (phase.start_time.is_constant() and phase.final_time.is_constant()):
+        return  # refused where they are read
+    for name, course in read.courses.items():
+        if not isinstance(course, ca.SX) and (len(read.phases) == 1 or read.phases[number].owns(name)):
+            what = f"{read.name}, input {name}"
+            course[0].require(what, float(phase.start_time), float(phase.final_time), between=True)
+
+
+def _in_order(draft: ControlProblem) -> list[Limit]:
+    """Ends after starts, of phases whose times are free and could change places."""
+    found = []
+    low = ca.DM([n.min if np.isfinite(n.min) else -1e20 for n in draft.free])
+    high = ca.DM([n.max if np.isfinite(n.max) else 1e20 for n in draft.free])
+    for phase in draft.phases:
+        length = phase.final_time - phase.start_time
+        slope = ca.jacobian(length, draft.numbers)
+        if length.is_constant() or not slope.is_constant():
+            continue
+        offset = float(ca.substitute(length, draft.numbers, ca.DM.zeros(len(draft.free))))
+        slope = ca.DM(slope)
+        least = offset + float(ca.sum2(ca.fmin(slope * low.T, slope * high.T)))
+        if least <= 0:
+            start, stop = horizon(draft, phase)
+            name = f"the end of {phase.name or draft.name} comes after its start"
+            found.append(Limit(length, 1e-6 * (stop - start), np.inf, name))
+    return found
 
 
 def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
@@ -232,7 +272,7 @@ def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tu
     for parameter in dae.flat.parameters:
         for k, name in enumerate(parameter.elements):
             if parameter.free and name in table.independent:
-                low, high = _range(parameter, k, dae)
+                low, high = _range(parameter, k, dae, held)
                 start = number_guess(name, guess, table.values[name])
                 found.append(FreeNumber(name, table.symbols[name], low, high, start))
             elif name in held:
@@ -259,7 +299,16 @@ def _declared_limits(dae: Dae) -> list[Constraint]:
     return found
 
 
-def _range(parameter: FlatVariable, k: int, dae: Dae) -> tuple[float, float]:
+def _range(parameter: FlatVariable, k: int, dae: Dae, held: Sequence[str]) -> tuple[float, float]:
+    for limit in (parameter.min, parameter.max):
+        leaves = (
+            {leaf.name() for leaf in ca.symvar(dae.table.reduce(limit[k]))} if limit is not None else set()
+        )
+        for name in leaves & set(held):
+            raise ModelError(
+                f"{parameter.name}: its limits depend on {name}, which is to change, expected numbers; write the limit in "
+                "constraints()"
+            )
     low = -np.inf if parameter.min is None else float(dae.table.number(parameter.min[k])[0])
     high = np.inf if parameter.max is None else float(dae.table.number(parameter.max[k])[0])
     if not low <= high:

@@ -19,6 +19,11 @@ def static(dae: Dae) -> bool:
     return not dae.states and not any(ca.depends_on(e.residual, dae.flat.time) for e in dae.flat.equations)
 
 
+def not_at_two_times(read: "ReadProblem") -> bool:
+    """Whether values are asked for at one time only, so that a signal may have one value."""
+    return len({str(p.time) for p in read.points}) <= 1
+
+
 def check_objective(read: "ReadProblem") -> "ReadProblem":
     """The problem, if its objective depends on numbers only; a signal of a static problem has one value as well."""
     signals = set(read.dae.variables)

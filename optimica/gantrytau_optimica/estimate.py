@@ -15,6 +15,7 @@ from gantrytau_optimica.experiments import Experiment
 from gantrytau_optimica.optimum import Optimum
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
+COARSE = 0.2  # deviations by which a halved mesh may move a parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,8 @@ class Estimate:
     parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;
     jacobian: slopes of the residuals in deviations, (N, k), for the parameters `names` that are at no limit; errors:
     these residuals, model less measured, (N,); scales: the deviations, (N,), 1 where none was given; known: whether
-    the deviations were given; weights: (N,) of a robust fit, else ones; optimum: the solved problem, whose objective
+    the deviations were given; weights: (N,) of a robust fit, else ones; mesh_shift: by how much the parameters
+    would move on half as long elements, about, by name (NaN: not found); optimum: the solved problem, whose objective
     is a multiple of the sum of squares.
     """
 
@@ -37,6 +39,7 @@ class Estimate:
     errors: np.ndarray
     scales: np.ndarray
     weights: np.ndarray
+    mesh_shift: dict[str, float]
     known: bool
     loss: str
     optimum: Optimum
@@ -158,6 +161,13 @@ class Estimate:
             for j, b in enumerate(self.names[:i])
             if abs(correlation[i, j]) > STRONG
         ]
+        deviations = self.deviations
+        worst = max(self.names, key=lambda n: abs(self.mesh_shift[n]) / deviations[n], default="")
+        if worst and not abs(self.mesh_shift[worst]) <= COARSE * deviations[worst]:
+            found.append(
+                f"the mesh is coarse: on twice the elements {worst} moves by "
+                f"{self.mesh_shift[worst] / deviations[worst]:.2g} of its deviations; raise elements="
+            )
         if self.known and self.loss == "squares" and self.probability < 1e-3:
             found.append(
                 f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "

@@ -84,7 +84,8 @@ def _phase(model: Model, experiment: Experiment, factor: float) -> Optimization:
                 raise ModelError(
                     f"measured {name}: found samples of {columns} columns, expected {found.numel()}"
                 )
-            total = total + factor * sum_of_squares(found, samples)
+            for one, column in zip(ca.vec(found).elements(), single_columns(samples), strict=True):
+                total = total + factor * sum_of_squares(one, column)
         return total
 
     begin, stop = experiment.horizon
@@ -111,9 +112,9 @@ def member(model: Any, name: str) -> Any:
             )
         found = vars(found)[match[1]]
         if match[2]:
-            index = tuple(int(i) for i in match[2][1:-1].split(","))
+            index = [int(i) for i in match[2][1:-1].split(",")]
             try:
-                found = found[index if len(index) > 1 else index[0]]
+                found = found[tuple(index) if len(index) > 1 else index[0]]
             except (IndexError, RuntimeError, TypeError):
                 raise ModelError(f"measured {name}: there is no element {match[2]} of {match[1]}") from None
     if not isinstance(found, ca.SX):
@@ -121,6 +122,14 @@ def member(model: Any, name: str) -> Any:
     for _ in range(order):
         found = der(found)
     return found
+
+
+def single_columns(samples: Samples) -> list[Samples]:
+    """Samples of one column each."""
+    return [
+        Samples(samples.times, values, deviation=deviation)
+        for values, deviation in zip(samples.values.T, samples.deviations.T[:, :, None], strict=True)
+    ]
 
 
 class _Change:

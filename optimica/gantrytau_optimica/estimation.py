@@ -18,6 +18,7 @@ from gantrytau import Model, ModelError, SolveError
 from gantrytau.symbols import split_derivative
 from gantrytau_optimica.building import Built, build
 from gantrytau_optimica.estimate import Estimate
+from gantrytau_optimica.estimate_mesh import mesh_shift
 from gantrytau_optimica.estimate_problem import Plan, plan, sample_times
 from gantrytau_optimica.estimate_sensitivity import Residuals, check_determined, residuals
 from gantrytau_optimica.experiments import Experiment, named
@@ -221,9 +222,14 @@ def _answer(
     _refuse_lost(read, found, optimum, inner, slopes, float(np.linalg.norm(measured / scales)))
     shown = {n.name: parameters[n.name] for n in read.numbers}
     chosen = [k for n in read.numbers for k in inner if order[k] == n.name]
+    names, slopes = tuple(order[k] for k in chosen), slopes[:, [inner.index(k) for k in chosen]]
+    errors = found.values(w)
+    shift = np.zeros(len(names))
+    if inner and not read.static:
+        shift = mesh_shift(optimum, found.program.problem, slopes, errors)
     return Estimate(
-        read.read.name, read.experiments, shown, at_bounds, tuple(order[k] for k in chosen),
-        slopes[:, [inner.index(k) for k in chosen]], found.values(w), scales, weights, known, loss, optimum,
+        read.read.name, read.experiments, shown, at_bounds, names, slopes, errors, scales, weights,
+        dict(zip(names, shift.tolist(), strict=True)), known, loss, optimum,
     )  # fmt: skip
 
 

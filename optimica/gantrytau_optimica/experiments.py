@@ -1,7 +1,7 @@
 """Experiments: what was measured, under which inputs, from which start; checked when they are told."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ class Experiment:
     measured: Mapping[str, Any]
     inputs: Mapping[str, Any] = field(default_factory=dict)
     start: Mapping[str, Any] = field(default_factory=dict)
+    _: KW_ONLY
     parameters: Mapping[str, Any] = field(default_factory=dict)
     guess: Mapping[str, Any] = field(default_factory=dict)
     begin: float = 0.0

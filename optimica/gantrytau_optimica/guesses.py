@@ -156,16 +156,30 @@ class _Stretched(Stretched):
         return np.interp(np.atleast_1d(fraction), self.share, self.values)
 
 
-def guess_of(source: "Result | Optimum", dae: Dae) -> dict[str, Any]:
-    """Guesses from another solution: its signals by name, its time stretched onto the new horizon."""
-    times = np.asarray(source.time)
-    names = [n for n in dae.variables if n in source]
-    missing = [n for n in dae.states if n not in source]
-    if missing:
-        raise ModelError(f"guess: the given solution has no {missing[0]}; give a solution of the same model")
+def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[str, Any]:
+    """Guesses from another solution by name: signals, their time stretched onto the new horizon, and free numbers.
 
-    share = (times - times[0]) / (times[-1] - times[0])
-    return {name: _Stretched(share, np.asarray(source[name])) for name in names}
+    component: path of the component that the solution is of. What the solution does not have keeps its default guess;
+    ModelError if it has no variable of the model at all.
+    """
+    before = f"{component}." if component else ""
+    times: dict[str, np.ndarray] = {}
+    for name in dae.variables:
+        own = name[len(before) :]
+        if name.startswith(before) and own in source:
+            times[name] = np.asarray(source.time_of(own) if hasattr(source, "time_of") else source.time)
+    if not times:
+        what = f"none of the variables of {component}" if component else "no variable of the problem"
+        raise ModelError(
+            f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the same "
+            "model, or write guess={'component': solution} with the component that it is of"
+        )
+    found: dict[str, Any] = {
+        n: _Stretched((t - t[0]) / (t[-1] - t[0]), np.asarray(source[n[len(before) :]]))
+        for n, t in times.items()
+    }
+    numbers = {before + n: x for n, x in getattr(source, "free", {}).items()}
+    return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
 
 
 def _ends(

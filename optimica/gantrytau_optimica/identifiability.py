@@ -7,6 +7,7 @@ points, only that is determined. Golub, Van Loan (2013), Matrix Computations, se
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -19,7 +20,7 @@ SURE = 1e-3  # how closely a ratio of changes is to be a simple number
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Slopes of the residuals (N, k) with respect to parameters, and their values (k,), at one point."""
+    """Slopes of the residuals (N, k) with respect to parameters, and their values (k,), at one point; N >= k."""
 
     jacobian: np.ndarray
     values: np.ndarray
@@ -35,12 +36,12 @@ def silent_changes(point: Point, sizes: np.ndarray) -> np.ndarray:
     """Combined changes that no residual notices, relative to `sizes`, each with as few parameters as possible, (k, d)."""
     slopes = point.jacobian * sizes
     norms = np.linalg.norm(slopes, axis=0)
-    _, singular, right = np.linalg.svd(slopes / norms, full_matrices=True)
-    singular = np.concatenate([singular, np.zeros(norms.size - singular.size)])
+    _, singular, right = np.linalg.svd(slopes / norms, full_matrices=False)
     null = right[singular <= RANK * singular[0]].T
     if not null.shape[1]:
         return null
-    pivots = qr(null.T, pivoting=True, mode="r")[1][: null.shape[1]]
+    found: Any = qr(null.T, pivoting=True, mode="r")
+    pivots = found[1][: null.shape[1]]
     null = null @ np.linalg.inv(null[pivots])
     null[np.abs(null) < 1e-5] = 0.0
     changes = null / norms[:, None]
@@ -60,7 +61,7 @@ def told_apart(
         again = None
     found = []
     for d in range(changes.shape[1]):
-        mine = np.flatnonzero(changes[:, d])
+        mine = np.flatnonzero(changes[:, d]).tolist()
         pairs = [(changes[:, d] * sizes, point.values)]
         if other is not None and again is not None:
             pairs.append((again[:, _same(again, mine, d)] * sizes, other.values))
@@ -68,10 +69,10 @@ def told_apart(
     return found
 
 
-def _same(changes: np.ndarray, mine: np.ndarray, otherwise: int) -> int:
+def _same(changes: np.ndarray, mine: list[int], otherwise: int) -> int:
     """The change that concerns the same parameters."""
     for d in range(changes.shape[1]):
-        if np.array_equal(np.flatnonzero(changes[:, d]), mine):
+        if np.flatnonzero(changes[:, d]).tolist() == mine:
             return d
     return otherwise
 
@@ -84,8 +85,8 @@ def _sentence(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> 
         if only:
             return f"{together}: only {only} is determined"
     change, value = points[0]
-    relative = change / np.where(value == 0.0, 1.0, value)
-    relative = relative / relative[np.argmax(np.abs(relative))]
+    relative = np.asarray(change) / np.where(value == 0.0, 1.0, value)
+    relative = relative / max(relative.tolist(), key=abs)
     if len(points) == 2 and np.allclose(relative, 1.0, atol=SURE):
         return f"{together}: they are determined up to a common factor only"
     steps = ", ".join(f"{n} by {r:+.3g} %" for n, r in zip(names, relative, strict=True))

@@ -213,7 +213,7 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
     for i, signal in enumerate(phase.inputs, nx + nz):
         if signal.pieces.kind == "free":
             continue
-        tracks[i], new = _pieces(signal, mesh, first + owner.size)
+        tracks[i], new = pieces_of(signal, mesh, first + owner.size)
         if signal.pieces.kind != "ramps":
             chains[i] = first + owner.size + np.arange(new.size)
         owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
@@ -221,7 +221,7 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
     return Layout(phase, mesh, scheme, first, first + np.arange(m), starts, ordered, chains, owner, moment)
 
 
-def _pieces(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
+def pieces_of(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
     """Track of an input made of pieces, and the shares of the horizon of its values: middles or ends of the pieces."""
     n, borders, pieces = mesh.elements, mesh.borders, signal.pieces
     if pieces.kind == "ramps":

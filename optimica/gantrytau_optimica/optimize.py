@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.translation import names
 from gantrytau_optimica.building import build
-from gantrytau_optimica.checking import static
+from gantrytau_optimica.checking import not_at_two_times, static
 from gantrytau_optimica.controls import read_controls
 from gantrytau_optimica.ipopt import Policy, Progress, Solver
 from gantrytau_optimica.mesh import Mesh, mesh_of, with_borders
@@ -22,6 +22,7 @@ from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import Phase
 from gantrytau_optimica.refinement import with_ramps
 from gantrytau_optimica.scheme import collocation
+from gantrytau_optimica.shooting import shoot
 
 Problem = Optimization | type[Optimization] | ReadProblem
 
@@ -45,9 +46,9 @@ def optimize(
     """Solve an optimal-control problem by direct collocation.
 
     problem: a subclass of Optimization or an instance; elements, points: of the mesh, points per element (1 to 9);
-    scheme: "radau" or "gauss"; guess: name -> number, array or function of time, or another solution; default: a
-    straight line between given initial and final values, else start values. tolerance: of Ipopt; max_time: s;
-    progress: called with (iteration, objective).
+    scheme: "radau", "gauss", or "shooting" (points: Runge-Kutta steps per element); guess: name -> number, array or
+    function of time, or another solution; default: a straight line between given initial and final values, else start
+    values. tolerance: of Ipopt; max_time: s; progress: called with (iteration, objective).
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
@@ -91,19 +92,22 @@ def prepare(
     """
     _check(tolerance, max_iterations, max_time, progress)
     _check_answers(refine, starts)
-    grid = collocation(scheme, points)
+    shooting = scheme == "shooting"
+    if shooting and refine is not None:
+        raise ModelError("refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'")
+    grid = collocation("radau" if shooting else scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     begin = time.perf_counter()
     guess = read_guesses(guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
     built = build(read, guess, held, read_controls(read, controls or {}))
-    if refine is not None:
-        built = replace(built, problem=with_ramps(built.problem))
-    if static(read.dae):
-        grid, mesh = collocation("radau", 1), mesh_of(1)
+    if static(read.dae) and not_at_two_times(read):
+        grid, mesh, shooting = collocation("radau", 1), mesh_of(1), False
     meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
-    program = transcribe(built.problem, meshes, grid)
+    if refine is not None:
+        built = replace(built, problem=with_ramps(built.problem, meshes))
+    program = shoot(built.problem, meshes, points) if shooting else transcribe(built.problem, meshes, grid)
     check_freedom(program)
     policy = Policy(tolerance, max_iterations, max_time, progress)
     return Prepared(

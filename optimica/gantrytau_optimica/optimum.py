@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,10 @@ class Optimum:
                 return phase
         return next(iter(self.phases.values()))  # a parameter is the same in all
 
+    def time_of(self, name: str) -> np.ndarray:
+        """The times in s of a variable: those of its phase."""
+        return self._phase(name).time
+
     @property
     def result(self) -> Result:
         """All variables of the model over `time`, to plot and save."""
@@ -162,7 +167,9 @@ class Optimum:
     def __getitem__(self, name: str) -> Any:
         if name in self.free:
             return self.free[name]
-        self.dae.expand(name)  # raises for unknown names
+        elements = self.dae.expand(name)  # raises for unknown names
+        if elements[0] in self._numbers:
+            return np.array([self._numbers.get(n, self.dae.table.values[n]) for n in elements])
         phase = self._phase(name)
         result = self._results[phase.phase.name]
         if name in result or name in self.dae.vectors:
@@ -199,7 +206,11 @@ class Optimum:
         return self.result.plot(*names, file=file)
 
     def save(self, path: Any):
-        """Save all variables over time, as Result.save."""
+        """Save all variables over time, as Result.save; with the ending .optimum the whole solution, for load_optimum."""
+        if Path(path).suffix == ".optimum":
+            from gantrytau_optimica.saving import save_optimum
+
+            return save_optimum(self, path)
         return self.result.save(path)
 
     @cached_property

@@ -8,8 +8,11 @@ import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
 from gantrytau_optimica.building import Built, with_guesses
+from gantrytau_optimica.carrying import carried
 from gantrytau_optimica.guesses import guess_of, number_guess
 from gantrytau_optimica.ipopt import Solver
+from gantrytau_optimica.meaning import first_guess
+from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import Program, transcribe
 from gantrytau_optimica.reach import out_of_reach, reach_text
@@ -17,9 +20,12 @@ from gantrytau_optimica.reading import ReadProblem
 from gantrytau_optimica.records import ControlProblem, FreeNumber
 from gantrytau_optimica.refinement import refined
 from gantrytau_optimica.relaxation import worth_relaxing
+from gantrytau_optimica.saved import SavedOptimum
 from gantrytau_optimica.starts import searched
 
-Guesses = Mapping[str, Any] | Result | Optimum
+Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
+FEW = 30  # elements, from which on first guesses are tried on half as many
+MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 ROUNDS = 5  # of solving again with points at moving times read from other elements
 
@@ -59,29 +65,49 @@ class Prepared:
         program = self.program.with_numbers(built.problem)
         lost = out_of_reach(built)
         if lost:
-            unsolved = self.solver.unsolved(program, _first(program, built))
+            unsolved = self.solver.unsolved(program, first_guess(program))
             raise SolveError(
                 f"{read.name}: no solution: {reach_text(lost)}. Correct these conditions, or the "
                 "parameters of the model.",
                 equations=[x.equation for x in lost],
                 optimum=Optimum(read.name, built, program, unsolved, self.build_time),
             )
-        optimum = self._best(built, program)
+        same = isinstance(guess, Optimum) and guess.program.assembled is self.program.assembled
+        optimum = self._best(built, program, guess.solution.w if same else first_guess(program))
         if self.refine is None:
             return optimum
         policy = self.solver.policy
         again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
         return refined(optimum, self.refine, lambda p, w: self._solved(optimum.built, p, Solver(p, again), w))
 
-    def _best(self, built: Built, program: Program) -> Optimum:
+    def _best(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
+
+        if self.starts == 1:
+            return solved_or_raise(self._solved(built, program, self.solver, first))
+        policy = self.solver.policy
+        coarse = self._coarse(built)
+        solver = Solver(coarse, replace(policy, max_iterations=min(policy.max_iterations, MOST_TRIED)))
 
         def solve(problem: ControlProblem) -> Optimum:
             changed = replace(built, problem=problem)
-            return self._solved(changed, program, self.solver, _first(program, changed))
+            return self._solved(changed, coarse, solver, first_guess(coarse.with_numbers(problem)))
 
-        optimum = searched(solve, built, self.starts) if self.starts > 1 else solve(built.problem)
-        return solved_or_raise(optimum)
+        best = searched(solve, built, self.starts)
+        for branch in best.search.branches if best.search else ():
+            nearby = carried(list(branch.optimum.phases.values()), program)
+            optimum = self._solved(built, program, self.solver, nearby)
+            if optimum.success or optimum.status == "interrupted":
+                return solved_or_raise(replace(optimum, search=best.search))
+        return solved_or_raise(best)
+
+    def _coarse(self, built: Built) -> Program:
+        """The program on every other border, on which first guesses are tried."""
+        layouts = self.program.places.layouts
+        if min(layout.mesh.elements for layout in layouts) < FEW or layouts[0].scheme.scheme == "shooting":
+            return self.program.with_numbers(built.problem)
+        meshes = [Mesh(np.unique(np.append(layout.mesh.borders[::2], 1.0))) for layout in layouts]
+        return transcribe(built.problem, meshes, layouts[0].scheme)
 
     def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends from a first guess of the unknowns of a program."""
@@ -139,13 +165,20 @@ def read_guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:
     """Guesses by name, from those of the caller or from another solution. Raises ModelError for unknown names."""
     if isinstance(guess, (Result, Optimum)):
         return guess_of(guess, read.dae)
+    if isinstance(guess, SavedOptimum):
+        return guess.guesses(read.dae)
     if guess is not None and not isinstance(guess, Mapping):
         raise ModelError(
             f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum"
         )
-    for name in guess or {}:
-        read.dae.expand(name)
-    return dict(guess or {})
+    found: dict[str, Any] = {}
+    for name, value in (guess or {}).items():
+        if isinstance(value, (Result, Optimum)):
+            found.update(guess_of(value, read.dae, name))
+        else:
+            read.dae.expand(name)
+            found[name] = value
+    return found
 
 
 def parameter_names(read: ReadProblem, name: str) -> tuple[str, ...]:
@@ -154,16 +187,3 @@ def parameter_names(read: ReadProblem, name: str) -> tuple[str, ...]:
     if elements[0] not in read.dae.table.symbols:
         raise ModelError(f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter")
     return tuple(elements)
-
-
-def _first(program: Program, built: Built) -> np.ndarray:
-    """The guess as unknowns of the program, inside of their bounds."""
-    places = program.places
-    w = np.zeros(places.size)
-    w[places.free] = [number.guess for number in built.problem.free]
-    for layout, phase in zip(places.layouts, built.problem.phases, strict=True):
-        w[layout.knots] = layout.mesh.borders[list(layout.mesh.moving)]
-        for number, signal in enumerate(phase.signals):
-            mine = layout.of(number)
-            w[mine] = signal.guess(layout.moment[mine - layout.first])
-    return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)

@@ -287,7 +287,7 @@ def _running_costs(places: Places, layout: Layout) -> list[Block]:
 
 def _without_sums(problem: ControlProblem) -> ca.SX:
     """The objective less its sums over samples, which have blocks of their own."""
-    symbols = [s.symbol for s in problem.sums]
+    symbols = list({s.symbol.element_hash(): s.symbol for s in problem.sums}.values())
     return (
         ca.substitute(problem.objective, ca.vertcat(*symbols), ca.SX.zeros(len(symbols), 1))
         if symbols

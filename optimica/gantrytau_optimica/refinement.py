@@ -1,6 +1,6 @@
 """`refine=`: solve, play back, improve the mesh, and solve again until the answer holds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from gantrytau_optimica.carrying import carried
 from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.program import transcribe
-from gantrytau_optimica.records import ControlProblem, Phase, Pieces
+from gantrytau_optimica.records import ControlProblem, Phase, Pieces, Signal
 from gantrytau_optimica.remeshing import better_mesh
 from gantrytau_optimica.switching import Switch
 from gantrytau_optimica.switching import switches as switches_of
@@ -51,18 +51,24 @@ class Refinement:
         )
 
 
-def with_ramps(problem: ControlProblem) -> ControlProblem:
+def with_ramps(problem: ControlProblem, meshes: Sequence[Mesh]) -> ControlProblem:
     """The problem with its free inputs as straight lines in each element: what keeps to limits at both ends keeps to
-    them between.
+    them between. Inputs in pieces that the caller chose keep the borders that these have on the first mesh.
     """
 
-    def changed(phase: Phase) -> Phase:
-        inputs = tuple(
-            replace(s, pieces=Pieces("ramps")) if s.pieces.kind == "free" else s for s in phase.inputs
-        )
+    def pieces(signal: Signal, mesh: Mesh) -> Pieces:
+        own = signal.pieces
+        if own.kind in ("free", "ramps"):
+            return Pieces("ramps")
+        borders = np.unique(np.append(mesh.borders[:: own.elements], 1.0))
+        return replace(own, borders=tuple(borders.tolist()))
+
+    def changed(phase: Phase, mesh: Mesh) -> Phase:
+        inputs = tuple(replace(s, pieces=pieces(s, mesh)) for s in phase.inputs)
         return replace(phase, inputs=inputs)
 
-    return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
+    phases = (changed(phase, mesh) for phase, mesh in zip(problem.phases, meshes, strict=True))
+    return replace(problem, phases=tuple(phases))
 
 
 def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum]) -> Optimum:
@@ -102,8 +108,10 @@ def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, how: str) ->
     stands = len(rounds) > 1 and max(rounds[-1].violation, rounds[-1].defect) <= accuracy
     meshes = []
     for played in optimum.playback.phases.values():
-        movable = how == "moving" and _movable(played.trajectory.phase)
-        meshes.append(better_mesh(played, accuracy, movable, roughness=stands, structure=how != "divided"))
+        phase = played.trajectory.phase
+        movable = how == "moving" and _movable(phase)
+        structure = how != "divided" and _of_ramps(phase)
+        meshes.append(better_mesh(played, accuracy, movable, roughness=stands, structure=structure))
     return meshes
 
 
@@ -136,4 +144,9 @@ def _holds(rounds: list[Round], accuracy: float) -> bool:
 
 def _movable(phase: Phase) -> bool:
     """Whether borders may move: not where samples tie values to times, nor where the caller chose the pieces."""
-    return not phase.courses and not phase.sums and all(s.pieces.kind == "ramps" for s in phase.inputs)
+    return not phase.courses and not phase.sums
+
+
+def _of_ramps(phase: Phase) -> bool:
+    """Whether all borders may be changed: not where the caller chose the pieces of inputs."""
+    return all(s.pieces.kind == "ramps" for s in phase.inputs)

@@ -8,6 +8,7 @@ below that of the transcription.
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -213,7 +214,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
             [symbols[i] for i, _ in closed], [ca.densify(form) for _, form in closed], [outputs], False
         )
         sizes = np.cumsum([0, *(e.numel() for e in everything)])
-        everything = [outputs[int(a) : int(b)] for a, b in zip(sizes[:-1], sizes[1:], strict=True)]
+        everything = [outputs[int(a) : int(b)] for a, b in pairwise(sizes)]
     place, begin, span = ca.SX.sym("place"), ca.SX.sym("begin"), ca.SX.sym("span")
     nodes = _nodes(trajectory)
     inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]

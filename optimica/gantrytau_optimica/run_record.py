@@ -190,10 +190,7 @@ def _verdict(optimum: Optimum) -> dict[str, Any]:
 
 def _between(optimum: Optimum) -> float | None:
     """The largest violation between the points, where the optimum can be played back."""
-    playback = getattr(optimum, "playback", None)
-    found = playback() if callable(playback) else playback
-    worst = getattr(found, "largest_violation", None)
-    return None if worst is None else float(worst)
+    return float(optimum.playback.violation) if optimum.success and optimum.playback.complete else None
 
 
 def _equations(read: ReadProblem) -> Iterator[str]:

@@ -173,8 +173,9 @@ def _phase_content(
         f"{place}/affine/offset": offsets,
     }
     for i, track in enumerate(phase.layout.tracks):
-        arrays[f"{place}/signals/{i}/nodes"] = track.nodes
-        arrays[f"{place}/signals/{i}/unknowns"] = track.unknowns.astype(np.int64)
+        nodes, unknowns = _polynomials(track, phase, arrays)
+        arrays[f"{place}/signals/{i}/nodes"] = nodes
+        arrays[f"{place}/signals/{i}/unknowns"] = unknowns.astype(np.int64)
     start, final = phase.horizon
     return {
         "name": own,
@@ -185,6 +186,18 @@ def _phase_content(
         "affine": [names[i] for i in np.flatnonzero(affine)],
         "others": [names[i] for i in others],
     }
+
+
+def _polynomials(track: Track, phase: Trajectory, arrays: Arrays) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and unknowns of a signal; one that is no polynomial through its unknowns becomes one through new values."""
+    if type(track) is Track:
+        return track.nodes, track.unknowns
+    n = phase.mesh.elements
+    nodes = np.tile(np.linspace(0.0, 1.0, 4), (n, 1))  # those of shooting are cubic at most
+    values = track.values(phase.w, np.repeat(np.arange(n), 4), nodes.ravel())
+    unknowns = arrays["w"].size + np.arange(values.size).reshape(n, 4)
+    arrays["w"] = np.append(arrays["w"], values)
+    return nodes, unknowns
 
 
 def _known(optimum: Optimum, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
@@ -283,7 +296,7 @@ def _optimum(
         vectors=table("vectors", lambda elements: tuple(str(e) for e in elements)),
         phases={phase.name: phase for phase in phases},
         multipliers=read("multipliers", "f", None),
-        bound_multipliers=read("bound_multipliers", "f", w.size),
+        bound_multipliers=read("bound_multipliers", "f", None),
     )
 
 

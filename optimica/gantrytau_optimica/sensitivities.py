@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
@@ -168,6 +169,7 @@ def sensitivities(optimum: Optimum, parameters: Sequence[str] | None = None) -> 
             f"{optimum.name}: no parameters are named, expected some; name them in sensitivities(optimum, [...]) or in "
             "prepare(parameters=[...])"
         )
+    _check_limits(optimum, wanted)
     missing = [n for n in wanted if n not in held]
     if missing:
         optimum = holding(optimum, missing)
@@ -190,6 +192,24 @@ def _parameter(optimum: Optimum, name: str) -> tuple[str, ...]:
                 f"{optimum.name}: {name} is no parameter, expected one; declare it as a Parameter"
             )
     return elements
+
+
+def _check_limits(optimum: Optimum, wanted: Sequence[str]) -> None:
+    """ModelError where a limit of a free number follows from a parameter: the program knows its number only."""
+    table = optimum.dae.table
+    for parameter in optimum.dae.flat.parameters:
+        for limit in (parameter.min, parameter.max) if parameter.free else ():
+            leaves = (
+                set()
+                if limit is None
+                else {leaf.name() for leaf in ca.symvar(table.reduce(ca.vertcat(*limit)))}
+            )
+            for name in wanted:
+                if name in leaves:
+                    raise ModelError(
+                        f"{optimum.name}: a limit of {parameter.name} follows from {name}, expected a number there; write "
+                        f"the limit of {parameter.name} in `constraints`"
+                    )
 
 
 def _moved(optimum: Optimum, step: np.ndarray, change: float, held: Mapping[str, float]) -> Optimum:

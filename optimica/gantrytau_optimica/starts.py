@@ -1,6 +1,6 @@
 """`starts=`: several first guesses around the default one, and the branches of solutions they lead to."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from gantrytau_optimica.records import ControlProblem, FreeNumber, Phase, Signal
 from gantrytau_optimica.sorting import signal_limits
 
 SEED = 20121
+EXTENTS = (0.15, 0.6)  # of the way from start to end, between which it is drawn how far a guess is bent
 SAME = 1e-3  # relative: objectives that are closer count as one branch
 WAVES = 3  # half waves in the deviation of a guess
 
@@ -96,28 +97,36 @@ def _drawn(number: FreeNumber, random: np.random.Generator) -> FreeNumber:
 def _bent(phase: Phase, span: tuple[float, float], name: str, random: np.random.Generator) -> Phase:
     limits = signal_limits(phase, name)
     states = {s.symbol.name(): s for s in phase.states}
+    extents = _extents(phase, limits, float(np.exp(random.uniform(*np.log(EXTENTS)))))
     guesses: dict[str, Guess] = {}
     for key, state in states.items():
         base, order = split_derivative(key)
         if order and derivative_name(base, order - 1) in states:
             continue
-        weights = random.normal(size=WAVES) / (1 + np.arange(WAVES)) * _extent(state, limits[state.name])
-        duration = span[1] - span[0]
+        weights = random.normal(size=WAVES) / (1 + np.arange(WAVES)) ** 2 * extents[state.name]
         guesses[key] = _wave(state.guess, weights, limits[state.name])
         above = derivative_name(base, order + 1)
         if above in states:
-            guesses[above] = _slope(states[above].guess, weights / duration)
+            guesses[above] = _slope(states[above].guess, weights / (span[1] - span[0]))
     inputs = tuple(replace(u, guess=_level(u, limits[u.name], random)) for u in phase.inputs)
     bent_states = tuple(replace(s, guess=guesses.get(s.symbol.name(), s.guess)) for s in phase.states)
     return replace(phase, states=bent_states, inputs=inputs)
 
 
-def _extent(state: Signal, limits: tuple[float, float]) -> float:
-    """How far a guess is bent: a share of the limits, else of the way it goes, else of its size."""
-    if np.isfinite(limits).all():
-        return 0.25 * (limits[1] - limits[0])
-    way = float(np.ptp(state.guess(np.linspace(0.0, 1.0, 21))))
-    return max(0.3 * way, 0.1 * state.nominal)
+def _extents(phase: Phase, limits: Mapping[str, tuple[float, float]], share: float) -> dict[str, float]:
+    """How far the guesses of states are bent: shares of the limits, else of the way that a whole vector goes."""
+    shares = np.linspace(0.0, 1.0, 21)
+    ways: dict[str, float] = {}
+    for state in phase.states:
+        vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
+        ways[vector] = float(np.hypot(ways.get(vector, 0.0), np.ptp(state.guess(shares))))
+    found = {}
+    for state in phase.states:
+        vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
+        low, high = limits[state.name]
+        width = 0.25 * (high - low) if np.isfinite(low) and np.isfinite(high) else np.inf
+        found[state.name] = min(width, max(share * ways[vector], 0.1 * state.nominal))
+    return found
 
 
 def _wave(guess: Guess, weights: np.ndarray, limits: tuple[float, float]) -> Guess:

@@ -1,6 +1,7 @@
 """What is said of values that are not finite, motions that run away, and conditions that depend on each other."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -243,3 +244,12 @@ def test_a_solver_stuck_where_a_root_ends():
     text = said(Held)
     assert "infinitely steep there" in text
     assert "root (Root), equation 1" in text
+
+
+def test_a_lower_accuracy_is_told_with_what_was_reached():
+    found = optimize(FastestMass)
+    lower = replace(found, solution=replace(found.solution, status=WORDS["Solved_To_Acceptable_Level"]))
+    assert "FastestMass: solved to a lower accuracy than asked for after" in lower.report()
+    assert "Conditions are met within" in lower.report()
+    assert "0 would be an optimum" in lower.report()
+    assert "0 would be an optimum" not in found.report()

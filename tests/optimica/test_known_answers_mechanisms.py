@@ -74,9 +74,6 @@ def test_a_four_bar_linkage_replays():
     assert found.final("crank.phi") == pytest.approx(2.0, abs=5e-4)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a bar that is given without its length is taken to be 1 m long for the pose"
-)
 def test_a_start_of_the_crank_without_its_length():
     assert translate(FourBar(crank=dict(phi=Start(1.0)))).evaluate({})["crank.phi"] == pytest.approx(1.0)
 

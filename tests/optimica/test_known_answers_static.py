@@ -181,9 +181,6 @@ def test_a_free_vector():
     np.testing.assert_allclose(amounts, weights / weights.sum(), atol=1e-5)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a vector of free numbers is not known by its own name, only by its elements'"
-)
 def test_a_free_vector_by_its_name():
     optimum = optimize(Column)
     assert np.shape(optimum["amount"]) == (3,)

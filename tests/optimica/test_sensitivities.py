@@ -223,6 +223,29 @@ def test_phases():
     )  # x = way - (t - 2 sqrt(way))^2 / 2
 
 
+def test_a_limit_of_an_input_that_is_a_parameter():
+    class Pushed(Optimization):
+        top = Parameter(1.0, unit="m/s2", description="largest acceleration")
+        mass: Any = Mass(x=Fixed(0.0), v=Fixed(0.0), u=dict(min=-1.0, max=top))
+        final_time: Any = Free(1.0, unit="s", min=0.1, max=100.0, description="duration")
+
+        def objective(self):
+            return self.final_time
+
+        def constraints(self):
+            yield final(self.mass.x) == 1
+            yield final(self.mass.v) == 0
+
+    # a bound of an unknown becomes a row of its own: solved again from where it stands
+    found = sensitivities(optimize(Pushed, elements=25), ["top"])
+    step = 1e-3
+    above, below = (
+        prepare(Pushed, parameters=["top"], elements=25).solve({"top": 1 + d}).objective
+        for d in (step, -step)
+    )
+    assert found.objective["top"] == pytest.approx((above - below) / (2 * step), rel=1e-5)
+
+
 def test_borders_of_elements_may_move():
     prepared = prepare(Carried, parameters=["way"], elements=2, lengths="free")
     optimum = prepared.solve()
@@ -255,3 +278,28 @@ def test_what_cannot_be_asked_is_said():
         optimize(Carried, elements=5, max_iterations=2)
     with pytest.raises(ModelError, match="iteration limit reached; sensitivities are those of a solution"):
         sensitivities(caught.value.optimum, ["way"])
+
+
+@pytest.mark.parametrize("limit", ["number", "constraint"])
+def test_a_limit_of_a_free_number_that_is_a_parameter(limit):
+    class Largest(Optimization):
+        top = Parameter(2.0, unit="1", description="largest value")
+        least = Parameter(2.0, unit="1", description="not used")
+        q: Any = Free(0.5, unit="1", min=0.0, max=top if limit == "number" else None, description="where")
+
+        def objective(self):
+            return -self.q
+
+        def constraints(self):
+            if limit == "constraint":
+                yield self.q <= self.top
+
+    optimum = optimize(Largest)
+    assert sensitivities(optimum, ["least"]).objective["least"] == 0.0
+    if limit == "constraint":
+        assert sensitivities(optimum, ["top"]).objective["top"] == pytest.approx(-1.0, rel=1e-6)
+        return
+    with pytest.raises(
+        ModelError, match=r"a limit of q follows from top, .*write the limit of q in `constraints`"
+    ):
+        sensitivities(optimum, ["top"])
