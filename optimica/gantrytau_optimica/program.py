@@ -117,6 +117,10 @@ def transcribe(
 
     located: free numbers, and borders by phase, for which points at moving times are looked up (default: the guess).
     """
+    if scheme.scheme == "shooting":
+        from gantrytau_optimica.shooting import shoot_steps
+
+        return shoot_steps(problem, meshes, scheme)
     places = lay_out(problem, tuple(meshes), scheme)
     free, borders = located or (np.array([n.guess for n in problem.free]), [m.borders for m in meshes])
     where = places_of_points(places, free, borders)

@@ -53,15 +53,18 @@ SLOPES = np.array([
     [0.0, 0.0, 0.0, 6.0],
 ])  # fmt: skip
 STAGES = Collocation("shooting", PLACES, np.append(0.0, PLACES), SLOPES, np.eye(5)[4], WEIGHTS)
-# values are read at the ends of the steps; integrals of what was found by Simpson's rule
-READING = Collocation(
-    "shooting",
-    np.array([1.0]),
-    np.array([0.0, 1.0]),
-    np.array([[-1.0], [1.0]]),
-    np.array([0.0, 1.0]),
-    np.array([1.0, 4.0, 1.0]) / 6,
-)
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting(Collocation):
+    """How a solution is read: values at the ends of steps, integrals by Simpson's rule; `steps` in each element."""
+
+    steps: int
+
+
+def _reading(steps: int) -> Shooting:
+    slopes, end = np.array([[-1.0], [1.0]]), np.array([0.0, 1.0])
+    return Shooting("shooting", end[1:], end, slopes, end, np.array([1.0, 4.0, 1.0]) / 6, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +130,21 @@ def shoot(problem: ControlProblem, meshes: Sequence[Mesh], steps: int) -> Progra
 
     Raises ModelError for elements whose lengths are free, and for values at times that move inside of the horizon.
     """
+    parts, fine = np.arange(steps) / steps, []
+    for mesh in meshes:
+        borders = np.append((mesh.borders[:-1, None] + mesh.widths[:, None] * parts).ravel(), 1.0)
+        fine.append(Mesh(borders, mesh.moving))
+    return shoot_steps(problem, fine, _reading(steps))
+
+
+def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Collocation) -> Program:
+    """The same on meshes that hold the steps already, of which `scheme.steps` make up an element."""
+    assert isinstance(scheme, Shooting)
     if any(mesh.moving for mesh in meshes):
         raise ModelError(
             f"{problem.name}: lengths='free' and scheme='shooting' do not go together; use scheme='radau' or given lengths"
         )
-    places = _places(problem, meshes, steps)
+    places = _places(problem, meshes, scheme)
     where = places_of_points(
         places, np.array([n.guess for n in problem.free]), [x.mesh.borders for x in places.layouts]
     )
@@ -177,15 +190,13 @@ def shoot(problem: ControlProblem, meshes: Sequence[Mesh], steps: int) -> Progra
     return Program(problem, places, assembled, tuple(groups), lbw, ubw, lower, upper, tuple(where))
 
 
-def _places(problem: ControlProblem, meshes: Sequence[Mesh], steps: int) -> Places:
+def _places(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Shooting) -> Places:
     """Number the unknowns."""
     layouts: list[Layout] = []
     size = len(problem.free)
     scales = [np.array([n.nominal or max(abs(n.guess), 1e-3) for n in problem.free])]
     for phase, mesh in zip(problem.phases, meshes, strict=True):
-        parts = np.arange(steps) / steps
-        borders = np.append((mesh.borders[:-1, None] + mesh.widths[:, None] * parts).ravel(), 1.0)
-        layouts.append(_lay_out(_held(phase, steps), Mesh(borders), size))
+        layouts.append(_lay_out(_held(phase, scheme.steps), mesh, scheme, size))
         size += layouts[-1].size
         scales.append(np.array([s.nominal for s in phase.signals])[layouts[-1].owner])
     return Places(problem, np.arange(len(problem.free)), tuple(layouts), np.concatenate(scales))
@@ -200,7 +211,7 @@ def _held(phase: Phase, steps: int) -> Phase:
     return replace(phase, inputs=tuple(inputs))
 
 
-def _lay_out(phase: Phase, mesh: Mesh, first: int) -> ShootingLayout:
+def _lay_out(phase: Phase, mesh: Mesh, scheme: Shooting, first: int) -> ShootingLayout:
     n, nx, nz = mesh.elements, len(phase.states), len(phase.algebraics)
     # step after step, so that what belongs together stands together
     each = 4 * (nx + nz)
@@ -228,7 +239,7 @@ def _lay_out(phase: Phase, mesh: Mesh, first: int) -> ShootingLayout:
         chains[i] = first + owner.size + np.arange(new.size)
         owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
     return ShootingLayout(
-        phase, mesh, READING, first, np.zeros(0, int), starts, tuple(tracks), chains, owner, moment, inside, algebraics
+        phase, mesh, scheme, first, np.zeros(0, int), starts, tuple(tracks), chains, owner, moment, inside, algebraics
     )  # fmt: skip
 
 

@@ -5,10 +5,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der, exp, sqrt, time
+from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, SolveError, der, exp, sqrt, time
 from gantrytau_optimica import Optimization, at, optimize, prepare
 from gantrytau_optimica.saving import load_optimum, save_optimum
-from tests.optimica.problems import BoundedOscillator, FastestMass, LinearQuadratic
+from tests.optimica.problems import BoundedOscillator, FastestMass, LinearQuadratic, Mass
 from tests.optimica.test_saving import ThereAndOn
 
 shoot = partial(optimize, scheme="shooting")
@@ -202,3 +202,15 @@ def test_a_stiff_motion_needs_steps_or_an_implicit_scheme():
     except SolveError:
         unstable = np.inf
     assert unstable > 10 * bound  # 25 times were found
+
+
+def test_a_failure_is_told_as_with_other_schemes():
+    class Short(LinearQuadratic):
+        mass = Mass(x=Fixed(1.0), v=Fixed(2.0), u=dict(min=-1.0, max=1.0))
+        final_time = 1.0
+
+    with pytest.raises(SolveError, match="no solution") as caught:
+        shoot(Short, elements=6, points=2)
+    # the force of 1 m/s2 changes the speed of 2 m/s to 1 m/s at best, not to -2
+    assert "could be solved" in str(caught.value)
+    assert "`final(mass.v) == -2`" in str(caught.value)
