@@ -109,8 +109,8 @@ def build(
 
 def _check_courses(read: ReadProblem, number: int, phase: Phase) -> None:
     """ModelError for samples of inputs that do not cover the phase or have gaps."""
-    if not (phase.start_time.is_constant() and phase.final_time.is_constant()):
-        return  # refused where they are read
+    if not (phase.states and phase.start_time.is_constant() and phase.final_time.is_constant()):
+        return  # without states nothing is needed between the samples; free times are refused where they are read
     for name, course in read.courses.items():
         if not isinstance(course, ca.SX) and (len(read.phases) == 1 or read.phases[number].owns(name)):
             what = f"{read.name}, input {name}"

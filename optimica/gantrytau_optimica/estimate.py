@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
@@ -69,6 +68,8 @@ class Estimate:
     @property
     def probability(self) -> float:
         """That noise of the given deviations leaves as large a chi_square; NaN where none were given."""
+        from scipy import stats
+
         return (
             float(stats.chi2.sf(self.chi_square, self.freedom)) if self.known and self.freedom > 0 else np.nan
         )
@@ -125,6 +126,8 @@ class Estimate:
 
         They are those of the model linearised at the answer. Raises ModelError.
         """
+        from scipy import stats
+
         if not isinstance(confidence, float) or not 0 < confidence < 1:
             raise ModelError(f"intervals: found confidence={confidence!r}, expected a number between 0 and 1")
         wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)

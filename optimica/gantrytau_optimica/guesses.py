@@ -171,8 +171,8 @@ def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[
     if not times:
         what = f"none of the variables of {component}" if component else "no variable of the problem"
         raise ModelError(
-            f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the same "
-            "model, or write guess={'component': solution} with the component that it is of"
+            f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the "
+            "same model, or write guess={'component': solution} with the component that it is of"
         )
     found: dict[str, Any] = {
         n: _Stretched((t - t[0]) / (t[-1] - t[0]), np.asarray(source[n[len(before) :]]))

@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import interpolate
-from scipy.spatial import KDTree
 
 from gantrytau import ModelError
 from gantrytau_optimica.path_points import words
@@ -163,6 +161,8 @@ def _piece(curve: Curve, a: float, b: float, name: str) -> tuple[float, Array, f
 
 def spline(points: Array, start: Array | None, end: Array | None, closed: bool) -> Curve:
     """The cubic spline through points over their chord lengths; start, end: unit vectors, or None for natural ends."""
+    from scipy import interpolate
+
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(chords)])
     free = (2, np.zeros(points.shape[1]))
@@ -233,6 +233,8 @@ def _rounding(before: Pieces, after: Pieces, cut: float) -> Curve:
 
 def nearest(pieces: Pieces, points: Array, near: Array | None = None) -> Array:
     """The length in m at which a path is nearest to each of the points (n, d); `near`: where to look."""
+    from scipy.spatial import KDTree
+
     length = pieces.knots[-1]
     if near is None:
         samples = np.linspace(0.0, length, max(500, 20 * len(pieces.knots)))

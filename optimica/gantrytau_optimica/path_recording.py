@@ -5,14 +5,17 @@ are along the path, not by time: fitted, measured along the fit, fitted again.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import interpolate
 
 from gantrytau import ModelError
 from gantrytau_optimica.path_fitting import Array, Curve, Pieces, by_length, nearest
 from gantrytau_optimica.path_points import SHARP
+
+if TYPE_CHECKING:
+    from scipy import interpolate
 
 FEWEST = 8  # points of a recording
 MOST_SPANS = 300  # of the spline through a recording
@@ -145,12 +148,14 @@ def _fit(points: Array, along: Array, tolerance: float | None, finest: float) ->
         breaks = split
 
 
-def _curve(spline: interpolate.BSpline, breaks: Array) -> Curve:
+def _curve(spline: "interpolate.BSpline", breaks: Array) -> Curve:
     slopes = [spline, spline.derivative(1), spline.derivative(2)]
     return Curve(lambda u: np.array([slope(u) for slope in slopes]), breaks)
 
 
-def _least_squares(u: Array, points: Array, breaks: Array) -> interpolate.BSpline:
+def _least_squares(u: Array, points: Array, breaks: Array) -> "interpolate.BSpline":
+    from scipy import interpolate
+
     knots = np.concatenate([[breaks[0]] * 5, breaks, [breaks[-1]] * 5])
     return interpolate.make_lsq_spline(u, points, knots, k=5)
 

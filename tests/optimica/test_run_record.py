@@ -40,7 +40,7 @@ def test_a_record_holds_what_was_asked_and_what_came_out():
     assert record["durations"] == {"read": 0.25, "build": optimum.build_time, "solve": optimum.solve_time}
     assert record["free"] == {"final_time": optimum.final_time}
     assert record["objective"] == optimum.objective
-    assert record["verdict"] == {"solved": True, "failed": [], "between_points": None}
+    assert record["verdict"] == {"solved": True, "failed": [], "between_points": optimum.playback.violation}
     assert record["report"] == optimum.report().splitlines()
     assert {"gantrytau", "casadi", "numpy", "python"} <= record["versions"].keys()
 
@@ -151,7 +151,8 @@ def test_other_names_are_refused(tmp_path):
 
 def test_what_a_playback_finds_is_in_the_verdict():
     class Played:
-        largest_violation = 0.25
+        violation = 0.25
+        complete = True
 
     optimum = solved()
     object.__setattr__(optimum, "__dict__", {**optimum.__dict__, "playback": Played})
