@@ -119,7 +119,8 @@ class FourBar(Model):
         found = [bar.modifications if isinstance(bar, Bar) else bar for bar in bars.values()]
         own = [getattr(type(self), name).modifications.get("length", 1.0) for name in bars]
         lengths = [
-            _number(ground), *(_number(bar.get("length", one)) for bar, one in zip(found, own, strict=True))
+            _number(ground),
+            *(_number(bar.get("length", one)) for bar, one in zip(found, own, strict=True)),
         ]
         _refuse_open(type(self).__name__, lengths)
         _refuse_parallel(type(self).__name__, modifications)

@@ -1,8 +1,11 @@
 """Optimisation of models written with gantrytau, in the style of Optimica."""
 
-from gantrytau_optimica.estimate import Estimate
-from gantrytau_optimica.estimation import estimate
-from gantrytau_optimica.experiments import Experiment
+from gantrytau_optimica.archive.run_record import compare_records, run_record, write_record
+from gantrytau_optimica.archive.saved import MissingGuess, SavedOptimum
+from gantrytau_optimica.archive.saving import load_optimum, save_optimum
+from gantrytau_optimica.estimation.estimate import Estimate
+from gantrytau_optimica.estimation.estimating import estimate
+from gantrytau_optimica.estimation.experiments import Experiment
 from gantrytau_optimica.measurements import Samples
 from gantrytau_optimica.optimization import (
     Free,
@@ -16,12 +19,9 @@ from gantrytau_optimica.optimization import (
 )
 from gantrytau_optimica.optimize import Prepared, optimize, prepare
 from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.pareto import TradeOff, pareto
-from gantrytau_optimica.paths import Corner, Deviation, Path, Way
-from gantrytau_optimica.run_record import compare_records, run_record, write_record
-from gantrytau_optimica.saved import MissingGuess, SavedOptimum
-from gantrytau_optimica.saving import load_optimum, save_optimum
-from gantrytau_optimica.sensitivities import Sensitivities, sensitivities
+from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.studies.pareto import TradeOff, pareto
+from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 
 __all__ = [
     "Corner",

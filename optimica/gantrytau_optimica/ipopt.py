@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.interruption import on_interrupt
-from gantrytau_optimica.program import Program
+from gantrytau_optimica.transcription.program import Program
 
 WORDS = {
     "Solve_Succeeded": "solved",

@@ -13,16 +13,16 @@ from gantrytau_optimica.building import build
 from gantrytau_optimica.checking import not_at_two_times, static
 from gantrytau_optimica.controls import read_controls
 from gantrytau_optimica.ipopt import Policy, Progress, Solver
-from gantrytau_optimica.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses
-from gantrytau_optimica.program import check_freedom, transcribe
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import Phase
-from gantrytau_optimica.refinement import with_ramps
-from gantrytau_optimica.scheme import collocation
-from gantrytau_optimica.shooting import shoot
+from gantrytau_optimica.refining.refinement import with_ramps
+from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
+from gantrytau_optimica.transcription.program import check_freedom, transcribe
+from gantrytau_optimica.transcription.scheme import collocation
+from gantrytau_optimica.transcription.shooting import shoot
 
 Problem = Optimization | type[Optimization] | ReadProblem
 

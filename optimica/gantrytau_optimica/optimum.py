@@ -12,12 +12,12 @@ from gantrytau import Dae, ModelError, Result
 from gantrytau.symbols import split_derivative
 from gantrytau.trajectories import labels
 from gantrytau_optimica.building import Built
+from gantrytau_optimica.failures.relaxation import Relaxed, relax
+from gantrytau_optimica.failures.reporting import report
 from gantrytau_optimica.ipopt import Solution
-from gantrytau_optimica.playback import Playback, play_back
-from gantrytau_optimica.program import Program
-from gantrytau_optimica.relaxation import Relaxed, relax
-from gantrytau_optimica.reporting import report
+from gantrytau_optimica.refining.playback import Playback, play_back
 from gantrytau_optimica.trajectory import Trajectory
+from gantrytau_optimica.transcription.program import Program
 
 Signal = Callable[[Any], np.ndarray]
 
@@ -208,7 +208,7 @@ class Optimum:
     def save(self, path: Any):
         """Save all variables over time, as Result.save; with the ending .optimum the whole solution, for load_optimum."""
         if Path(path).suffix == ".optimum":
-            from gantrytau_optimica.saving import save_optimum
+            from gantrytau_optimica.archive.saving import save_optimum
 
             return save_optimum(self, path)
         return self.result.save(path)

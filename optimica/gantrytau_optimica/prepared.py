@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
+from gantrytau_optimica.archive.saved import SavedOptimum
 from gantrytau_optimica.building import Built, with_guesses
-from gantrytau_optimica.carrying import carried
+from gantrytau_optimica.failures.meaning import first_guess
+from gantrytau_optimica.failures.reach import out_of_reach, reach_text
+from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.guesses import guess_of, number_guess
 from gantrytau_optimica.ipopt import Solver
-from gantrytau_optimica.meaning import first_guess
-from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.program import Program, transcribe
-from gantrytau_optimica.reach import out_of_reach, reach_text
 from gantrytau_optimica.reading import ReadProblem
 from gantrytau_optimica.records import ControlProblem, FreeNumber
-from gantrytau_optimica.refinement import refined
-from gantrytau_optimica.relaxation import worth_relaxing
-from gantrytau_optimica.saved import SavedOptimum
-from gantrytau_optimica.starts import searched
+from gantrytau_optimica.refining.carrying import carried
+from gantrytau_optimica.refining.refinement import refined
+from gantrytau_optimica.refining.starts import searched
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.program import Program, transcribe
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 FEW = 30  # elements, from which on first guesses are tried on half as many

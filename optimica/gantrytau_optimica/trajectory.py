@@ -6,9 +6,9 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.layout import Layout
-from gantrytau_optimica.mesh import Mesh
 from gantrytau_optimica.records import ControlProblem, Phase
+from gantrytau_optimica.transcription.layout import Layout
+from gantrytau_optimica.transcription.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)

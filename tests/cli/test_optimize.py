@@ -464,7 +464,9 @@ def test_a_guess_that_is_no_result(fails, move, tmp_path, name, text, message):
 def test_a_guess_of_another_model(fails, move, tmp_path):
     file = tmp_path / "a.csv"
     file.write_text("time [s],x\n0,1\n1,1\n")
-    assert "the given solution has no variable of the problem" in fails(FAULT, "optimize", move, "--guess", file)
+    assert "the given solution has no variable of the problem" in fails(
+        FAULT, "optimize", move, "--guess", file
+    )
 
 
 def test_what_is_missing_to_read_netcdf_is_told(fails, move, tmp_path, monkeypatch):

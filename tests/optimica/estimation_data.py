@@ -4,7 +4,7 @@ import numpy as np
 
 from gantrytau import Input, Model, Parameter, Real, der, sqrt
 from gantrytau_optimica import Samples
-from gantrytau_optimica.experiments import Experiment
+from gantrytau_optimica.estimation.experiments import Experiment
 
 HOLES = {"a1": 0.02656702e-4, "a2": 0.02713898e-4}  # benchmarks, problem 7
 NOISE = 1e-4  # m, of a level

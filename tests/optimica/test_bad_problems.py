@@ -136,8 +136,9 @@ def test_a_guess_that_cannot_be(guess, words):
 
 def test_a_guess_from_another_model():
     other = optimize(BoundedOscillator, elements=5)
-    assert "the given solution has no variable of the problem, as mass.x; give a solution of the same" in message(
-        FastestMass, guess=other
+    assert (
+        "the given solution has no variable of the problem, as mass.x; give a solution of the same"
+        in message(FastestMass, guess=other)
     )
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from gantrytau import Model, ModelError, Parameter, Real, SolveError, der, exp
 from gantrytau_optimica import Free, Samples
-from gantrytau_optimica.estimation import estimate
-from gantrytau_optimica.experiments import Experiment
+from gantrytau_optimica.estimation.estimating import estimate
+from gantrytau_optimica.estimation.experiments import Experiment
 from tests.optimica.estimation_data import Decay, Enzyme, QuadrupleTank, Trend, toggling
 
 TIMES = np.linspace(0.0, 3.0, 13)

@@ -9,8 +9,9 @@ import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, Real, SolveError
 from gantrytau.cli import motion_problems
-from gantrytau_optimica import Free, Optimization, continuation, final, optimize
-from gantrytau_optimica.pareto import pareto
+from gantrytau_optimica import Free, Optimization, final, optimize
+from gantrytau_optimica.studies import continuation
+from gantrytau_optimica.studies.pareto import pareto
 from tests.optimica.problems import Mass
 
 FREE, _, _ = motion_problems()

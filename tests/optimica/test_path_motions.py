@@ -8,7 +8,7 @@ from gantrytau import Bounds, Real, StateSelect, between, der, translate
 from gantrytau.functions import dot
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
-from gantrytau_optimica.paths import Path, Way
+from gantrytau_optimica.paths.path import Path, Way
 from tests.optimica.phase_plane import OnPath
 
 START, END = np.array([0.0, 2.51, -1.03]), np.array([1.711, 3.46, -0.24])

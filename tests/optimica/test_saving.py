@@ -12,8 +12,8 @@ import pytest
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der, exp
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize
-from gantrytau_optimica.saved import MissingGuess
-from gantrytau_optimica.saving import load_optimum, save_optimum
+from gantrytau_optimica.archive.saved import MissingGuess
+from gantrytau_optimica.archive.saving import load_optimum, save_optimum
 from tests.optimica.problems import FastestMass, FastestOscillator, Mass
 
 

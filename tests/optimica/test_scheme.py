@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, ModelError, Parameter, Real, der
 from gantrytau_optimica import Optimization, optimize
-from gantrytau_optimica.scheme import collocation, interpolation
+from gantrytau_optimica.transcription.scheme import collocation, interpolation
 
 CASES = [(scheme, points) for scheme in ("radau", "gauss") for points in range(1, 6)]
 

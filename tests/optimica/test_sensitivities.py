@@ -9,7 +9,7 @@ import pytest
 from gantrytau import Fixed, ModelError, Parameter, SolveError
 from gantrytau.cli import motion_problems
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize, prepare
-from gantrytau_optimica.sensitivities import sensitivities
+from gantrytau_optimica.studies.sensitivities import sensitivities
 from tests.optimica.problems import LinearQuadratic, Mass
 
 FREE, _, _ = motion_problems()

@@ -1,0 +1,1 @@
+"""Optima on file, and records of runs."""

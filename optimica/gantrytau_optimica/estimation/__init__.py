@@ -1,0 +1,1 @@
+"""Parameters of dynamic models from measured data."""

@@ -1,0 +1,146 @@
+"""How the residuals of a fit move with the estimated numbers, on the manifold that the equations of the model are.
+
+    w = (p, y): estimated numbers, all other unknowns; G(p, y) = 0: collocated equations and starts; r(p, y): residuals
+    dr/dp = r_p - r_y G_y^-1 G_p
+
+All Jacobians are exact; G_y is factorised once. Bard (1974), Nonlinear Parameter Estimation, section 5.4, with the
+equations of the model as constraints.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from gantrytau import ModelError
+from gantrytau_optimica.transcription.assembly import Assembled, Block, assemble
+from gantrytau_optimica.transcription.blocks import running
+from gantrytau_optimica.transcription.layout import Places
+from gantrytau_optimica.transcription.program import Program
+
+NEWTON_STEPS = 30
+CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Residuals (N,) in deviations of all samples of a program, and their exact slopes; w: unscaled unknowns (n,).
+
+    sizes: number of residuals of every sum over samples, in the order of the phases.
+    """
+
+    program: Program
+    assembled: Assembled
+    sizes: tuple[int, ...]
+
+    def values(self, w: np.ndarray) -> np.ndarray:
+        """(model - measured) / deviation, (N,)."""
+        return np.array(self.assembled.nlp(w / self.program.places.scale, [])[1]).ravel()
+
+    @cached_property
+    def equations(self) -> np.ndarray:
+        """Numbers of the rows that are equations."""
+        return np.flatnonzero(self.program.lbg == self.program.ubg)
+
+    @cached_property
+    def others(self) -> np.ndarray:
+        """Numbers of the unknowns that are not estimated."""
+        return np.setdiff1d(np.arange(self.program.places.size), self.program.places.free)
+
+    def jacobian(self, w: np.ndarray) -> np.ndarray:
+        """Slopes (N, k) with respect to the free numbers in their units."""
+        program, free = self.program, self.program.places.free
+        slopes = _csc(self.assembled.jac_g(w / program.places.scale, [])[1])
+        found = slopes[:, free].toarray()
+        if self.others.size:
+            equations, factors = self._factorised(w)
+            moved = factors.solve(equations[:, free].toarray())
+            found = found - slopes[:, self.others] @ moved
+        return found / program.places.scale[free]
+
+    def on_manifold(self, w: np.ndarray, numbers: np.ndarray) -> np.ndarray | None:
+        """Unknowns that fulfil the equations for other free numbers, by Newton's method from w; None if it fails."""
+        scale, w = self.program.places.scale, w.copy()
+        w[self.program.places.free] = numbers
+        for _ in range(NEWTON_STEPS):
+            try:
+                _, factors = self._factorised(w)
+            except ModelError:
+                return None
+            values = np.array(self.program.assembled.nlp(w / scale, [])[1]).ravel()
+            step = factors.solve((values - self.program.lbg)[self.equations])
+            if not np.all(np.isfinite(step)):
+                return None
+            w[self.others] -= step * scale[self.others]
+            if np.max(np.abs(step), initial=0.0) < CLOSE:
+                return w
+        return None
+
+    def _factorised(self, w: np.ndarray) -> tuple[Any, SuperLU]:
+        """Slopes of the equations, and the factors of those with respect to the other unknowns."""
+        whole = _csc(self.program.assembled.jac_g(w / self.program.places.scale, [])[1]).tocsr()
+        equations = whole[self.equations].tocsc()
+        try:
+            return equations, splu(equations[:, self.others].tocsc())
+        except (RuntimeError, ValueError) as error:
+            raise ModelError(
+                f"{self.program.problem.name}: the equations and starts do not determine the motion ({error}); give "
+                "independent starts"
+            ) from error
+
+
+def residuals(program: Program) -> Residuals:
+    """Residuals of the sums over samples of a program."""
+    places, blocks, sizes = program.places, [], []
+    total = sum(s.times.size for s in program.problem.sums)
+    for layout in places.layouts:
+        start, final = (float(t) for t in (layout.phase.start_time, layout.phase.final_time))
+        for one in layout.phase.sums:
+            element, place = layout.mesh.locate((one.times - start) / (final - start))
+            value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
+            count = one.times.size
+            rows = sum(sizes) + np.arange(count)
+            scatter = sparse.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(total, count))
+            known = np.vstack([one.values, one.deviations])
+            error = (one.expression - value) / deviation
+            blocks.append(
+                running(places, layout).block(
+                    error, element, place, scatter, extra=((value, deviation), known)
+                )
+            )
+            sizes.append(count)
+    return Residuals(program, _assembled(places, blocks, total), tuple(sizes))
+
+
+def _assembled(places: Places, blocks: Sequence[Block], rows: int) -> Assembled:
+    """The residuals as rows of a program without an objective."""
+    return assemble([], blocks, sparse.csr_matrix((rows, places.size)), 0)
+
+
+def _csc(matrix: ca.DM) -> Any:
+    """A sparse matrix of CasADi for SciPy."""
+    columns, rows = matrix.sparsity().get_ccs()
+    return sparse.csc_matrix((np.array(matrix.nonzeros()), rows, columns), shape=matrix.shape)
+
+
+def check_determined(found: Residuals, states: dict[str, list[str]]) -> None:
+    """ModelError unless there are as many equations as unknowns; states: those without a given start by experiment."""
+    missing = found.others.size - found.equations.size
+    if missing == 0:
+        return
+    name = found.program.problem.name
+    if missing < 0:
+        raise ModelError(
+            f"{name}: {-missing} more conditions than the motion has starts, expected as many; take starts out that "
+            "follow from others"
+        )
+    words = "; ".join(f"{experiment}: {', '.join(some)}" for experiment, some in states.items() if some)
+    raise ModelError(
+        f"{name}: {missing} initial values are neither given nor estimated ({words}), expected them in "
+        "Experiment(start={name: number or Free(guess)})"
+    )

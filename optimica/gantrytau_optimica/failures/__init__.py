@@ -1,0 +1,1 @@
+"""How a solve ended and why, in the model's words."""

@@ -1,0 +1,1 @@
+"""Paths to follow, and how they are made from points and recordings."""

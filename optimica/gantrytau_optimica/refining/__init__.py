@@ -1,0 +1,1 @@
+"""Answers that hold: played back, refined, and searched from several first guesses."""

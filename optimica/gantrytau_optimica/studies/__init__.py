@@ -1,0 +1,1 @@
+"""What an optimum depends on: sensitivities, and trade-offs along a weight."""

@@ -1,0 +1,254 @@
+"""A family of optima along one weight: what is gained in one quantity for what is lost in another."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gantrytau import ModelError, SolveError
+from gantrytau.errors import did_you_mean
+from gantrytau_optimica.ipopt import Progress
+from gantrytau_optimica.optimize import Guesses, Prepared, Problem, prepare
+from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.studies.continuation import Course, follow
+from gantrytau_optimica.studies.picture import draw, write
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Quantity = Callable[[Optimum], float]
+EQUAL = 1e-6  # relative: quantities that differ by less are the same, a hundred times Ipopt's tolerance
+
+
+@dataclass(frozen=True, eq=False)
+class TradeOff:
+    """Optima along a weight. `points` are those found, in the order of `weights` (n,); ["quantity"] is (n,).
+
+    failures: what was said for a weight without optimum; findings: points that are local minima only, and steps of the
+    weight that had to be smaller.
+    """
+
+    name: str
+    weight: str
+    weights: np.ndarray
+    points: tuple[Optimum, ...]
+    quantities: dict[str, np.ndarray]
+    failures: dict[float, str]
+    findings: tuple[str, ...]
+    units: dict[str, str]
+
+    def __repr__(self) -> str:
+        lost = f", {len(self.failures)} not found" if self.failures else ""
+        return f"<TradeOff {self.name}: {len(self.points)} points along {self.weight}{lost}>"
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        found = {**self.quantities, self.weight: self.weights}
+        if name not in found:
+            raise ModelError(f"{self.name}: the points have no '{name}'{did_you_mean(name, found)}")
+        return found[name]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the solver for the points as they stand."""
+        return sum(point.iterations for point in self.points)
+
+    def report(self) -> str:
+        """A table of weights and quantities, what was not found, and what to doubt."""
+        heads = [self.weight, *(f"{n} [{self.units[n]}]" if n in self.units else n for n in self.quantities)]
+        lines = ["  ".join(f"{head:>14}" for head in heads)]
+        for k, weight in enumerate(self.weights):
+            row = [weight, *(column[k] for column in self.quantities.values())]
+            lines.append("  ".join(f"{x:>{max(14, len(h))}.6g}" for x, h in zip(row, heads, strict=True)))
+        lines += [f"{self.weight} = {w:g}: {words.splitlines()[0]}" for w, words in self.failures.items()]
+        return "\n".join([*lines, *self.findings])
+
+    def plot(self, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """The first quantity over the others, each point with its weight; saved to `file` if one is named."""
+        return draw(self, file)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write weights and quantities as CSV, one row per point."""
+        return write(self, path)
+
+
+def pareto(
+    problem: Problem,
+    weight: str,
+    values: Sequence[float],
+    *,
+    along: Sequence[str] | Mapping[str, str | Quantity] | None = None,
+    elements: int | Sequence[float] = 50,
+    points: int = 3,
+    scheme: str = "radau",
+    lengths: Literal["given", "free"] = "given",
+    guess: Guesses | None = None,
+    controls: Mapping[str, Any] | None = None,
+    tolerance: float = 1e-8,
+    max_iterations: int = 1000,
+    max_time: float = 300.0,
+    progress: Progress | None = None,
+) -> TradeOff:
+    """Solve a problem for several values of a weight, each from the one before; it is built once.
+
+    weight: a scalar Parameter; along: what to record, all to be small: a free number, "final_time", "objective",
+    "integral(x)", "final(x)", or {label: one of these or a function of an Optimum}; default: the two parts of the
+    objective, "unweighed" and "weighed" (objective = unweighed + weight * weighed). Other keywords: see `optimize`.
+    A value that is not reached is approached by smaller steps; if that fails too, it is told in `.failures`. Raises
+    ModelError for what is written wrongly, SolveError if no value is solved.
+    """
+    numbers = _numbers(weight, values)
+    prepared = prepare(
+        problem,
+        parameters=[weight],
+        elements=elements,
+        points=points,
+        scheme=scheme,
+        lengths=lengths,
+        guess=guess,
+        controls=controls,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        max_time=max_time,
+        progress=progress,
+    )
+    _check_weight(prepared, weight)
+    asked, units = _quantities(prepared, weight, along)
+    course = follow(prepared, weight, numbers)
+    if not course.optima:
+        first = next(iter(course.failures.values()))
+        raise SolveError(f"no value of {weight} was solved; the first said: {first}", optimum=first.optimum)
+    return _recorded(prepared, weight, course, asked, units)
+
+
+def _recorded(
+    prepared: Prepared, weight: str, course: Course, asked: Mapping[str, Quantity], units: dict[str, str]
+) -> TradeOff:
+    found = list(course.optima)
+    columns = {
+        label: np.array([_value(label, quantity, course.optima[w]) for w in found])
+        for label, quantity in asked.items()
+    }
+    findings = [*course.findings, *_dominated(weight, np.array(found), columns)]
+    return TradeOff(
+        name=prepared.built.read.name,
+        weight=weight,
+        weights=np.array(found),
+        points=tuple(course.optima.values()),
+        quantities=columns,
+        failures={w: str(error) for w, error in course.failures.items()},
+        findings=tuple(findings),
+        units=units,
+    )
+
+
+def _dominated(weight: str, weights: np.ndarray, columns: Mapping[str, np.ndarray]) -> list[str]:
+    """Points to which another one is better in one quantity and no worse in the others."""
+    table, found = np.array(list(columns.values())), []
+    if len(columns) < 2:
+        return found
+    margin = EQUAL * np.max(np.abs(table), axis=1)[:, None]
+    for k, value in enumerate(weights):
+        mine = table[:, k, None]
+        better = np.all(table <= mine, axis=0) & np.any(table < mine - margin, axis=0)
+        if np.any(better):
+            which = weights[int(np.flatnonzero(better)[0])]
+            found.append(
+                f"{weight} = {value:g} is dominated by {weight} = {which:g}, which is no worse in {' and '.join(columns)}: "
+                "a local minimum; try another guess= or order of the values"
+            )
+    return found
+
+
+def _numbers(weight: str, values: Any) -> list[float]:
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.array(np.nan)
+    if numbers.ndim != 1 or numbers.size == 0 or not np.all(np.isfinite(numbers)):
+        raise ModelError(f"{weight}: found the values {values!r}, expected a list of finite numbers")
+    seen, count = np.unique(numbers, return_counts=True)
+    if np.any(count > 1):
+        raise ModelError(f"{weight}: the value {seen[count > 1][0]:g} is repeated, expected each one once")
+    return numbers.tolist()
+
+
+def _check_weight(prepared: Prepared, weight: str) -> None:
+    held = [n.name for n in prepared.built.problem.free if n.held]
+    name = prepared.built.read.name
+    if not held:
+        raise ModelError(f"{name}: {weight} is chosen by the optimiser, expected a Parameter with a value")
+    if held != [weight]:
+        raise ModelError(
+            f"{name}: {weight} has {len(held)} elements, expected one number; name one of {held}"
+        )
+
+
+def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, Quantity], dict[str, str]]:
+    """The quantities by label, and the units of those that are free numbers, or values at the end."""
+    from gantrytau.trajectories import labels
+
+    if along is None:
+        return {"unweighed": lambda o: _parts(o, weight)[0], "weighed": lambda o: _parts(o, weight)[1]}, {}
+    if isinstance(along, str) or not isinstance(along, (Sequence, Mapping)) or not len(along):
+        raise ModelError(f"along={along!r}: expected a list of quantities or {{label: quantity}}")
+    pairs = dict(along) if isinstance(along, Mapping) else {text: text for text in along}
+    known, found, units = labels(prepared.built.read.dae)[0], {}, {}
+    for label, what in pairs.items():
+        if callable(what):
+            found[label] = what
+            continue
+        found[label], unit = _quantity(prepared, str(label), what, known)
+        if unit:
+            units[str(label)] = unit
+    return found, units
+
+
+def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str]) -> tuple[Quantity, str]:
+    name, dae = prepared.built.read.name, prepared.built.read.dae
+    if not isinstance(what, str):
+        raise ModelError(f"along {label}: found {what!r}, expected a name or a function of an Optimum")
+    free = {n.name for n in prepared.built.problem.free if not n.held}
+    if what in free:
+        return (lambda o: o.free[what]), known.get(what, "")
+    if what in ("objective", "start_time", "final_time"):
+        return (lambda o: float(getattr(o, what))), "" if what == "objective" else "s"
+    kind, _, inner = what.removesuffix(")").partition("(")
+    if kind in ("integral", "final") and what == f"{kind}({inner})":
+        elements = dae.expand(inner)
+        if len(elements) != 1:
+            raise ModelError(f"along {label}: {inner} has {len(elements)} elements, expected one; name it")
+        if kind == "integral":
+            return (lambda o: o.integral(elements[0])), f"{known[inner]}.s" if inner in known else ""
+        return (lambda o: float(o.final(elements[0]))), known.get(inner, "")
+    if what in dae.variables or what in dae.vectors:
+        raise ModelError(
+            f"along {label}: {what} varies over time, expected a number; write 'final({what})' or 'integral({what})'"
+        )
+    over_time = (f"{k}({n})" for n in dae.variables for k in ("integral", "final"))
+    choices = [*free, "final_time", "objective", *over_time]
+    raise ModelError(f"along {label}: {name} has no quantity '{what}'{did_you_mean(what, choices)}")
+
+
+def _value(label: str, quantity: Quantity, optimum: Optimum) -> float:
+    try:
+        value = float(quantity(optimum))
+    except Exception as error:  # of a function that is not ours
+        raise ModelError(
+            f"along {label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number"
+        ) from error
+    return value
+
+
+def _parts(optimum: Optimum, weight: str) -> tuple[float, float]:
+    """The objective without its weighed part, and what the weight weighs: its partial derivative."""
+    program, scale = optimum.program, optimum.program.places.scale
+    place = {n.name: p for n, p in zip(program.problem.free, program.places.free, strict=True)}[weight]
+    gradient = np.array(program.assembled.grad_f(optimum.solution.w / scale, [])[1]).ravel()
+    weighed = float(gradient[place] / scale[place])
+    return optimum.objective - float(optimum.solution.w[place]) * weighed, weighed

@@ -1,0 +1,1 @@
+"""A control problem on meshes becomes a nonlinear program."""

@@ -1,0 +1,242 @@
+"""Where the unknowns of a transcribed problem stand, and the constant matrices that pick them out.
+
+Within an element every signal is a polynomial through some nodes: a state through the start of the element and
+its collocation points, an algebraic or a free input through the points, a constant input through one node, a
+linear one through the ends of its group of elements. Nodes are places in the element, 0 to 1.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from gantrytau_optimica.records import ControlProblem, Phase, Signal
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.scheme import Collocation
+
+Sparse = Any  # a matrix of scipy.sparse
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The polynomial pieces of a signal: nodes (n, m) and the unknowns that hold the values there, (n, m)."""
+
+    nodes: np.ndarray
+    unknowns: np.ndarray
+
+    def basis(self, element: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Weights (k, m) of the nodes of the named elements (k,) at places (k,)."""
+        return lagrange(self.nodes[element], place)
+
+    def values(self, w: np.ndarray, element: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """The signal (k,) at places of elements."""
+        return np.einsum("km,km->k", self.basis(element, place), w[self.unknowns[element]])
+
+
+def lagrange(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Weights (k, m) of values at nodes (k, m) for the polynomial's value at places (k,); exact at a node."""
+    found = np.ones(nodes.shape)
+    for j in range(nodes.shape[1]):
+        for i in range(nodes.shape[1]):
+            if i != j:
+                found[:, j] *= (place - nodes[:, i]) / (nodes[:, j] - nodes[:, i])
+    found[np.abs(found) < 1e-14] = 0.0
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """The unknowns of one phase on n elements with k points.
+
+    starts (n + 1, nx): states at the borders; with Radau points the last point of an element is the start of the
+    next. tracks: of all signals in their order. chains: consecutive values of piecewise inputs, by number of the
+    signal. knots: the moving borders. moment: share of the horizon of every unknown from `first` on.
+    """
+
+    phase: Phase
+    mesh: Mesh
+    scheme: Collocation
+    first: int
+    knots: np.ndarray
+    starts: np.ndarray
+    tracks: tuple[Track, ...]
+    chains: dict[int, np.ndarray]
+    owner: np.ndarray  # number of the signal of every unknown from `first` on, -1 for knots
+    moment: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.owner.size
+
+    @cached_property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Element and place of all collocation points, one after another."""
+        n, k = self.mesh.elements, self.scheme.points.size
+        return np.repeat(np.arange(n), k), np.tile(self.scheme.points, n)
+
+    @cached_property
+    def fractions(self) -> np.ndarray:
+        """Where on [0, 1] the points lie, (n k,)."""
+        return (self.mesh.borders[:-1, None] + self.mesh.widths[:, None] * self.scheme.points).ravel()
+
+    def of(self, signal: int) -> np.ndarray:
+        """All unknowns of a signal, in order of time."""
+        mine = np.flatnonzero(self.owner == signal)
+        return self.first + mine[np.argsort(self.moment[mine], kind="stable")]
+
+    def placed(self, w: np.ndarray) -> Mesh:
+        """The mesh with its moving borders as they stand among the unknowns."""
+        return self.mesh.placed(w[self.knots]) if self.knots.size else self.mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """All unknowns: the free numbers, then phase after phase. scale: typical size of each."""
+
+    problem: ControlProblem
+    free: np.ndarray
+    layouts: tuple[Layout, ...]
+    scale: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.scale.size
+
+    def pick(self, row: Any, unknown: Any, value: Any, rows: int) -> Sparse:
+        """The matrix (rows, size) of scaled unknowns with value * scale at (row, unknown)."""
+        row, unknown, value = (np.concatenate([np.ravel(x) for x in part]) for part in (row, unknown, value))
+        unknown = unknown.astype(np.int64)
+        return sparse.csr_matrix((value * self.scale[unknown], (row, unknown)), shape=(rows, self.size))
+
+    def gather(self, layout: Layout, element: np.ndarray, place: np.ndarray) -> Sparse:
+        """To signals, free numbers and, where borders move, the ends of the element, at places (k,), one after another."""
+        moving, nf = layout.knots.size > 0, self.free.size
+        local = len(layout.tracks) + nf + (2 if moving else 0)
+        point = np.arange(element.size) * local
+        rows, unknowns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+        for i, track in enumerate(layout.tracks):
+            basis = track.basis(element, place)
+            r, c = np.nonzero(basis)
+            rows.append(point[r] + i)
+            unknowns.append(track.unknowns[element[r], c])
+            values.append(basis[r, c])
+        for i in range(nf):
+            rows.append(point + len(layout.tracks) + i)
+            unknowns.append(np.full(element.size, self.free[i]))
+            values.append(np.ones(element.size))
+        if moving:
+            shares = layout.mesh.shares()[0]
+            for i, border in enumerate((element, element + 1)):
+                part = shares[border].tocoo()
+                rows.append(point[part.row] + len(layout.tracks) + nf + i)
+                unknowns.append(layout.knots[part.col])
+                values.append(part.data)
+        return self.pick(rows, unknowns, values, local * element.size)
+
+    def numbers(self) -> Sparse:
+        """To the free numbers."""
+        return self.pick([np.arange(self.free.size)], [self.free], [np.ones(self.free.size)], self.free.size)
+
+    def slopes(self, layout: Layout) -> Sparse:
+        """To the derivatives, with respect to the place in the element, of all states at all points, divided by size."""
+        n, k, nx = layout.mesh.elements, layout.scheme.points.size, len(layout.phase.states)
+        if not nx:
+            return sparse.csr_matrix((0, self.size))
+        sizes = np.array([s.nominal for s in layout.phase.states])
+        nodes = np.stack([layout.tracks[i].unknowns for i in range(nx)], axis=2)  # (n, k + 1, nx)
+        place = np.broadcast_to(nodes[:, None], (n, k, k + 1, nx))
+        value = np.broadcast_to(layout.scheme.differentiation.T[None, :, :, None] / sizes, place.shape)
+        row = np.broadcast_to(np.arange(n * k * nx).reshape(n, k, 1, nx), place.shape)
+        return self.pick([row], [place], [value], n * k * nx)
+
+    def jumps(self, layout: Layout) -> Sparse:
+        """To the end of each element less the start of the next; no rows where the two are one unknown."""
+        n, nx = layout.mesh.elements, len(layout.phase.states)
+        if layout.scheme.points[-1] == 1.0 or not nx:
+            return sparse.csr_matrix((0, self.size))
+        sizes = np.array([s.nominal for s in layout.phase.states])
+        nodes = np.stack([layout.tracks[i].unknowns for i in range(nx)], axis=2)
+        nodes = np.concatenate([nodes, layout.starts[1:, None, :]], axis=1)
+        weights = np.concatenate([layout.scheme.end, [-1.0]])
+        value = np.broadcast_to(weights[None, :, None] / sizes, nodes.shape)
+        row = np.broadcast_to(np.arange(n * nx).reshape(n, 1, nx), nodes.shape)
+        return self.pick([row], [nodes], [value], n * nx)
+
+
+def lay_out(problem: ControlProblem, meshes: tuple[Mesh, ...], scheme: Collocation) -> Places:
+    """Number the unknowns: free numbers, then element after element, so that what belongs together stands together."""
+    layouts: list[Layout] = []
+    size = len(problem.free)
+    scales = [np.array([n.nominal or max(abs(n.guess), 1e-3) for n in problem.free])]
+    for phase, mesh in zip(problem.phases, meshes, strict=True):
+        layout = _lay_out(phase, mesh, scheme, size)
+        size += layout.size
+        layouts.append(layout)
+        nominal = np.array([*(s.nominal for s in phase.signals), 1.0])  # the last for knots, numbered -1
+        scales.append(nominal[layout.owner])
+    return Places(problem, np.arange(len(problem.free)), tuple(layouts), np.concatenate(scales))
+
+
+def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layout:
+    n, k, m = mesh.elements, scheme.points.size, len(mesh.moving)
+    nx, nz = len(phase.states), len(phase.algebraics)
+    pointwise = [
+        *range(nx + nz),
+        *(nx + nz + i for i, u in enumerate(phase.inputs) if u.pieces.kind == "free"),
+    ]
+    per_point, shared = len(pointwise), scheme.points[-1] == 1.0
+    per_element = k * per_point + (0 if shared else nx)
+    begin = first + m + nx
+    point = begin + per_element * np.arange(n)[:, None] + per_point * np.arange(k)[None, :]
+    ends = (
+        point[:, -1, None] if shared else (begin + per_element * np.arange(1, n + 1) - nx)[:, None]
+    ) + np.arange(nx)
+    starts = np.vstack([first + m + np.arange(nx), ends])
+    size = m + nx + per_element * n
+    owner, moment = np.full(size, -1), np.zeros(size)
+    times = mesh.borders[:-1, None] + mesh.widths[:, None] * scheme.points
+    moment[:m] = mesh.borders[list(mesh.moving)]
+    owner[starts - first], moment[starts - first] = np.arange(nx), mesh.borders[:, None]
+    nodes, points = np.tile(scheme.nodes, (n, 1)), np.tile(scheme.points, (n, 1))
+    tracks: dict[int, Track] = {}
+    for offset, i in enumerate(pointwise):
+        owner[point + offset - first], moment[point + offset - first] = i, times
+        if i < nx:
+            tracks[i] = Track(nodes, np.column_stack([starts[:-1, i], point + offset]))
+        else:
+            tracks[i] = Track(points, point + offset)
+    chains: dict[int, np.ndarray] = {}
+    for i, signal in enumerate(phase.inputs, nx + nz):
+        if signal.pieces.kind == "free":
+            continue
+        tracks[i], new = pieces_of(signal, mesh, first + owner.size)
+        if signal.pieces.kind != "ramps":
+            chains[i] = first + owner.size + np.arange(new.size)
+        owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
+    ordered = tuple(tracks[i] for i in range(len(phase.signals)))
+    return Layout(phase, mesh, scheme, first, first + np.arange(m), starts, ordered, chains, owner, moment)
+
+
+def pieces_of(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:
+    """Track of an input made of pieces, and the shares of the horizon of its values: middles or ends of the pieces."""
+    n, borders, pieces = mesh.elements, mesh.borders, signal.pieces
+    if pieces.kind == "ramps":
+        unknowns = first + np.arange(2 * n).reshape(n, 2)
+        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), np.column_stack(
+            [borders[:-1], borders[1:]]
+        ).ravel()
+    if pieces.borders:
+        ends = np.array(pieces.borders)
+        group = np.clip(np.searchsorted(ends, (borders[:-1] + borders[1:]) / 2) - 1, 0, ends.size - 2)
+    else:
+        group = np.arange(n) // pieces.elements
+        ends = np.append(borders[:: pieces.elements][: group[-1] + 1], borders[-1])
+    if pieces.kind == "constant":
+        return Track(np.full((n, 1), 0.5), first + group[:, None]), (ends[:-1] + ends[1:]) / 2
+    pair = np.column_stack([ends[group], ends[group + 1]])
+    nodes = (pair - borders[:-1, None]) / mesh.widths[:, None]
+    return Track(nodes, first + np.column_stack([group, group + 1])), ends

@@ -1,0 +1,342 @@
+"""Direct collocation: a control problem on meshes becomes a nonlinear program.
+
+    unknowns        free numbers p; per phase the moving borders, and per element the states at its start x_0, and
+                    at each of its k points the states x_j, algebraics z_j and inputs u_j, divided by typical sizes
+    dynamics        sum_i D_ij x_i = h f(t_j, x_j, z_j, u_j, p)          at every point
+    algebraic       0 = g(t_j, x_j, z_j, u_j, p)                         at every point
+    path            lower <= c(t_j, x_j, z_j, u_j, p) <= upper           at every point
+    continuity      x_0 of the next element = value of this one's polynomial at its end
+    step            |next value - value| <= max_step                     of piecewise inputs
+    border          distance of moving borders >= the shortest
+    boundary        conditions on values at single times
+    integral        sum over elements of h sum_j w_j L(t_j, ...)
+
+What happens at a point is one small function, evaluated and differentiated for all points at once; the rest is
+linear (see assembly). Nothing symbolic grows with the number of elements.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from gantrytau import ModelError
+from gantrytau_optimica.records import ControlProblem, Limit
+from gantrytau_optimica.sorting import bare_limit, signal_limits
+from gantrytau_optimica.transcription.assembly import Assembled, Block, assemble
+from gantrytau_optimica.transcription.blocks import Place, places_of_points, running, single_block
+from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.scheme import Collocation
+
+FEW = 1e-9  # of an element, by which a moving point may stand outside of it
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of the program that mean one thing: kind, name in the model's words, phase, and places on [0, 1] (or NaN).
+
+    size: a row of the program times this is the quantity in its unit.
+    """
+
+    kind: str  # "dynamics", "algebraic", "path", "continuity", "step", "border", "boundary"
+    name: str
+    phase: int
+    rows: np.ndarray
+    moments: np.ndarray
+    lower: float
+    upper: float
+    size: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """The nonlinear program in scaled unknowns, its limits, and what its rows and unknowns mean."""
+
+    problem: ControlProblem
+    places: Places
+    assembled: Assembled
+    groups: tuple[Rows, ...]
+    lbw: np.ndarray
+    ubw: np.ndarray
+    lbg: np.ndarray
+    ubg: np.ndarray
+    points: tuple[Place, ...] = field(default=())
+
+    def with_numbers(self, problem: ControlProblem) -> "Program":
+        """The same program with other free numbers and first guesses."""
+        lower, upper, places = self.lbw.copy(), self.ubw.copy(), self.places
+        for place, number in zip(places.free, problem.free, strict=True):
+            lower[place], upper[place] = number.min / places.scale[place], number.max / places.scale[place]
+        return replace(self, problem=problem, lbw=lower, ubw=upper)
+
+    def astray(self, w: np.ndarray) -> bool:
+        """Whether a point whose time moves has left the element whose polynomials it reads."""
+        moved = [one for one in self.points if one.place is None]
+        if not moved:
+            return False
+        borders = [layout.placed(w).borders for layout in self.places.layouts]
+        now = places_of_points(self.places, w[self.places.free], borders)
+        for old, new in zip(self.points, now, strict=True):
+            here = borders[old.phase]
+            left, right = here[old.element], here[old.element + 1]
+            share = self._share(old, w)
+            if old.place is None and new.element != old.element and not (
+                left - FEW * (right - left) <= share <= right + FEW * (right - left)
+            ):  # fmt: skip
+                return True
+        return False
+
+    def _share(self, one: Place, w: np.ndarray) -> float:
+        if isinstance(one.point.time, str):
+            return float(one.point.time == "final")
+        from gantrytau_optimica.transcription.blocks import share_of
+
+        share = share_of(self.problem.phases[one.phase], one.point.time)
+        return float(ca.Function("share", [self.problem.numbers], [share])(w[self.places.free]))
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """Number of its group for every row."""
+        found = np.zeros(self.assembled.rows, int)
+        for number, group in enumerate(self.groups):
+            found[group.rows] = number
+        return found
+
+
+def transcribe(
+    problem: ControlProblem,
+    meshes: Sequence[Mesh],
+    scheme: Collocation,
+    located: tuple[np.ndarray, Sequence[np.ndarray]] | None = None,
+) -> Program:
+    """The nonlinear program of `problem` on one mesh per phase.
+
+    located: free numbers, and borders by phase, for which points at moving times are looked up (default: the guess).
+    """
+    if scheme.scheme == "shooting":
+        from gantrytau_optimica.transcription.shooting import shoot_steps
+
+        return shoot_steps(problem, meshes, scheme)
+    places = lay_out(problem, tuple(meshes), scheme)
+    free, borders = located or (np.array([n.guess for n in problem.free]), [m.borders for m in meshes])
+    where = places_of_points(places, free, borders)
+    groups: list[Rows] = []
+    objective, blocks, linear = [], [], []
+    paths = [
+        [limit for limit in phase.path_limits if bare_limit(limit, phase) is None] for phase in problem.phases
+    ]
+    count = 0
+    for number, (layout, path) in enumerate(zip(places.layouts, paths, strict=True)):
+        mine = _rows(places, layout, number, path, count)
+        groups += mine.groups
+        linear.append((mine, layout, path))
+        count = mine.stop
+    groups += [
+        Rows("boundary", limit.name, -1, np.array([count + i]), np.array([np.nan]), limit.lower, limit.upper)
+        for i, limit in enumerate(problem.boundary)
+    ]
+    total = count + len(problem.boundary)
+    for mine, layout, path in linear:
+        blocks.append(_point_block(places, layout, path, mine.start, total))
+        objective += _running_costs(places, layout)
+    if problem.boundary:
+        rows = np.arange(count, total)
+        scatter = sparse.csr_matrix((np.ones(rows.size), (rows, rows - count)), shape=(total, rows.size))
+        blocks.append(single_block(places, where, [limit.expression for limit in problem.boundary], scatter))
+    objective.append(single_block(places, where, [_without_sums(problem)], sparse.csr_matrix([[1.0]])))
+    objective += [b for layout in places.layouts for b in _sample_sums(places, layout)]
+    matrix = sparse.vstack(
+        [m for mine, _, _ in linear for m in mine.linear] + [sparse.csr_matrix((total - count, places.size))]
+    )
+    lower, upper = np.zeros(total), np.zeros(total)
+    for group in groups:
+        lower[group.rows], upper[group.rows] = group.lower / group.size, group.upper / group.size
+    lbw, ubw = _bounds(places)
+    assembled = assemble(objective, blocks, matrix.tocsr(), 0)
+    return Program(problem, places, assembled, tuple(groups), lbw, ubw, lower, upper, tuple(where))
+
+
+@dataclass(frozen=True, eq=False)
+class _PhaseRows:
+    """The rows of one phase: numbers from start to stop, what they mean, and their linear part."""
+
+    start: int
+    stop: int
+    groups: list[Rows]
+    linear: list[Sparse]
+
+
+def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start: int) -> _PhaseRows:
+    phase, fractions = layout.phase, layout.fractions
+    meaning = [("dynamics", s.name, 0.0, 0.0, s.nominal) for s in phase.states]
+    meaning += [("algebraic", name, 0.0, 0.0, 1.0) for name in phase.residual_names]
+    meaning += [("path", limit.name, limit.lower, limit.upper, 1.0) for limit in path]
+    per_point, points = len(meaning), fractions.size
+    at_points = start + per_point * np.arange(points)
+    groups = [
+        Rows(kind, name, number, at_points + i, fractions, low, high, size)
+        for i, (kind, name, low, high, size) in enumerate(meaning)
+    ]
+    slopes = places.slopes(layout).tocoo()
+    nx = max(len(phase.states), 1)
+    place = (slopes.row // nx) * per_point + slopes.row % nx
+    linear: list[Sparse] = [
+        sparse.csr_matrix((slopes.data, (place, slopes.col)), shape=(per_point * points, places.size))
+    ]
+    stop = start + per_point * points
+    jumps = places.jumps(layout)
+    for i, state in enumerate(phase.states if jumps.shape[0] else ()):
+        rows = stop + nx * np.arange(layout.mesh.elements) + i
+        groups.append(
+            Rows("continuity", state.name, number, rows, layout.mesh.borders[1:], 0.0, 0.0, state.nominal)
+        )
+    linear.append(jumps)
+    stop += jumps.shape[0]
+    for signal, chain in layout.chains.items():
+        step = phase.signals[signal].pieces.max_step
+        if step is None or chain.size < 2:
+            continue
+        rows = np.arange(chain.size - 1)
+        linear.append(_differences(places, chain))
+        moments = layout.moment[chain[1:] - layout.first]
+        groups.append(
+            Rows(
+                "step",
+                phase.signals[signal].name,
+                number,
+                stop + rows,
+                moments,
+                -step,
+                step,
+                phase.signals[signal].nominal,
+            )
+        )
+        stop += rows.size
+    if layout.knots.size:
+        stretches = np.diff(np.concatenate([[0.0], layout.mesh.borders[list(layout.mesh.moving)], [1.0]]))
+        matrix, offset = _stretches(places, layout)
+        linear.append(matrix)
+        for i, (length, fixed) in enumerate(zip(stretches, offset, strict=True)):
+            name = f"the length of stretch {i + 1} of the mesh"
+            low = layout.mesh.shortest * length - fixed
+            groups.append(Rows("border", name, number, np.array([stop + i]), np.array([np.nan]), low, np.inf))
+        stop += stretches.size
+    return _PhaseRows(start, stop, groups, linear)
+
+
+def _differences(places: Places, chain: np.ndarray) -> Sparse:
+    """Steps between consecutive unknowns, divided by their size."""
+    rows = np.arange(chain.size - 1)
+    size = places.scale[chain[0]]
+    return places.pick(
+        [rows, rows], [chain[1:], chain[:-1]], [np.full(rows.size, v / size) for v in (1.0, -1.0)], rows.size
+    )
+
+
+def _stretches(places: Places, layout: Layout) -> tuple[Sparse, np.ndarray]:
+    """Distances of consecutive moving borders, the ends of the phase included: linear part and offset."""
+    m = layout.knots.size
+    rows = np.arange(m)
+    matrix = places.pick([rows, rows + 1], [layout.knots, layout.knots], [np.ones(m), -np.ones(m)], m + 1)
+    offset = np.zeros(m + 1)
+    offset[-1] = 1.0
+    return matrix, offset
+
+
+def _point_block(places: Places, layout: Layout, path: list[Limit], start: int, total: int) -> Block:
+    phase, run = layout.phase, running(places, layout)
+    slopes = phase.ode * (run.horizon * run.width)
+    values = ca.vertcat(slopes, phase.residuals, *(limit.expression for limit in path))
+    element, place = layout.points
+    per_point = values.numel()
+    factor = np.ones((element.size, per_point))
+    factor[:, : len(phase.states)] = -1.0 / np.array([s.nominal for s in phase.states])
+    index = np.arange(factor.size)
+    scatter = sparse.csr_matrix((factor.ravel(), (start + index, index)), shape=(total, index.size))
+    return run.block(values, element, place, scatter)
+
+
+def _running_costs(places: Places, layout: Layout) -> list[Block]:
+    """The integral of the integrand, and the penalties on steps of piecewise inputs."""
+    found, phase = [], layout.phase
+    if not phase.integrand.is_zero():
+        run = running(places, layout)
+        weights = np.tile(layout.scheme.weights, layout.mesh.elements)[None, :]
+        element, place = layout.points
+        found.append(
+            run.block(phase.integrand * run.horizon * run.width, element, place, sparse.csr_matrix(weights))
+        )
+    for signal, chain in layout.chains.items():
+        pieces, size = phase.signals[signal].pieces, places.scale[chain[0]]
+        if pieces.step_penalty and chain.size > 1:
+            step = ca.SX.sym("step")
+            weights = np.full((1, chain.size - 1), pieces.step_penalty * size**2)
+            found.append(
+                Block(
+                    step,
+                    ca.SX(0, 1),
+                    ca.SX(0, 1),
+                    step**2,
+                    np.zeros((0, chain.size - 1)),
+                    _differences(places, chain),
+                    sparse.csr_matrix(weights),
+                )
+            )
+    return found
+
+
+def _without_sums(problem: ControlProblem) -> ca.SX:
+    """The objective less its sums over samples, which have blocks of their own."""
+    symbols = list({s.symbol.element_hash(): s.symbol for s in problem.sums}.values())
+    return (
+        ca.substitute(problem.objective, ca.vertcat(*symbols), ca.SX.zeros(len(symbols), 1))
+        if symbols
+        else problem.objective
+    )
+
+
+def _sample_sums(places: Places, layout: Layout) -> list[Block]:
+    problem, found = places.problem, []
+    for one in layout.phase.sums:
+        run = running(places, layout)
+        weight = float(ca.jacobian(problem.objective, one.symbol))
+        start, final = float(layout.phase.start_time), float(layout.phase.final_time)
+        element, place = layout.mesh.locate((one.times - start) / (final - start))
+        value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
+        error = ((one.expression - value) / deviation) ** 2
+        weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
+        known = np.vstack([one.values, one.deviations])
+        found.append(run.block(error, element, place, weights, extra=((value, deviation), known)))
+    return found
+
+
+def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:
+    """Limits of the scaled unknowns, those of bare signals on the path included."""
+    lower, upper = np.full(places.size, -np.inf), np.full(places.size, np.inf)
+    for layout in places.layouts:
+        limits = signal_limits(layout.phase, places.problem.name)
+        for i, signal in enumerate(layout.phase.signals):
+            lower[layout.of(i)], upper[layout.of(i)] = limits[signal.name]
+    for place, number in zip(places.free, places.problem.free, strict=True):
+        lower[place], upper[place] = number.min, number.max
+    return lower / places.scale, upper / places.scale
+
+
+def check_freedom(program: Program) -> None:
+    """ModelError if nothing is free, or if there are more conditions than unknowns."""
+    name = program.problem.name
+    equalities = int(np.sum(program.lbg == program.ubg))
+    unknowns = program.places.size - int(np.sum(program.lbw == program.ubw))
+    if unknowns == 0:
+        raise ModelError(f"{name}: nothing is free; declare a Free number or an Input")
+    if equalities > unknowns:
+        from gantrytau_optimica.failures.dependence import decided_text
+
+        raise ModelError(
+            f"{name}: {equalities} conditions for {unknowns} unknowns on this mesh, expected no more conditions than "
+            f"unknowns; remove some at the ends or along the path, or free a number{decided_text(program)}"
+        )
