@@ -25,6 +25,7 @@ from gantrytau_optimica.transcription.program import Program, transcribe
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 FEW = 30  # elements, from which on first guesses are tried on half as many
+MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 ROUNDS = 5  # of solving again with points at moving times read from other elements
@@ -94,12 +95,18 @@ class Prepared:
             return self._solved(changed, coarse, solver, first_guess(coarse.with_numbers(problem)))
 
         best = searched(solve, built, self.starts)
-        for branch in best.search.branches if best.search else ():
+        if best.search is None:
+            return solved_or_raise(best)
+        near = Solver(program, replace(policy, near=True))
+        found: list[Optimum] = []
+        for branch in best.search.branches[:MOST_BRANCHES]:
             nearby = carried(list(branch.optimum.phases.values()), program)
-            optimum = self._solved(built, program, self.solver, nearby)
-            if optimum.success or optimum.status == "interrupted":
-                return solved_or_raise(replace(optimum, search=best.search))
-        return solved_or_raise(best)
+            for solver in (near, self.solver):
+                found.append(self._solved(built, program, solver, nearby))
+                if found[-1].success or found[-1].status == "interrupted":
+                    break
+        optimum = min((o for o in found if o.success), key=lambda o: o.objective, default=found[0])
+        return solved_or_raise(replace(optimum, search=best.search))
 
     def _coarse(self, built: Built) -> Program:
         """The program on every other border, on which first guesses are tried."""
