@@ -32,7 +32,13 @@ PUSH = 1e-2  # Ipopt's bound_push and bound_frac: how far a guess is moved insid
 FAR = 1e5  # typical sizes that an unknown moves from its guess when it runs away
 
 # From a solution nearby the barrier begins low: begun high, it may lead to another branch.
-NEAR = {"mu_strategy": "monotone", "mu_init": 1e-4, "bound_push": 1e-5, "bound_frac": 1e-5, "slack_bound_push": 1e-5}
+NEAR = {
+    "mu_strategy": "monotone",
+    "mu_init": 1e-4,
+    "bound_push": 1e-5,
+    "bound_frac": 1e-5,
+    "slack_bound_push": 1e-5,
+}
 
 Progress = Callable[[int, float], None]  # iteration, objective
 
@@ -60,7 +66,9 @@ class Policy:
     max_iterations: int = 1000
     max_time: float = 300.0
     progress: Progress | None = None
-    near: bool = False  # whether guesses are solutions of nearly the same program, from which it must not stray
+    near: bool = (
+        False  # whether guesses are solutions of nearly the same program, from which it must not stray
+    )
 
 
 class Solver:

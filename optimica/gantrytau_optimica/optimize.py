@@ -3,12 +3,14 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, SolveError
 from gantrytau.translation import names
+from gantrytau_optimica.archive.run_record import write_record
 from gantrytau_optimica.building import build
 from gantrytau_optimica.checking import not_at_two_times, static
 from gantrytau_optimica.controls import read_controls
@@ -42,31 +44,40 @@ def optimize(
     max_iterations: int = 1000,
     max_time: float = 300.0,
     progress: Progress | None = None,
+    record: Any = None,
 ) -> Optimum:
-    """Solve an optimal-control problem by direct collocation.
+    """Solve an optimal-control problem.
 
-    problem: a subclass of Optimization or an instance; elements, points: of the mesh, points per element (1 to 9);
-    scheme: "radau", "gauss", or "shooting" (points: Runge-Kutta steps per element); guess: name -> number, array or
-    function of time, or another solution; default: a straight line between given initial and final values, else start
-    values. tolerance: of Ipopt; max_time: s; progress: called with (iteration, objective).
+    problem: a subclass of Optimization or an instance.
+    elements: their number, or their lengths relative to each other; points: in each (1 to 9); lengths: "free" lets the
+    optimiser place the borders. scheme: "radau", "gauss", or "shooting" (points: Runge-Kutta steps per element).
+    guess: name -> number, array or function of time, or another solution; a component -> a solution of that component.
+    Default: a straight line between given initial and final values, else start values.
+    controls: input -> dict(kind="constant" | "linear" | "ramps", elements=1, max_step=None, step_penalty=0.0).
+    refine: relative accuracy to which limits and conditions hold when played back, and to which the objective stands.
+    starts: first guesses that are tried; `.search` of the answer tells the branches they led to.
+    tolerance: of Ipopt; max_time: s, of one solve; progress: called with (iteration, objective).
+    record: a file or folder to which inputs, versions and verdict are written as JSON, whatever the outcome.
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
-    return prepare(
-        problem,
-        elements=elements,
-        points=points,
-        scheme=scheme,
-        lengths=lengths,
-        guess=guess,
-        controls=controls,
-        refine=refine,
-        starts=starts,
-        tolerance=tolerance,
-        max_iterations=max_iterations,
-        max_time=max_time,
-        progress=progress,
-    ).solve()
+    policy = dict(
+        elements=elements, points=points, scheme=scheme, lengths=lengths, guess=guess, controls=controls, refine=refine,
+        starts=starts, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time,
+    )  # fmt: skip
+    begun, clock = datetime.now(UTC), time.perf_counter()
+    read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
+    read_time = time.perf_counter() - clock
+    found: Optimum | None = None
+    try:
+        found = prepare(read, progress=progress, **policy).solve()
+        return found
+    except SolveError as error:
+        found = error.optimum
+        raise
+    finally:
+        if record is not None and found is not None:
+            write_record(found, record, problem=problem, options=policy, started=begun, read_time=read_time)
 
 
 def prepare(

@@ -35,6 +35,7 @@ REMEDIES = {
     "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
     "time limit reached": "Allow more with max_time=, or try another guess=.",
     "interrupted": "What was reached so far is in .optimum.",
+    "diverging: the problem may be unbounded": "Limit what runs away, or try another guess= or starts=.",
 }
 
 
