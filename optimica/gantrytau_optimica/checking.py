@@ -19,9 +19,15 @@ def static(dae: Dae) -> bool:
     return not dae.states and not any(ca.depends_on(e.residual, dae.flat.time) for e in dae.flat.equations)
 
 
-def not_at_two_times(read: "ReadProblem") -> bool:
-    """Whether values are asked for at one time only, so that a signal may have one value."""
-    return len({str(p.time) for p in read.points}) <= 1
+def one_point(read: "ReadProblem") -> bool:
+    """Whether a problem is static in its costs, limits and inputs as well, and asks for values at one time only."""
+    courses = read.courses.values()
+    if not static(read.dae) or any(not isinstance(c, ca.SX) or not c.is_constant() for c in courses):
+        return False
+    expressions = [p.integrand for p in read.phases] + [p.expression for p in read.points]
+    expressions += [e for c in read.constraints for e in (c.expression, c.lower, c.upper)]
+    timed = ca.depends_on(ca.vertcat(*(ca.vec(e) for e in expressions)), read.dae.flat.time)
+    return not timed and not read.targets and len({str(p.time) for p in read.points}) <= 1
 
 
 def check_objective(read: "ReadProblem") -> "ReadProblem":

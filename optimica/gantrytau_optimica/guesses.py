@@ -10,7 +10,6 @@ import numpy as np
 
 from gantrytau import Dae, ModelError, Result
 from gantrytau.symbols import derivative_name, split_derivative
-from gantrytau_optimica.completion import Completion
 from gantrytau_optimica.optimization import Point
 from gantrytau_optimica.reading import Constraint
 from gantrytau_optimica.records import ControlProblem, Course, Phase, Signal
@@ -168,7 +167,7 @@ def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[
     for name in dae.variables:
         own = name[len(before) :]
         if name.startswith(before) and own in source:
-            times[name] = np.asarray(source.time_of(own) if hasattr(source, "time_of") else source.time)
+            times[name] = _times(source, own)
     if not times:
         what = f"none of the variables of {component}" if component else "no variable of the problem"
         raise ModelError(
@@ -181,6 +180,11 @@ def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[
     }
     numbers = {before + n: x for n, x in getattr(source, "free", {}).items()}
     return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
+
+
+def _times(source: "Result | Optimum", name: str) -> np.ndarray:
+    """The times of a variable, in an optimum those of its phase."""
+    return np.asarray(source.time if isinstance(source, Result) else source.time_of(name))
 
 
 def _ends(
@@ -265,15 +269,13 @@ def _algebraics(
     leaves = [s.symbol for s in (*phase.states, *phase.inputs, *phase.courses)]
     signals = [symbols[s.name()] for s in leaves]
     found: dict[str, Guess] = {}
-    implicit = [a.name for a in phase.algebraics if a.name not in built.closed and a.symbol.name() not in own]
-    completed = _completed(built, phase, leaves, signals, span) if implicit else None
-    for number, algebraic in enumerate(phase.algebraics):
+    for algebraic in phase.algebraics:
         closed = built.closed.get(algebraic.name)
         if algebraic.symbol.name() in own:
             guess = own[algebraic.symbol.name()]
-        elif completed is not None:
-            guess = completed.guess(number)
-        elif closed is not None:
+        elif closed is None:
+            guess = _constant(dae.start.get(algebraic.name, 1.0))
+        else:
             closed = ca.substitute(closed, old, values) if old.numel() else closed
             function = ca.Function(
                 "closed", [built.problem.time, ca.vertcat(ca.SX(0, 1), *leaves)], [ca.densify(closed)]
@@ -283,39 +285,6 @@ def _algebraics(
         leaves.append(algebraic.symbol)
         signals.append(guess)
     return found
-
-
-def _completed(
-    built: "Built", phase: Phase, leaves: list[ca.SX], signals: list[Guess], span: tuple[float, float]
-) -> Completion:
-    """All algebraics of a phase from its equations, along the guess of its other signals."""
-    problem, start = built.problem, built.read.dae.start
-    z = ca.vertcat(*(a.symbol for a in phase.algebraics))
-    residuals = ca.substitute(phase.residuals, problem.numbers, ca.DM([n.guess for n in problem.free]))
-    known = ca.vertcat(ca.SX(0, 1), *leaves)
-    function = ca.Function(
-        "algebraics", [problem.time, known, z], [ca.densify(residuals), ca.densify(ca.jacobian(residuals, z))]
-    )
-    begin = np.array([start.get(leaf.name(), 0.0) for leaf in leaves])
-    first = np.array([_started(built, a, leaves, begin) for a in phase.algebraics])
-    roots = np.array([k for k, a in enumerate(phase.algebraics) if a.min == 0.0], int)
-    return Completion(function, tuple(signals), begin, first, roots, span)
-
-
-def _started(built: "Built", algebraic: Signal, leaves: list[ca.SX], begin: np.ndarray) -> float:
-    """The start value of an algebraic; of a square root, from what stands under it at the start."""
-    start = built.read.dae.start
-    if algebraic.symbol.name() in start:
-        return float(start[algebraic.symbol.name()])
-    closed = built.closed.get(algebraic.name)
-    if closed is None:
-        return 1.0
-    table = built.read.dae.table
-    known = {leaf.name(): value for leaf, value in zip(leaves, begin, strict=True)}
-    inside = ca.symvar(closed)
-    values = [known.get(s.name(), start.get(s.name(), table.values.get(s.name(), 1.0))) for s in inside]
-    value = float(ca.evalf(ca.substitute(closed, ca.vertcat(ca.SX(0, 1), *inside), ca.DM(values))))
-    return value if np.isfinite(value) else 1.0
 
 
 class _Closed:

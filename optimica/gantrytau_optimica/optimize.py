@@ -12,7 +12,7 @@ from gantrytau import ModelError, SolveError
 from gantrytau.translation import names
 from gantrytau_optimica.archive.run_record import write_record
 from gantrytau_optimica.building import build
-from gantrytau_optimica.checking import not_at_two_times, static
+from gantrytau_optimica.checking import one_point
 from gantrytau_optimica.controls import read_controls
 from gantrytau_optimica.ipopt import Policy, Progress, Solver
 from gantrytau_optimica.optimization import Optimization
@@ -61,7 +61,7 @@ def optimize(
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
-    policy = dict(
+    policy: dict[str, Any] = dict(
         elements=elements, points=points, scheme=scheme, lengths=lengths, guess=guess, controls=controls, refine=refine,
         starts=starts, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time,
     )  # fmt: skip
@@ -113,8 +113,8 @@ def prepare(
     guess = read_guesses(guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
     built = build(read, guess, held, read_controls(read, controls or {}))
-    if static(read.dae) and not_at_two_times(read):
-        grid, mesh, shooting = collocation("radau", 1), mesh_of(1), False
+    if one_point(read):
+        grid, mesh, shooting, refine = collocation("radau", 1), mesh_of(1), False, None
     meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
     if refine is not None:
         built = replace(built, problem=with_ramps(built.problem, meshes))

@@ -74,8 +74,10 @@ class Prepared:
                 equations=[x.equation for x in lost],
                 optimum=Optimum(read.name, built, program, unsolved, self.build_time),
             )
-        same = isinstance(guess, Optimum) and guess.program.assembled is self.program.assembled
-        optimum = self._best(built, program, guess.solution.w if same else first_guess(program))
+        first = first_guess(program)
+        if isinstance(guess, Optimum) and guess.program.assembled is self.program.assembled:
+            first = guess.solution.w
+        optimum = self._best(built, program, first)
         if self.refine is None:
             return optimum
         policy = self.solver.policy

@@ -1,6 +1,6 @@
 """Reads an optimisation problem: the model translated, objective and constraints in its symbols."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -130,15 +130,7 @@ def read_problem(
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
     dae = translate_flat(flat, given=_given(stages, flat), find=mentioned)
-    links = [
-        ReadLink(
-            instance.path(c.first),
-            instance.path(c.second),
-            tuple(f"{instance.path(c.second)}.{n}" for n in c.jump),
-        )
-        for c in found
-        if isinstance(c, Link)
-    ]
+    links = [_link(name, instance, phases, c) for c in found if isinstance(c, Link)]
     read = ReadProblem(
         name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
         _courses(name, stages, dae),
@@ -146,6 +138,20 @@ def read_problem(
     read = check_objective(read)
     check_times(read)
     return read
+
+
+def _link(name: str, instance: Instance, phases: Sequence[ReadPhase], link: Link) -> ReadLink:
+    """A link by paths. Raises ModelError for phases of another problem."""
+    paths = [instance.paths.get(id(one)) for one in (link.first, link.second)]
+    known = [phase.name for phase in phases]
+    for path, one in zip(paths, (link.first, link.second), strict=True):
+        if path is None or path not in known or path == "":
+            raise ModelError(
+                f"{name}: link: found {type(one).__name__}, which is no phase of this problem, expected two of "
+                f"{', '.join(known) if known != [''] else 'its phases (there are none)'}; write self.name of the phase"
+            )
+    first, second = (str(path) for path in paths)
+    return ReadLink(first, second, tuple(f"{second}.{n}" for n in link.jump))
 
 
 def _place(name: str, path: str, which: str) -> str:

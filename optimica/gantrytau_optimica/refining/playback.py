@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from gantrytau import Result
+from gantrytau import ModelError, Result
 from gantrytau.trajectories import labels
 from gantrytau_optimica.records import ControlProblem, Limit, Phase
 from gantrytau_optimica.refining.replay import Replayed, replay
@@ -74,6 +74,11 @@ class Playback:
     @cached_property
     def result(self) -> Result:
         """All variables of the model along the motion as played; only where there is one phase."""
+        if len(self.phases) > 1:
+            names = ", ".join(f"'{name}'" for name in self.phases)
+            raise ModelError(
+                f"{self.optimum.name} has phases with times of their own; ask one of .phases[...]: {names}"
+            )
         dae, (played,) = self.optimum.dae, self.phases.values()
         names = list(dae.variables)
         rows = played.values(self.optimum.built.expressed(names))
