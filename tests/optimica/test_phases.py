@@ -82,9 +82,6 @@ def test_phases_are_played_back(there_and_back):
     assert "`back.mass.x begins where out.mass.x ends` is missed by" in report
 
 
-@pytest.mark.xfail(
-    strict=True, reason="Playback.result unpacks one phase, ValueError instead of a ModelError"
-)
 def test_a_playback_of_phases_has_no_common_result(there_and_back):
     with pytest.raises(ModelError, match="has phases"):
         _ = there_and_back.playback.result
@@ -403,7 +400,6 @@ def test_a_link_of_the_problem_itself():
     assert "link" in message(changed(constraints=lambda self: [link(self, self.back)]))
 
 
-@pytest.mark.xfail(strict=True, reason="reading.read_problem: KeyError of Instance.path for a foreign phase")
 def test_a_link_of_a_phase_of_another_problem():
     other = ThereAndBack()
     assert "link" in message(changed(constraints=lambda self: [link(self.out, other.back)]))

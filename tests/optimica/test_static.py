@@ -33,13 +33,11 @@ class Tracked(Optimization):
 STATIC = "checking.static looks at equations only: one point is transcribed, though time enters elsewhere"
 
 
-@pytest.mark.xfail(strict=True, reason=STATIC)
 def test_a_cost_that_depends_on_time_is_not_static():
     # t - 1/2 is missed in the second half: integral of s^2 from 0 to 1/2
     assert optimize(Tracked, elements=10).objective == pytest.approx(1 / 24, abs=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason=STATIC)
 def test_a_limit_that_depends_on_time_is_not_static():
     class Above(Optimization):
         model = Doubled(w=0.0)
@@ -54,7 +52,6 @@ def test_a_limit_that_depends_on_time_is_not_static():
     assert optimize(Above, elements=10).objective == pytest.approx(1 / 3, abs=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason=STATIC)
 @pytest.mark.parametrize("course", [lambda t: t, ([0.0, 1.0], [0.0, 1.0])])
 def test_a_known_input_that_changes_is_not_static(course):
     class Driven(Optimization):
@@ -82,7 +79,6 @@ def test_a_static_problem_has_one_value():
     np.testing.assert_allclose(optimum["model.y"], 0.86, atol=1e-7)
 
 
-@pytest.mark.xfail(strict=True, reason="ramps on the one element leave the value at its begin undetermined")
 def test_a_static_problem_refined_has_one_value():
     class Still(Optimization):
         model = Doubled(w=0.3)
