@@ -16,9 +16,9 @@ from gantrytau_optimica.guesses import guess_of, number_guess
 from gantrytau_optimica.ipopt import Solver
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.reading import ReadProblem
-from gantrytau_optimica.records import ControlProblem, FreeNumber
+from gantrytau_optimica.records import ControlProblem, FreeNumber, Phase, Signal
 from gantrytau_optimica.refining.carrying import carried
-from gantrytau_optimica.refining.refinement import refined
+from gantrytau_optimica.refining.refinement import refined, with_ramps
 from gantrytau_optimica.refining.starts import searched
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, transcribe
@@ -94,8 +94,12 @@ class Prepared:
         solver = Solver(coarse, replace(policy, max_iterations=min(policy.max_iterations, MOST_TRIED)))
 
         def solve(problem: ControlProblem) -> Optimum:
-            changed = replace(built, problem=problem)
-            return self._solved(changed, coarse, solver, first_guess(coarse.with_numbers(problem)))
+            guessed = coarse.with_numbers(
+                replace(coarse.problem, phases=_guessed(coarse.problem, problem), free=problem.free)
+            )
+            return self._solved(
+                replace(built, problem=guessed.problem), guessed, solver, first_guess(guessed)
+            )
 
         best = searched(solve, built, self.starts)
         if best.search is None:
@@ -112,12 +116,14 @@ class Prepared:
         return solved_or_raise(replace(optimum, search=best.search))
 
     def _coarse(self, built: Built) -> Program:
-        """The program on every other border, on which first guesses are tried."""
+        """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,
+        and the search is lost less often.
+        """
         layouts = self.program.places.layouts
         if min(layout.mesh.elements for layout in layouts) < FEW or layouts[0].scheme.scheme == "shooting":
             return self.program.with_numbers(built.problem)
         meshes = [Mesh(np.unique(np.append(layout.mesh.borders[::2], 1.0))) for layout in layouts]
-        return transcribe(built.problem, meshes, layouts[0].scheme)
+        return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
 
     def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends from a first guess of the unknowns of a program."""
@@ -151,6 +157,19 @@ class Prepared:
             return replace(number, guess=number_guess(number.name, guess, number.guess))
         value = values.get(number.name, self.built.read.dae.table.values[number.name])
         return replace(number, guess=value, min=value, max=value)
+
+
+def _guessed(coarse: ControlProblem, problem: ControlProblem) -> tuple[Phase, ...]:
+    """The phases of a program with the guesses of another."""
+    guesses = {s.name: s.guess for s in problem.signals}
+
+    def done(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
+        return tuple(replace(s, guess=guesses[s.name]) for s in signals)
+
+    return tuple(
+        replace(p, states=done(p.states), algebraics=done(p.algebraics), inputs=done(p.inputs))
+        for p in coarse.phases
+    )
 
 
 def solved_or_raise(optimum: Optimum) -> Optimum:

@@ -2,8 +2,8 @@
 
 import sys
 
-from tests.benchmarks import engine, growth, mechanisms, motion
+from tests.benchmarks import answers, engine, growth, mechanisms, motion
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
-    sys.exit(print_table("Benchmarks", (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows())))
+    sys.exit(print_table("Benchmarks", (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows(), answers.rows())))
