@@ -43,9 +43,23 @@ class Built:
     closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
 
     def expressed(self, names: Sequence[str]) -> ca.SX:
-        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem."""
+        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.
+
+        Raises ModelError for derivatives that the problem does not hold.
+        """
         found = self.system.resolve([self.read.dae.expression(name) for name in names])
-        return ca.vertcat(ca.SX(0, 1), *known(found, self.read, self.numbers))
+        column = ca.vertcat(ca.SX(0, 1), *known(found, self.read, self.numbers))
+        problem = self.problem
+        own = [problem.time, problem.numbers, *(s.symbol for s in problem.signals)]
+        own += [c.symbol for phase in problem.phases for c in phase.courses]
+        inside = {e.element_hash() for e in ca.vertcat(*own).elements()}
+        for leaf in ca.symvar(column):
+            if leaf.element_hash() not in inside:
+                raise ModelError(
+                    f"{problem.name}: {', '.join(names[:3])} needs {leaf.name()}, which is not part of the problem; mention "
+                    "it there, in a constraint or an equation"
+                )
+        return column
 
 
 def build(
