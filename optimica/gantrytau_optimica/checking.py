@@ -21,7 +21,7 @@ def static(dae: Dae) -> bool:
 
 def one_point(read: "ReadProblem") -> bool:
     """Whether a problem is static in its costs, limits and inputs as well, and asks for values at one time only."""
-    fixed = [c for c in read.courses.values() if isinstance(c, ca.SX) and c.is_constant()]
+    fixed = [c for c in read.courses.values() if not isinstance(c, tuple) and c.is_constant()]
     if not static(read.dae) or len(fixed) < len(read.courses):
         return False
     expressions = [p.integrand for p in read.phases] + [p.expression for p in read.points]
