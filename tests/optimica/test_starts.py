@@ -6,6 +6,8 @@ import pytest
 from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der
 from gantrytau_optimica import Free, Optimization, final, optimize
 from tests.optimica.problems import FastestMass
+from tests.optimica.test_controls import Effort, best_pieces
+from tests.optimica.test_phases import ThereAndBack
 
 
 class Point(Model):
@@ -184,3 +186,40 @@ def test_where_no_guess_leads_to_a_solution_the_first_is_reported():
 def test_numbers_of_guesses_that_cannot_be(starts):
     with pytest.raises(ModelError, match=r"starts=.*: expected a whole number of at least 1"):
         optimize(FastestMass, starts=starts)
+
+
+def test_a_search_in_phases():
+    optimum = optimize(ThereAndBack, elements=10, starts=4)
+    assert optimum.objective == pytest.approx(4.0, abs=1e-6)
+    assert sum(b.count for b in optimum.search.branches) + optimum.search.failures == 4
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="carrying.carried takes moving borders from the guess: the best branch is lost on the way",
+)
+def test_the_answer_is_no_worse_than_its_best_branch():
+    optimum = optimize(FastestMass, elements=6, lengths="free", starts=3)
+    assert optimum.objective <= optimum.search.branches[0].objective + 1e-6
+
+
+COARSE = "prepared._coarse halves the elements but not the groups of elements that make a piece"
+
+
+@pytest.mark.xfail(strict=True, reason=COARSE)
+def test_branches_keep_the_pieces_of_the_caller():
+    # eight pieces in either case; 40 elements carry them exactly, and so do 20
+    controls = {"mass.u": dict(kind="constant", elements=5)}
+    optimum = optimize(Effort, elements=40, starts=2, controls=controls)
+    assert optimum.objective == pytest.approx(best_pieces(np.full(8, 1 / 8))[0], abs=1e-8)
+    assert optimum.search.branches[0].objective == pytest.approx(optimum.objective, abs=1e-8)
+
+
+@pytest.mark.xfail(strict=True, raises=SolveError, reason=COARSE)
+def test_a_limit_on_steps_is_that_of_the_mesh_asked_for():
+    # steps of 12 / 40 are needed; pieces of twice the length would need twice as much
+    controls = {"mass.u": dict(kind="constant", max_step=0.35)}
+    alone = optimize(Effort, elements=40, controls=controls)
+    assert optimize(Effort, elements=40, controls=controls, starts=2).objective == pytest.approx(
+        alone.objective
+    )
