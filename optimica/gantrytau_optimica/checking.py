@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
@@ -19,10 +19,13 @@ def static(dae: Dae) -> bool:
     return not dae.states and not any(ca.depends_on(e.residual, dae.flat.time) for e in dae.flat.equations)
 
 
+def _constant(course: Any) -> bool:
+    return isinstance(course, ca.SX) and course.is_constant()
+
+
 def one_point(read: "ReadProblem") -> bool:
     """Whether a problem is static in its costs, limits and inputs as well, and asks for values at one time only."""
-    fixed = [c for c in read.courses.values() if not isinstance(c, tuple) and c.is_constant()]
-    if not static(read.dae) or len(fixed) < len(read.courses):
+    if not static(read.dae) or any(not _constant(course) for course in read.courses.values()):
         return False
     expressions = [p.integrand for p in read.phases] + [p.expression for p in read.points]
     expressions += [e for c in read.constraints for e in (c.expression, c.lower, c.upper)]
