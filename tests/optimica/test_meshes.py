@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, ModelError, Parameter
-from gantrytau_optimica import Free, Optimization, at, final, optimize
+from gantrytau import Fixed, ModelError, Parameter, Real
+from gantrytau_optimica import Free, Optimization, at, final, optimize, prepare
 from tests.optimica.known_problems import zero
 from tests.optimica.problems import FastestMass, LinearQuadratic, Mass
 from tests.optimica.test_controls import Effort
+from tests.optimica.test_phases import ThereAndBack
 
 
 class Uneven(FastestMass):
@@ -226,3 +227,54 @@ def test_a_time_at_an_end_is_the_end():
 
     for scheme in ("radau", "gauss"):
         assert optimize(Ends, elements=3, scheme=scheme).objective == pytest.approx(1.5, abs=1e-8)
+
+
+def test_gauss_does_not_look_at_the_end_but_the_playback_does():
+    class Squared(Mass):
+        square = Real(unit="m2", max=0.4, description="square of the way")
+
+        def equations(self):
+            yield from super().equations()
+            yield self.square == self.x**2
+
+    class Far(Optimization):
+        mass = Squared(x=Fixed(0.0), v=Fixed(0.0), u=dict(min=-1.0, max=1.0))
+        final_time = 2.0
+
+        def objective(self):
+            return -final(self.mass.x)
+
+    # Gauss' points lie inside: the limit of what is no state is passed at the very end
+    far = optimize(Far, elements=5, scheme="gauss")
+    passed = next(v for v in far.playback.violations if v.name == "limits of mass.square")
+    assert passed.amount == pytest.approx(far.objective**2 - 0.4, abs=1e-6)
+    assert passed.time == pytest.approx(2.0)
+    assert optimize(Far, elements=5).objective == pytest.approx(-np.sqrt(0.4), abs=1e-6)
+
+
+def test_free_lengths_of_phases():
+    controls = {"out.mass.u": "constant", "back.mass.u": "constant"}
+    optimum = optimize(ThereAndBack, elements=3, lengths="free", controls=controls)
+    assert optimum.objective == pytest.approx(4.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("late", [4.0, 3.0, 2.5])
+def test_a_time_stays_where_it_is_as_a_held_horizon_changes(late):
+    """One program solved for another horizon is that of the horizon."""
+
+    class Far(FastestMass):
+        final_time = Parameter(2.6, unit="s", description="duration")
+
+        def objective(self):
+            return 0.0
+
+        def integrand(self):
+            return self.mass.u**2
+
+        def constraints(self):
+            yield from super().constraints()
+            yield at(1.0, self.mass.x) == 0.3
+
+    found = prepare(Far, parameters=["final_time"], elements=9).solve({"final_time": late})
+    assert float(found.signal("mass.x")(1.0)) == pytest.approx(0.3, abs=1e-9)
+    assert found.objective == pytest.approx(optimize(Far(final_time=late), elements=9).objective, rel=1e-7)
