@@ -319,3 +319,21 @@ def test_a_failed_solve_is_not_played_back_in_its_report():
     with pytest.raises(SolveError) as caught:
         optimize(Uneven, max_iterations=2)
     assert "Played back" not in str(caught.value)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="reporting._objective_free asks for the slope where all unknowns are equal: differences vanish",
+)
+def test_an_objective_of_a_difference_depends_on_what_is_free():
+    class Matched(Optimization):
+        mass = Mass(x=Fixed(0.0), v=Fixed(0.0), u=1.0)
+        k = Free(1.0, unit="m/s", description="to be the final speed")
+        final_time = 2.0
+
+        def objective(self):
+            return (self.k - final(self.mass.v)) ** 2
+
+    optimum = optimize(Matched, elements=4)
+    assert optimum["k"] == pytest.approx(2.0, abs=1e-6)
+    assert "depends on nothing that is free" not in optimum.report()
