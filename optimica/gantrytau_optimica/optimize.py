@@ -108,6 +108,10 @@ def prepare(
         raise ModelError("refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'")
     grid = collocation("radau" if shooting else scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
+    if points == 1 and refine is not None:
+        raise ModelError(
+            "refine with points=1: inputs are straight lines there, expected at least 2 points per element"
+        )
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     begin = time.perf_counter()
     guess = read_guesses(guess, read)

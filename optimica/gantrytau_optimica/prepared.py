@@ -120,7 +120,10 @@ class Prepared:
         and the search is lost less often.
         """
         layouts = self.program.places.layouts
-        if min(layout.mesh.elements for layout in layouts) < FEW or layouts[0].scheme.scheme == "shooting":
+        pieces = [u.pieces.kind for phase in built.problem.phases for u in phase.inputs]
+        own = any(layout.mesh.moving for layout in layouts) or {"constant", "linear"} & set(pieces)
+        few = min(layout.mesh.elements for layout in layouts) < FEW
+        if own or few or layouts[0].scheme.scheme == "shooting":
             return self.program.with_numbers(built.problem)
         meshes = [Mesh(np.unique(np.append(layout.mesh.borders[::2], 1.0))) for layout in layouts]
         return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
@@ -133,6 +136,8 @@ class Prepared:
                 break
             program = _relocated(program, solution.w)
             solution = Solver(program, solver.policy).solve(program, solution.w)
+        if solution.success:
+            program.require_points(solution.w)
         return Optimum(built.read.name, built, program, solution, self.build_time)
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:

@@ -83,6 +83,10 @@ class Trajectory:
         if times is None:
             times = self.times(self.mesh.borders[element] + place * self.mesh.widths[element])
         rows = [track.values(self.w, element, place) for track in self.layout.tracks]
+        at_start = (element == 0) & (place <= 0.0)
+        if self.layout.begin.size and np.any(at_start):
+            for k, unknown in enumerate(self.layout.begin, len(self.phase.states)):
+                rows[k] = np.where(at_start, self.w[unknown], rows[k])
         rows += [course.value(times) for course in self.phase.courses]
         return np.array(rows).reshape(len(rows), times.size)
 

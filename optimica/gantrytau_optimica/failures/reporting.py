@@ -183,7 +183,7 @@ def _objective_free(program: Program) -> bool:
     gradient = program.assembled.grad_f.sparsity_out(1)
     columns = np.array(gradient.row(), dtype=int)
     held = program.lbw == program.ubw
-    _, value = program.assembled.grad_f(np.full(program.places.size, 0.7312), ca.DM(0, 1))
+    _, value = program.assembled.grad_f(np.linspace(0.3, 0.9, program.places.size), ca.DM(0, 1))
     dense = gradient.nnz() == program.places.size
     used = np.array(value.nonzeros()) != 0.0 if dense else np.ones(columns.size, bool)
     return bool(np.any(~held[columns] & used))

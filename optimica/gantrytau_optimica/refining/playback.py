@@ -172,13 +172,14 @@ def _at_points(optimum: "Optimum", phases: list[Replayed]) -> tuple[float, list[
         for point in phase.points:
             symbols.append(point.symbol)
             values.append(ca.DM(_point(played, point.expression, point.time)))
-        sums: dict[str, float] = {}
+        sums: dict[int, float] = {}
         for one in phase.sums:
             error = (played.at(one.expression, one.times)[0] - one.values) / one.deviations
-            sums[one.symbol.name()] = sums.get(one.symbol.name(), 0.0) + float(error @ error)
-        for one in {s.symbol.name(): s for s in phase.sums}.values():
+            key = one.symbol.element_hash()
+            sums[key] = sums.get(key, 0.0) + float(error @ error)
+        for key, one in {s.symbol.element_hash(): s for s in phase.sums}.items():
             symbols.append(one.symbol)
-            values.append(ca.DM(sums[one.symbol.name()]))
+            values.append(ca.DM(sums[key]))
         running += _running(played)
     rows = ca.vertcat(problem.objective, *(limit.expression for limit in problem.boundary))
     found = np.array(ca.Function("points", symbols, [ca.densify(rows)])(*values)).ravel()

@@ -5,13 +5,16 @@ import numpy as np
 
 from gantrytau_optimica.refining.playback import limits_of, range_of
 from gantrytau_optimica.refining.replay import PLACES, Replayed
-from gantrytau_optimica.refining.switching import switches
+from gantrytau_optimica.refining.switching import sides, switches
+from gantrytau_optimica.sorting import signal_limits
 from gantrytau_optimica.trajectory import Trajectory
 from gantrytau_optimica.transcription.mesh import Mesh
 
 ORDER = 5  # of the error that an element adds, with three points
 MOST_PARTS = 4
 NEAR = 0.02  # of an element: borders that are closer to a switch give way to it
+ROUGH = 0.1  # of the root of the accuracy: jumps of ramps, relative to the range of an input, that are smoothed away
+PROVEN = 800  # elements, from which on a mesh is not divided only to prove itself
 LEAST = 5e-4  # of the horizon: shorter elements hardly move the objective, and the solver crawls
 SAME = 1e-4  # of the horizon: switches that are closer count as one
 
@@ -30,16 +33,36 @@ def better_mesh(
     knots = _apart(np.array([s.share for s in changes]))
     parts = _parts(played, accuracy)
     if roughness:
-        parts = np.maximum(parts, np.where(_rough(trajectory) > np.sqrt(accuracy), 2, 1))
+        parts = np.maximum(parts, np.where(_rough(trajectory) > ROUGH * np.sqrt(accuracy), 2, 1))
+    every = _with_knots(borders, parts, knots)
+    same = every.size == borders.size and np.allclose(every, borders, atol=1e-9)
+    if same and trajectory.mesh.elements < PROVEN:  # only a finer mesh shows that this one was fine enough
+        every = _with_knots(borders, np.where(_open(trajectory), 2, 1), knots)
+    jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
+    jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
+    return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
+
+
+def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Borders with elements divided, and with knots, to which borders close by give way."""
     kept = _divided(borders, parts)[1:-1]
     for knot in knots:
         element = int(np.clip(np.searchsorted(borders, knot) - 1, 0, borders.size - 2))
         near = max(LEAST, NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2]))
         kept = kept[np.abs(kept - knot) > near]
-    every = np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
-    jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
-    jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
-    return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
+    return np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
+
+
+def _open(trajectory: Trajectory) -> np.ndarray:
+    """Elements in which an input is nowhere at a limit: there it may be curved, (n,)."""
+    phase = trajectory.phase
+    limits = signal_limits(phase, trajectory.problem.name)
+    found = np.full(trajectory.mesh.elements, not phase.inputs)
+    first = len(phase.states) + len(phase.algebraics)
+    for number, signal in enumerate(phase.inputs, first):
+        ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
+        found |= np.any(sides(ends, *limits[signal.name]) == 0, axis=1)
+    return found
 
 
 def _apart(knots: np.ndarray) -> np.ndarray:

@@ -183,14 +183,10 @@ class _System:
     def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
         """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
         found = self.integrator(x0=state / sizes, z0=guess[self.kept], p=p)
-        x = (
-            np.hstack([(state / sizes)[:, None], np.array(found["xf"]).reshape(state.size, PLACES.size - 1)])
-            * sizes[:, None]
-        )
+        x = np.array(found["xf"]).reshape(state.size, PLACES.size) * sizes[:, None]
         if not np.all(np.isfinite(x)):
             raise RuntimeError("not finite")
-        kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size - 1)
-        kept = np.hstack([kept[:, :1], kept])
+        kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size)
         z = np.array(self.others(PLACES[None, :], x, kept, p))
         return x.T, z.T
 
@@ -234,7 +230,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     if not kept:
         del dae["z"], dae["alg"]
     method = "idas" if kept else "cvodes"
-    integrator = ca.integrator("replay", method, dae, 0.0, PLACES[1:].tolist(), options)
+    integrator = ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options)
     return _System(
         integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
     )

@@ -89,8 +89,11 @@ def bent(problem: ControlProblem, random: np.random.Generator) -> ControlProblem
 def _drawn(number: FreeNumber, random: np.random.Generator) -> FreeNumber:
     if number.held:
         return number
-    factor = float(np.exp(random.uniform(-0.5, 0.5)))
-    guess = number.guess * factor if number.guess else random.uniform(-0.5, 0.5)
+    if np.isfinite(number.min) and np.isfinite(number.max) and random.uniform() < 0.5:
+        guess = random.uniform(number.min, number.max)
+    else:
+        sign = -1.0 if number.min < 0 < number.max and random.uniform() < 0.5 else 1.0
+        guess = sign * (number.guess or 1.0) * float(np.exp(random.normal(0.0, 0.7)))
     return replace(number, guess=float(np.clip(guess, number.min, number.max)))
 
 
@@ -121,11 +124,12 @@ def _extents(phase: Phase, limits: Mapping[str, tuple[float, float]], share: flo
         vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
         ways[vector] = float(np.hypot(ways.get(vector, 0.0), np.ptp(state.guess(shares))))
     found = {}
+    longest = max(ways.values(), default=0.0)
     for state in phase.states:
         vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
         low, high = limits[state.name]
         width = 0.25 * (high - low) if np.isfinite(low) and np.isfinite(high) else np.inf
-        found[state.name] = min(width, max(share * ways[vector], 0.1 * state.nominal))
+        found[state.name] = min(width, max(share * max(ways[vector], 0.5 * longest), 0.1 * state.nominal))
     return found
 
 

@@ -43,12 +43,12 @@ def _of_inputs(trajectory: Trajectory) -> list[Switch]:
         if signal.pieces.kind != "ramps" or not (np.isfinite(low) or np.isfinite(high)):
             continue
         ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
-        side = _sides(ends, low, high)
+        side = sides(ends, low, high)
         found += _changes(signal.name, side, ends, (low, high), borders)
     return found
 
 
-def _sides(values: np.ndarray, low: float, high: float) -> np.ndarray:
+def sides(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """-1, 0 or 1: at the lower limit, between, at the upper limit."""
     width = high - low if np.isfinite(low) and np.isfinite(high) else max(np.max(np.abs(values)), 1e-9)
     side = np.zeros(values.shape, int)
@@ -107,7 +107,7 @@ def _of_limits(trajectory: Trajectory) -> list[Switch]:
     found = []
     for limit, row in zip(limits, rows, strict=True):
         width = range_of(limit, row)
-        side = _sides(row / width, limit.lower / width, limit.upper / width)
+        side = sides(row / width, limit.lower / width, limit.upper / width)
         for k in np.flatnonzero(np.diff(side)):
             share = 0.5 * (shares[k] + shares[k + 1])
             found.append(Switch(float(share), limit.name, SIDES[int(side[k])], SIDES[int(side[k + 1])]))

@@ -118,8 +118,13 @@ def share_of(phase: Phase, time: ca.SX) -> ca.SX:
     return (time - phase.start_time) / (phase.final_time - phase.start_time)
 
 
-def places_of_points(places: Places, free: np.ndarray, borders: Sequence[np.ndarray]) -> list[Place]:
-    """Where all points lie for these free numbers and borders of elements, by phase. Raises ModelError outside."""
+def places_of_points(
+    places: Places, free: np.ndarray, borders: Sequence[np.ndarray], inside_only: bool = True
+) -> list[Place]:
+    """Where all points lie for these free numbers and borders of elements, by phase.
+
+    Raises ModelError for points outside of the horizon; those that move stay at its end if not inside_only.
+    """
     problem, found = places.problem, []
     for number, (layout, here) in enumerate(zip(places.layouts, borders, strict=True)):
         for point in layout.phase.points:
@@ -129,7 +134,9 @@ def places_of_points(places: Places, free: np.ndarray, borders: Sequence[np.ndar
                 evaluate = ca.Function("share", [problem.numbers], [share_of(layout.phase, point.time)])
                 value, other = float(evaluate(free)), float(evaluate(1.37 * free + 0.11))  # any other values
                 fixed = abs(value - other) <= 1e-12
-            if not -1e-9 <= value <= 1 + 1e-9:
+            if not inside_only and not fixed:
+                value = min(max(value, 0.0), 1.0)
+            if not -1e-6 <= value <= 1 + 1e-6:
                 raise ModelError(
                     f"{problem.name}: at({point.time}, ...): lies outside of the horizon, at {value:.6g} of its length; "
                     "choose a time inside of it"
@@ -177,6 +184,10 @@ def _fixed(places: Places, layout: Layout, one: Place):
     element, place = np.array([one.element]), np.array([one.place])
     whole = places.gather(layout, element, place)
     here = ca.SX.sym("point", len(layout.tracks))
+    if layout.begin.size and one.element == 0 and one.place == 0.0:
+        nx, nz = len(layout.phase.states), layout.begin.size
+        exact = places.pick([np.arange(nz)], [layout.begin], [np.ones(nz)], nz)
+        whole = sparse.vstack([whole[:nx], exact, whole[nx + nz :]]).tocsr()
     share = layout.mesh.borders[one.element] + one.place * layout.mesh.widths[one.element]
     time = layout.phase.start_time + float(share) * (layout.phase.final_time - layout.phase.start_time)
     return here, here, whole[: len(layout.tracks)], time

@@ -5,13 +5,15 @@ its collocation points, an algebraic or a free input through the points, a const
 linear one through the ends of its group of elements. Nodes are places in the element, 0 to 1.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from gantrytau import ModelError
 from gantrytau_optimica.records import ControlProblem, Phase, Signal
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
@@ -52,7 +54,8 @@ class Layout:
 
     starts (n + 1, nx): states at the borders; with Radau points the last point of an element is the start of the
     next. tracks: of all signals in their order. chains: consecutive values of piecewise inputs, by number of the
-    signal. knots: the moving borders. moment: share of the horizon of every unknown from `first` on.
+    signal. knots: the moving borders. moment: share of the horizon of every unknown from `first` on. begin (nz,): algebraics
+    at the start, where conditions ask for them: polynomials through the points would be extrapolated there.
     """
 
     phase: Phase
@@ -65,6 +68,7 @@ class Layout:
     chains: dict[int, np.ndarray]
     owner: np.ndarray  # number of the signal of every unknown from `first` on, -1 for knots
     moment: np.ndarray
+    begin: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     @property
     def size(self) -> int:
@@ -213,12 +217,30 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
     for i, signal in enumerate(phase.inputs, nx + nz):
         if signal.pieces.kind == "free":
             continue
+        if mesh.moving and signal.pieces.kind == "linear" and signal.pieces.elements > 1:
+            raise ModelError(
+                f"controls {signal.name}: straight lines over several elements and lengths='free' do not go together; "
+                "take elements=1 or give the lengths"
+            )
         tracks[i], new = pieces_of(signal, mesh, first + owner.size)
         if signal.pieces.kind != "ramps":
             chains[i] = first + owner.size + np.arange(new.size)
         owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
+    begin = np.zeros(0, int)
+    if nz and _asked_at_the_start(phase):
+        begin = first + owner.size + np.arange(nz)
+        owner, moment = np.append(owner, nx + np.arange(nz)), np.append(moment, np.zeros(nz))
     ordered = tuple(tracks[i] for i in range(len(phase.signals)))
-    return Layout(phase, mesh, scheme, first, first + np.arange(m), starts, ordered, chains, owner, moment)
+    return Layout(
+        phase, mesh, scheme, first, first + np.arange(m), starts, ordered, chains, owner, moment, begin
+    )
+
+
+def _asked_at_the_start(phase: Phase) -> bool:
+    """Whether an algebraic stands in a value at the start."""
+    symbols = ca.vertcat(*(a.symbol for a in phase.algebraics))
+    asked = [p.expression for p in phase.points if isinstance(p.time, str) and p.time == "initial"]
+    return any(ca.depends_on(e, symbols) for e in asked)
 
 
 def pieces_of(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray]:

@@ -79,7 +79,7 @@ class Program:
         if not moved:
             return False
         borders = [layout.placed(w).borders for layout in self.places.layouts]
-        now = places_of_points(self.places, w[self.places.free], borders)
+        now = places_of_points(self.places, w[self.places.free], borders, inside_only=False)
         for old, new in zip(self.points, now, strict=True):
             here = borders[old.phase]
             left, right = here[old.element], here[old.element + 1]
@@ -89,6 +89,12 @@ class Program:
             ):  # fmt: skip
                 return True
         return False
+
+    def require_points(self, w: np.ndarray) -> None:
+        """ModelError if a point whose time moves lies outside of the horizon."""
+        if any(one.place is None for one in self.points):
+            borders = [layout.placed(w).borders for layout in self.places.layouts]
+            places_of_points(self.places, w[self.places.free], borders)
 
     def _share(self, one: Place, w: np.ndarray) -> float:
         if isinstance(one.point.time, str):
@@ -123,7 +129,7 @@ def transcribe(
         return shoot_steps(problem, meshes, scheme)
     places = lay_out(problem, tuple(meshes), scheme)
     free, borders = located or (np.array([n.guess for n in problem.free]), [m.borders for m in meshes])
-    where = places_of_points(places, free, borders)
+    where = places_of_points(places, free, borders, inside_only=located is None)
     groups: list[Rows] = []
     objective, blocks, linear = [], [], []
     paths = [
@@ -142,6 +148,8 @@ def transcribe(
     total = count + len(problem.boundary)
     for mine, layout, path in linear:
         blocks.append(_point_block(places, layout, path, mine.start, total))
+        if layout.begin.size:
+            blocks.append(_begin_block(places, layout, mine.begin, total))
         objective += _running_costs(places, layout)
     if problem.boundary:
         rows = np.arange(count, total)
@@ -168,6 +176,7 @@ class _PhaseRows:
     stop: int
     groups: list[Rows]
     linear: list[Sparse]
+    begin: int  # of the equations of algebraics at the start
 
 
 def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start: int) -> _PhaseRows:
@@ -196,6 +205,11 @@ def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start:
         )
     linear.append(jumps)
     stop += jumps.shape[0]
+    begin = stop
+    for name in phase.residual_names[: layout.begin.size]:
+        groups.append(Rows("algebraic", name, number, np.array([stop]), np.zeros(1), 0.0, 0.0))
+        stop += 1
+    linear.append(sparse.csr_matrix((stop - begin, places.size)))
     for signal, chain in layout.chains.items():
         step = phase.signals[signal].pieces.max_step
         if step is None or chain.size < 2:
@@ -225,7 +239,7 @@ def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start:
             low = layout.mesh.shortest * length - fixed
             groups.append(Rows("border", name, number, np.array([stop + i]), np.array([np.nan]), low, np.inf))
         stop += stretches.size
-    return _PhaseRows(start, stop, groups, linear)
+    return _PhaseRows(start, stop, groups, linear, begin)
 
 
 def _differences(places: Places, chain: np.ndarray) -> Sparse:
@@ -258,6 +272,17 @@ def _point_block(places: Places, layout: Layout, path: list[Limit], start: int, 
     index = np.arange(factor.size)
     scatter = sparse.csr_matrix((factor.ravel(), (start + index, index)), shape=(total, index.size))
     return run.block(values, element, place, scatter)
+
+
+def _begin_block(places: Places, layout: Layout, start: int, total: int) -> Block:
+    """The equations of the algebraics at the start of a phase."""
+    run, nx, nz = running(places, layout), len(layout.phase.states), layout.begin.size
+    rows = np.arange(nz)
+    scatter = sparse.csr_matrix((np.ones(nz), (start + rows, rows)), shape=(total, nz))
+    block = run.block(layout.phase.residuals, np.zeros(1, int), np.zeros(1), scatter)
+    exact = places.pick([rows], [layout.begin], [np.ones(nz)], nz)
+    gather = sparse.vstack([block.gather[:nx], exact, block.gather[nx + nz :]]).tocsr()
+    return replace(block, gather=gather)
 
 
 def _running_costs(places: Places, layout: Layout) -> list[Block]:
@@ -301,6 +326,10 @@ def _without_sums(problem: ControlProblem) -> ca.SX:
 
 def _sample_sums(places: Places, layout: Layout) -> list[Block]:
     problem, found = places.problem, []
+    if layout.phase.sums and layout.knots.size:
+        raise ModelError(
+            f"{problem.name}: lengths='free' and sums over samples do not go together; give the lengths of the elements"
+        )
     for one in layout.phase.sums:
         run = running(places, layout)
         weight = float(ca.jacobian(problem.objective, one.symbol))

@@ -17,7 +17,7 @@ inputs; use "radau" for those.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
@@ -96,8 +96,8 @@ class AlgebraicTrack(Track):
 class ShootingLayout(Layout):
     """The unknowns of a phase; `mesh` holds the steps. inside: states (n, 3, nx) of the stages within a step."""
 
-    inside: np.ndarray
-    algebraics: np.ndarray  # (n, 4, nz)
+    inside: np.ndarray = field(kw_only=True)
+    algebraics: np.ndarray = field(kw_only=True)  # (n, 4, nz)
 
     @property
     def stages(self) -> Layout:
@@ -239,7 +239,8 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Shooting, first: int) -> Shooting
         chains[i] = first + owner.size + np.arange(new.size)
         owner, moment = np.append(owner, np.full(new.size, i)), np.append(moment, new)
     return ShootingLayout(
-        phase, mesh, scheme, first, np.zeros(0, int), starts, tuple(tracks), chains, owner, moment, inside, algebraics
+        phase, mesh, scheme, first, np.zeros(0, int), starts, tuple(tracks), chains, owner, moment,
+        inside=inside, algebraics=algebraics,
     )  # fmt: skip
 
 
