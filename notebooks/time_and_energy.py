@@ -156,8 +156,8 @@ assert abs(fastest.final_time - 0.91313) < 1e-4  # s, the limit of ever finer me
 # %% [markdown]
 # ## Paths and speeds: Figure 3.9
 #
-# On the line one motor stands at its limit and two idle along. In a hurry the tool swings far out, and all three are at
-# their limits nearly all the time. With more weight on energy it comes back towards the line.
+# On the line one motor is at its limit and the other two have force to spare. In a hurry the tool swings far out, and all
+# three are at their limits most of the time. With more weight on energy it comes back towards the line.
 
 # %%
 
@@ -346,7 +346,7 @@ assert abs(slope.objective["weight"] / base.integral("square") - 1) < 1e-6  # d(
 # A solver finds the best motion around its first guess, here the straight line. With `starts` it begins from other
 # guesses, too, bent at random, and reports the branches. One limit is added, a speed of 8 m/s for the carts. Without it
 # a guess may end in a motion that drives cart 1 at more than 20 m/s right up to the pose in which its arm stands across the
-# guideway. That is singular: played back, such an answer misses B by a metre, whatever its time.
+# guideway. That is singular: played back, such an answer ends more than a metre from B.
 
 
 # %%
