@@ -72,6 +72,20 @@ def test_a_known_input(course, whole):
     assert "model.u" in optimum
 
 
+@pytest.mark.parametrize("scheme", ["gauss", "shooting"])
+@pytest.mark.parametrize(("course", "whole"), [(STEPS, 2.35), (LINES, 3.4)])
+def test_a_known_input_in_other_schemes(scheme, course, whole):
+    optimum = optimize(problem(Held, inputs={"model.u": course}), elements=20, scheme=scheme)
+    assert optimum.objective == pytest.approx((5 - whole) ** 2 / 2, abs=1e-7)
+
+
+def test_samples_longer_than_the_horizon():
+    # from -1 to 3.5 s: 2 at the start, 3 at 0.5 s, 1.5 at the end
+    longer = Samples([-1.0, 0.5, 3.5], [0.0, 3.0, 0.0])
+    optimum = optimize(problem(Held, inputs={"model.u": longer}), elements=20)
+    assert optimum.objective == pytest.approx((5 - 2.5 * 0.5 - 2.25 * 1.5) ** 2 / 2, abs=1e-7)
+
+
 def test_steps_of_a_known_input_become_borders():
     optimum = optimize(problem(Held, inputs={"model.u": STEPS}), elements=3)
     for jump in (0.7, 1.1):

@@ -41,7 +41,7 @@ SPEED = float(T @ Y / (T @ T))  # least squares through the origin
 LEAST = float(Y @ Y - SPEED * (T @ Y))
 
 
-@pytest.mark.parametrize("scheme", ["radau", "gauss"])
+@pytest.mark.parametrize("scheme", ["radau", "gauss", "shooting"])
 def test_a_line_through_samples_off_the_mesh(scheme):
     optimum = optimize(Thrown, elements=4, scheme=scheme)
     assert optimum["mass.v"][0] == pytest.approx(SPEED, abs=1e-7)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Array, Fixed, Input, Model, ModelError, Parameter, Real, der
+from gantrytau import Array, Fixed, Model, ModelError, Parameter, Real, der
 from gantrytau_optimica import Free, Optimization, at, final, initial, link, optimize
 from tests.optimica.problems import Mass
 
@@ -85,6 +85,21 @@ def test_phases_are_played_back(there_and_back):
 def test_a_playback_of_phases_has_no_common_result(there_and_back):
     with pytest.raises(ModelError, match="has phases"):
         _ = there_and_back.playback.result
+
+
+@pytest.mark.xfail(
+    strict=True, reason="Optimum.start_time and final_time go by the order in which phases are declared"
+)
+def test_phases_declared_in_another_order_than_they_happen():
+    class Reversed(Optimization):
+        back: Any = Leg()
+        out: Any = First()
+        objective = ThereAndBack.objective
+        constraints = ThereAndBack.constraints
+
+    optimum = optimize(Reversed, elements=6)
+    assert optimum.objective == pytest.approx(4.0, abs=1e-6)
+    assert (optimum.start_time, optimum.final_time) == pytest.approx((0.0, 4.0), abs=1e-6)
 
 
 def test_phases_refined_on_borders_that_do_not_fit():
@@ -289,117 +304,3 @@ def test_controls_and_guesses_of_a_phase():
     # two pieces are enough there; a continuous input cannot switch at once
     assert optimum["out.final_time"] == pytest.approx(2.0, abs=1e-6)
     assert 4.0 < optimum.final_time < 4.2
-
-
-def message(problem) -> str:
-    with pytest.raises(ModelError) as caught:
-        optimize(problem)
-    return str(caught.value)
-
-
-def changed(**members):
-    return type("Wrong", (ThereAndBack,), members)
-
-
-class Nested(First):
-    """A phase within a phase."""
-
-    inner = Leg()
-
-
-class Held(Model):
-    """A model that holds a phase."""
-
-    inner = Leg()
-
-
-class Outside(ThereAndBack):
-    """A variable that belongs to no phase."""
-
-    load = Real(unit="N", description="load")
-
-    def equations(self):
-        yield self.load == 1
-
-
-class Other(Leg):
-    """A phase with another model."""
-
-    mass = Ball()
-
-
-class Chosen(ThereAndBack):
-    """An input that belongs to no phase."""
-
-    hand = Input(unit="m", description="hand")
-
-
-NO_PHASE: Any = 3
-
-
-@pytest.mark.parametrize(
-    ("problem", "words"),
-    [
-        (
-            changed(out=Nested()),
-            "Wrong: the phase out.inner lies inside of out, expected phases as components",
-        ),
-        (
-            changed(held=Held()),
-            "Wrong: the phase held.inner lies inside of held, expected phases as components",
-        ),
-        (Outside, "Outside: load belongs to no phase, expected variables in phases only; declare it in one"),
-        (Chosen, "Chosen: hand belongs to no phase"),
-        (
-            changed(integrand=lambda self: self.out.mass.u**2),
-            "Wrong.integrand: found an integrand beside phases, expected none; write it in the phases",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.y"])]),
-            "back.mass.y",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.u"])]),
-            "Wrong: link, jump: back.mass.u is no state of the phase, expected one of back.mass.x, back.mass.v",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump="mass.v")]),
-            "link: found jump='mass.v', expected a list of names; write ['mass.v']",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out.mass, self.back)]),
-            "expected two phases: components that are Optimizations",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, NO_PHASE)]),
-            "link: found 3, expected two phases",
-        ),
-        (
-            changed(constraints=lambda self: [self.out.mass.x <= self.back.mass.x]),
-            "joins signals of several phases over their whole paths, expected values at one time",
-        ),
-        (
-            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.x) == 0]),
-            "joins out and back, expected variables of one phase",
-        ),
-        (
-            changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]),
-            "link(out, back) finds no out.mass.h, expected the same variables in both phases",
-        ),
-        (
-            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.z) == 0]),
-            "Mass has no 'z'",
-        ),
-    ],
-)
-def test_what_cannot_be_a_phase(problem, words):
-    assert words in message(problem)
-
-
-def test_a_link_of_the_problem_itself():
-    assert "link" in message(changed(constraints=lambda self: [link(self, self.back)]))
-
-
-def test_a_link_of_a_phase_of_another_problem():
-    other = ThereAndBack()
-    assert "link" in message(changed(constraints=lambda self: [link(self.out, other.back)]))
