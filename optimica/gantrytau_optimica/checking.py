@@ -1,5 +1,6 @@
 """What can be wrong with a problem that was read, found before anything is built."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
@@ -8,10 +9,10 @@ import casadi as ca
 
 from gantrytau import Dae, ModelError
 from gantrytau.symbols import split_derivative, time
-from gantrytau_optimica.optimization import Optimization, Point
+from gantrytau_optimica.optimization import Optimization, Point, Target
 
 if TYPE_CHECKING:
-    from gantrytau_optimica.reading import ReadProblem
+    from gantrytau_optimica.reading import Constraint, ReadProblem
 
 
 def static(dae: Dae) -> bool:
@@ -66,18 +67,22 @@ def _check_targets(read: "ReadProblem") -> "ReadProblem":
                 f"{read.name}.objective: {target.symbol} does not enter it as a sum times a number; add it, with a "
                 "weight that is a number, to what objective() returns"
             )
-        for constraint in read.constraints:
-            if ca.depends_on(
-                ca.vertcat(constraint.expression, constraint.lower, constraint.upper), target.symbol
-            ):
-                raise ModelError(
-                    f"{constraint.place}: {target.symbol} stands in a constraint, expected it in objective() only"
-                )
         if any(leaf.element_hash() in points for leaf in ca.symvar(target.expression)):
             raise ModelError(
                 f"{read.name}: {target.symbol} holds a value at a time, expected signals; name the variables themselves"
             )
     return read
+
+
+def check_constraints(constraints: Iterable["Constraint"], targets: Iterable[Target]) -> None:
+    """ModelError for a sum over samples in a constraint."""
+    for constraint in constraints:
+        whole = ca.vertcat(constraint.expression, constraint.lower, constraint.upper)
+        for target in targets:
+            if ca.depends_on(whole, target.symbol):
+                raise ModelError(
+                    f"{constraint.place}: {target.symbol} stands in a constraint, expected it in objective() only"
+                )
 
 
 def check_spelling(problem: type[Optimization]) -> None:

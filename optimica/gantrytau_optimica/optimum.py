@@ -99,13 +99,13 @@ class Optimum:
 
     @property
     def start_time(self) -> float:
-        """Start of the horizon in s; with phases, of the first."""
-        return next(iter(self.phases.values())).start_time
+        """Start of the horizon in s; with phases, the earliest."""
+        return min(phase.start_time for phase in self.phases.values())
 
     @property
     def final_time(self) -> float:
-        """End of the horizon in s; with phases, of the last."""
-        return list(self.phases.values())[-1].final_time
+        """End of the horizon in s; with phases, the latest."""
+        return max(phase.final_time for phase in self.phases.values())
 
     @property
     def time(self) -> np.ndarray:

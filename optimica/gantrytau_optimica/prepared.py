@@ -104,6 +104,8 @@ class Prepared:
         best = searched(solve, built, self.starts)
         if best.search is None:
             return solved_or_raise(best)
+        if coarse.assembled is program.assembled:
+            return solved_or_raise(best)
         near = Solver(program, replace(policy, near=True))
         found: list[Optimum] = []
         for branch in best.search.branches[:MOST_BRANCHES]:

@@ -17,7 +17,7 @@ from gantrytau.signals import read_signals
 from gantrytau.symbols import split_derivative, writing
 from gantrytau.translation import names, translate_flat
 from gantrytau.unit_checking import check_units
-from gantrytau_optimica.checking import check_objective, check_spelling, check_times
+from gantrytau_optimica.checking import check_constraints, check_objective, check_spelling, check_times
 from gantrytau_optimica.measurements import Samples
 from gantrytau_optimica.optimization import Free, Link, Optimization, Point, Target, initial, reading
 from gantrytau_optimica.problem_units import check_problem_units
@@ -128,6 +128,7 @@ def read_problem(
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
+    check_constraints(constraints, asked.targets)
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
     dae = translate_flat(flat, given=_given(stages, flat), find=mentioned)
     links = [_link(name, instance, phases, c) for c in found if isinstance(c, Link)]
