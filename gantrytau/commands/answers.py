@@ -9,6 +9,7 @@ import typer
 
 from gantrytau.commands.models import Chosen
 from gantrytau.commands.reporting import CommandError
+from gantrytau.errors import ModelError
 from gantrytau.symbols import split_derivative
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def selected(optimum: Any, names: tuple[str, ...]) -> "Result":
 def _values(optimum: Any, name: str) -> Any:
     try:
         return optimum[name]
-    except RuntimeError as error:  # CasADi's, of symbols without values
+    except ModelError as error:  # of derivatives that the problem does not hold
         raise CommandError(
             f"--plot {name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
         ) from error

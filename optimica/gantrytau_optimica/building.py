@@ -160,7 +160,7 @@ def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
 def _with_sizes(draft: ControlProblem) -> ControlProblem:
     bounds = {name: ends for phase in draft.phases for name, ends in signal_limits(phase, draft.name).items()}
     return _changed(
-        draft, lambda phase, signal: replace(signal, nominal=typical_size(signal, bounds[signal.name]))
+        draft, lambda phase, signal: replace(signal, nominal=typical_size(draft, signal, bounds[signal.name]))
     )
 
 

@@ -119,8 +119,14 @@ def with_targets(
                 continue
             measured = ca.SX.sym(f"samples of {one}"[:60])
             courses.append(_course(measured, samples, column))
+            deviations = samples.deviations[:, column]
+            if np.ptp(deviations) > 1e-12 * np.max(deviations):
+                raise ModelError(
+                    f"{read.name}: {target.symbol} has a deviation for every sample, expected one for each column in an "
+                    "integral; use sum_of_squares, or one deviation"
+                )
             weight = ca.jacobian(objective, target.symbol)
-            integrand += weight * ((one - measured) / float(np.mean(samples.deviations[:, column]))) ** 2
+            integrand += weight * ((one - measured) / float(deviations[0])) ** 2
     return replace(phase, sums=tuple(sums), courses=(*phase.courses, *courses), integrand=integrand)
 
 

@@ -308,13 +308,15 @@ class _Closed:
         return found
 
 
-def typical_size(signal: Signal, bounds: tuple[float, float]) -> float:
+def typical_size(problem: ControlProblem, signal: Signal, bounds: tuple[float, float]) -> float:
     """A typical magnitude: declared, else from limits, else from the guess."""
     if np.isfinite(signal.nominal):
         return signal.nominal
     finite = [abs(b) for b in bounds if np.isfinite(b) and b != 0.0]
     size = max(finite) if finite else float(np.max(np.abs(signal.guess(np.linspace(0.0, 1.0, 11)))))
-    return size if 1e-6 < size < 1e9 else 1.0
+    algebraic = {a.name for phase in problem.phases for a in phase.algebraics}
+    least = 1e-6 if signal.name in algebraic else 1e-14  # what rounding leaves of a zero is no size
+    return size if least < size < 1e15 else 1.0
 
 
 def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.interruption import on_interrupt
-from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.program import Program, first_guess
 
 WORDS = {
     "Solve_Succeeded": "solved",
@@ -39,6 +39,9 @@ NEAR = {
     "bound_frac": 1e-5,
     "slack_bound_push": 1e-5,
 }
+
+SLOPE = 1e-4  # of the objective by a scaled unknown: steepest slopes at the guess are scaled up to it
+MOST_SCALED = 1e4
 
 Progress = Callable[[int, float], None]  # iteration, objective
 
@@ -95,6 +98,7 @@ class Solver:
         }
         if policy.near:
             options["ipopt"] |= NEAR
+        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
 
@@ -165,6 +169,14 @@ def finite(program: Program, w: np.ndarray) -> bool:
     x, none, assembled = w / program.places.scale, ca.DM(0, 1), program.assembled
     parts = [*assembled.nlp(x, none), assembled.grad_f(x, none)[1], assembled.jac_g(x, none)[1]]
     return all(np.all(np.isfinite(np.array(part.nonzeros()))) for part in parts)
+
+
+def _objective_scale(program: Program) -> float:
+    """A factor for an objective whose slopes at the guess are so small that Ipopt would take any point for its optimum."""
+    x = first_guess(program) / program.places.scale
+    slopes = np.abs(np.array(program.assembled.grad_f(x, ca.DM(0, 1))[1].nonzeros()))
+    steepest = float(np.max(slopes[np.isfinite(slopes)], initial=0.0))
+    return min(SLOPE / steepest, MOST_SCALED) if 0.0 < steepest < SLOPE else 1.0
 
 
 class Watch(ca.Callback):

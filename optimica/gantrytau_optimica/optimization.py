@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau import Model, ModelError, Parameter
 from gantrytau_optimica.measurements import Samples
@@ -187,6 +188,10 @@ def final(expression: Any) -> ca.SX:
 
 def at(time: Any, expression: Any) -> ca.SX:
     """The value of an expression at any time in s, of the same shape; the time need not lie on the mesh."""
+    if not isinstance(time, (int, float, ca.SX, ca.DM, np.number)) or isinstance(time, bool):
+        raise ModelError(
+            f"at: found the time {time!r}, expected a number in s or an expression of free numbers"
+        )
     return _point(f"at({time})", expression, time)
 
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from gantrytau import ModelError, SolveError
 from gantrytau.translation import names
-from gantrytau_optimica.archive.run_record import write_record
+from gantrytau_optimica.archive.run_record import require_place, write_record
 from gantrytau_optimica.building import build
 from gantrytau_optimica.checking import one_point
 from gantrytau_optimica.controls import read_controls
 from gantrytau_optimica.ipopt import Policy, Progress, Solver
 from gantrytau_optimica.optimization import Optimization
 from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses
+from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses, solution_given
 from gantrytau_optimica.reading import ReadProblem, read_problem
 from gantrytau_optimica.records import Phase
 from gantrytau_optimica.refining.refinement import with_ramps
@@ -65,6 +65,8 @@ def optimize(
         elements=elements, points=points, scheme=scheme, lengths=lengths, guess=guess, controls=controls, refine=refine,
         starts=starts, tolerance=tolerance, max_iterations=max_iterations, max_time=max_time,
     )  # fmt: skip
+    if record is not None:
+        require_place(record)
     begun, clock = datetime.now(UTC), time.perf_counter()
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     read_time = time.perf_counter() - clock
@@ -108,25 +110,29 @@ def prepare(
         raise ModelError("refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'")
     grid = collocation("radau" if shooting else scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
-    if points == 1 and refine is not None:
+    wanted = controls.values() if isinstance(controls, Mapping) else ()
+    ramps = refine is not None or any(one in ("ramps", {"kind": "ramps"}) for one in wanted)
+    if points == 1 and ramps:
         raise ModelError(
-            "refine with points=1: inputs are straight lines there, expected at least 2 points per element"
+            "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points"
         )
     read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
     begin = time.perf_counter()
-    guess = read_guesses(guess, read)
+    near, guess = solution_given(guess), read_guesses(guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
     built = build(read, guess, held, read_controls(read, controls or {}))
     if one_point(read):
         grid, mesh, shooting, refine = collocation("radau", 1), mesh_of(1), False, None
     meshes = [_with_jumps(mesh, phase) for phase in built.problem.phases]
-    if refine is not None:
+    if refine is not None or (
+        mesh.moving and points > 1
+    ):  # free borders would be moved to where limits are passed
         built = replace(built, problem=with_ramps(built.problem, meshes))
     program = shoot(built.problem, meshes, points) if shooting else transcribe(built.problem, meshes, grid)
     check_freedom(program)
     policy = Policy(tolerance, max_iterations, max_time, progress)
     return Prepared(
-        built, program, Solver(program, policy), guess, time.perf_counter() - begin, refine, starts
+        built, program, Solver(program, policy), guess, time.perf_counter() - begin, refine, starts, near
     )
 
 

@@ -178,7 +178,8 @@ class Optimum:
 
     def final(self, name: str) -> Any:
         """The value at the end of the horizon."""
-        return self[name][-1]
+        value = self[name]
+        return value if name in self.free else value[-1]
 
     def integral(self, name: str) -> float:
         """The integral of a variable over its phase, by the quadrature of the collocation, in its unit times s."""

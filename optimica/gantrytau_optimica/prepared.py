@@ -9,27 +9,28 @@ import numpy as np
 from gantrytau import ModelError, Result, SolveError
 from gantrytau_optimica.archive.saved import SavedOptimum
 from gantrytau_optimica.building import Built, with_guesses
-from gantrytau_optimica.failures.meaning import first_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.guesses import guess_of, number_guess
 from gantrytau_optimica.ipopt import Solver
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.reading import ReadProblem
-from gantrytau_optimica.records import ControlProblem, FreeNumber, Phase, Signal
+from gantrytau_optimica.records import ControlProblem, FreeNumber, Limit, Phase, Signal
 from gantrytau_optimica.refining.carrying import carried
-from gantrytau_optimica.refining.refinement import refined, with_ramps
+from gantrytau_optimica.refining.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.refining.starts import searched
+from gantrytau_optimica.transcription.blocks import places_of_points, share_of
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.program import Program, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 FEW = 30  # elements, from which on first guesses are tried on half as many
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
-ROUNDS = 5  # of solving again with points at moving times read from other elements
+ROUNDS = 6  # of solving again with points at moving times read from other elements
 
+UNSETTLED = "not settled: values at moving times leave the elements that they are read from"
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
     "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
@@ -50,6 +51,7 @@ class Prepared:
     build_time: float
     refine: float | None = None
     starts: int = 1
+    near: bool = False  # whether the guess is a solution
 
     def __repr__(self) -> str:
         size, rows = self.program.places.size, self.program.assembled.rows
@@ -77,18 +79,26 @@ class Prepared:
         first = first_guess(program)
         if isinstance(guess, Optimum) and guess.program.assembled is self.program.assembled:
             first = guess.solution.w
-        optimum = self._best(built, program, first)
+        optimum = self._best(built, program, first, self.near if guess is None else solution_given(guess))
         if self.refine is None:
             return optimum
         policy = self.solver.policy
         again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
-        return refined(optimum, self.refine, lambda p, w: self._solved(optimum.built, p, Solver(p, again), w))
 
-    def _best(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
+        def solve(program: Program, first: np.ndarray) -> Optimum:
+            """From nearby first, where it stays on its branch."""
+            found = self._solved(optimum.built, program, Solver(program, replace(again, near=True)), first)
+            if found.success or found.status in ("interrupted", "time limit reached"):
+                return found
+            return self._solved(optimum.built, program, Solver(program, again), first)
+
+        return refined(optimum, self.refine, solve)
+
+    def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
 
         if self.starts == 1:
-            return solved_or_raise(self._solved(built, program, self.solver, first))
+            return solved_or_raise(self._alone(built, program, first, near))
         policy = self.solver.policy
         coarse = self._coarse(built)
         solver = Solver(coarse, replace(policy, max_iterations=min(policy.max_iterations, MOST_TRIED)))
@@ -117,6 +127,29 @@ class Prepared:
         optimum = min((o for o in found if o.success), key=lambda o: o.objective, default=found[0])
         return solved_or_raise(replace(optimum, search=best.search))
 
+    def _alone(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
+        """From one first guess, on its branch if it is a solution; with ramps, over the answer without if need be."""
+        if near:
+            policy = self.solver.policy
+            most = min(policy.max_iterations, MOST_AGAIN)
+            nearby = Solver(program, replace(policy, near=True, max_iterations=most))
+            optimum = self._solved(built, program, nearby, first)
+            if optimum.success or optimum.status == "interrupted":
+                return optimum
+        optimum = self._solved(built, program, self.solver, first)
+        if optimum.success or self.refine is None or optimum.status in ("interrupted", "time limit reached"):
+            return optimum
+        layouts = program.places.layouts
+        plain = transcribe(
+            without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
+        )
+        solver = Solver(plain, self.solver.policy)
+        free = self._solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
+        if not free.success:
+            return optimum
+        again = self._solved(built, program, self.solver, carried(list(free.phases.values()), program))
+        return again if again.success else optimum
+
     def _coarse(self, built: Built) -> Program:
         """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,
         and the search is lost less often.
@@ -133,13 +166,16 @@ class Prepared:
     def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends from a first guess of the unknowns of a program."""
         solution = solver.solve(program, first)
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS):
             if not solution.success or not program.astray(solution.w):
                 break
-            program = _relocated(program, solution.w)
+            program = _relocated(program, solution.w, confined=number == ROUNDS - 1)
+            built = replace(built, problem=program.problem)
             solution = Solver(program, solver.policy).solve(program, solution.w)
         if solution.success:
             program.require_points(solution.w)
+            if program.astray(solution.w):
+                solution = replace(solution, success=False, status=UNSETTLED)
         return Optimum(built.read.name, built, program, solution, self.build_time)
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
@@ -189,12 +225,30 @@ def solved_or_raise(optimum: Optimum) -> Optimum:
     raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
 
 
-def _relocated(program: Program, w: np.ndarray) -> Program:
-    """The program with the points at moving times read from the elements in which they now lie."""
+def _relocated(program: Program, w: np.ndarray, confined: bool) -> Program:
+    """The program with the points at moving times read from the elements in which they now lie; confined: kept there."""
     layouts = program.places.layouts
     borders = [layout.placed(w).borders for layout in layouts]
+    problem = program.problem
+    if confined and not any(layout.knots.size for layout in layouts):
+        now = places_of_points(program.places, w[program.places.free], borders, inside_only=False)
+        rows = [
+            Limit(
+                share_of(problem.phases[one.phase], one.point.time),
+                *borders[one.phase][one.element : one.element + 2].tolist(),
+                f"the time of {one.point.symbol} stays within its element",
+            )
+            for one in now
+            if one.place is None and not isinstance(one.point.time, str)
+        ]
+        problem = replace(problem, boundary=(*problem.boundary, *rows))
     located = (w[program.places.free], borders)
-    return transcribe(program.problem, [layout.mesh for layout in layouts], layouts[0].scheme, located)
+    return transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme, located)
+
+
+def solution_given(guess: Any) -> bool:
+    """Whether a guess is an optimum, on whose branch the search should stay."""
+    return isinstance(guess, (Optimum, SavedOptimum))
 
 
 def read_guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:

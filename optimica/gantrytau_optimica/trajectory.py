@@ -20,6 +20,10 @@ class Trajectory:
     w: np.ndarray
     numbers: np.ndarray  # free and held, in the order of the problem
 
+    def __repr__(self) -> str:
+        name = self.phase.name or self.problem.name
+        return f"<Trajectory of {name}: {self.start_time:g} to {self.final_time:g} s, {self.time.size} times>"
+
     @property
     def phase(self) -> Phase:
         """The phase in states, algebraics and inputs."""

@@ -6,4 +6,8 @@ from tests.benchmarks import answers, engine, growth, mechanisms, motion
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
-    sys.exit(print_table("Benchmarks", (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows(), answers.rows())))
+    sys.exit(
+        print_table(
+            "Benchmarks", (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows(), answers.rows())
+        )
+    )

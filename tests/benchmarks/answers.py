@@ -18,8 +18,12 @@ def rows() -> Iterator[Row]:
     free, line, _ = motion_problems()
     begin = time.perf_counter()
     straight = optimize(line, refine=1e-6)
-    yield at_most("GT-A straight line refined, |T - 0.973782 s|", abs(straight.final_time - EXACT_LINE), 1e-6, "s")
-    yield at_most("GT-A straight line refined, limits passed, of their range", straight.playback.violation, 1e-6)
+    yield at_most(
+        "GT-A straight line refined, |T - 0.973782 s|", abs(straight.final_time - EXACT_LINE), 1e-6, "s"
+    )
+    yield at_most(
+        "GT-A straight line refined, limits passed, of their range", straight.playback.violation, 1e-6
+    )
     yield shown("GT-A straight line refined, time", f"{time.perf_counter() - begin:.1f} s")
     begin = time.perf_counter()
     moved = optimize(free, refine=2e-6)
@@ -28,8 +32,12 @@ def rows() -> Iterator[Row]:
     yield at_most("GT-A free path played back, end missed", 1e6 * _missed(moved), 10.0, "um")
     begin = time.perf_counter()
     best = optimize(free, starts=8)
-    yield at_most("GT-A best of 8 first guesses, T over that of the known branch", best.final_time / KNOWN_FREE, 0.95)
-    yield shown("GT-A best of 8 first guesses", f"{best.final_time:.5f} s in {time.perf_counter() - begin:.0f} s")
+    yield at_most(
+        "GT-A best of 8 first guesses, T over that of the known branch", best.final_time / KNOWN_FREE, 0.95
+    )
+    yield shown(
+        "GT-A best of 8 first guesses", f"{best.final_time:.5f} s in {time.perf_counter() - begin:.0f} s"
+    )
 
 
 def _missed(optimum: Optimum) -> float:

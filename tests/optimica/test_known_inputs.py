@@ -95,10 +95,6 @@ def test_steps_of_a_known_input_become_borders():
     np.testing.assert_allclose(optimum.signal("model.twice")(inside), [2.0, 6.0, 6.0, 1.0])
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="Trajectory.at reads a course after its jump where a point lies on the border before it",
-)
 def test_the_integral_of_a_known_input_with_steps():
     optimum = optimize(problem(Held, inputs={"model.u": STEPS}), elements=3)
     whole = 0.7 + 1.2 + 0.45

@@ -109,9 +109,6 @@ def test_two_sensors_of_one_signal():
     assert optimize(TwoSensors, elements=3)["mass.v"][0] == pytest.approx(two_sensors(), abs=1e-7)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="playback._at_points tells sums by their name, which both sensors share"
-)
 def test_two_sensors_of_one_signal_are_played_back():
     optimum = optimize(TwoSensors, elements=3)
     assert optimum.playback.objective == pytest.approx(optimum.objective, rel=1e-7)
@@ -254,12 +251,9 @@ def objective(function):
             objective(lambda p: sum_of_squares(final(p.mass.x), p.samples)),
             "which has its time already; name the variable itself",
         ),
-        pytest.param(
+        (
             problem(constraints=lambda p: [sum_of_squares(p.mass.x, p.samples) <= 1]),
             "Problem, constraint 1: sum_of_squares(mass.x)",
-            marks=pytest.mark.xfail(
-                strict=True, reason="check_problem_units meets the symbol first: RuntimeError of CasADi"
-            ),
         ),
         (
             objective(lambda p: integral_of_squares(p.mass.x, p.samples)),

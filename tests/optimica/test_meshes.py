@@ -160,7 +160,6 @@ def test_an_expression_of_free_numbers_as_time():
 ROUNDING = "blocks.places_of_points refuses a time by 1e-9, Ipopt keeps a bound to 1e-8 only: a time at the end of its range"
 
 
-@pytest.mark.xfail(strict=True, reason=ROUNDING)
 def test_a_free_time_may_end_at_the_end():
     class Farthest(Optimization):
         """At 1 m/s the way grows until the end: the best time to look is 2 s, its limit."""
@@ -175,9 +174,6 @@ def test_a_free_time_may_end_at_the_end():
     assert optimize(Farthest, elements=5).objective == pytest.approx(-2.0, abs=1e-6)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a time that left its element is refused at its limit instead of being looked up anew"
-)
 def test_a_free_time_of_passing_far_from_its_guess():
     exact = zero(lambda t: 3 * t**2 - 2 * t**3 - 0.3, 0.0, 1.0)
     assert optimize(Passing, elements=7, guess={"when": 0.9})["when"] == pytest.approx(exact, abs=1e-7)

@@ -87,9 +87,6 @@ def test_a_playback_of_phases_has_no_common_result(there_and_back):
         _ = there_and_back.playback.result
 
 
-@pytest.mark.xfail(
-    strict=True, reason="Optimum.start_time and final_time go by the order in which phases are declared"
-)
 def test_phases_declared_in_another_order_than_they_happen():
     class Reversed(Optimization):
         back: Any = Leg()

@@ -312,10 +312,6 @@ def test_a_failed_solve_is_not_played_back_in_its_report():
     assert "Played back" not in str(caught.value)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="reporting._objective_free asks for the slope where all unknowns are equal: differences vanish",
-)
 def test_an_objective_of_a_difference_depends_on_what_is_free():
     class Matched(Optimization):
         mass = Mass(x=Fixed(0.0), v=Fixed(0.0), u=1.0)

@@ -135,18 +135,11 @@ class AroundByCoordinates(Around):
         yield (self.point.x - self.meter) ** 2 + (self.point.y - self.height) ** 2 >= self.radius**2
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="starts._extents: a coordinate that ends where it began is hardly bent alone",
-)
 def test_the_search_does_not_depend_on_how_coordinates_are_named():
     branches = optimize(AroundByCoordinates, elements=20, starts=10).search.branches
     assert len(branches) == 2
 
 
-@pytest.mark.xfail(
-    strict=True, reason="starts._drawn: a free number keeps its sign and comes no farther than exp(1/2)"
-)
 def test_several_minima_of_a_static_problem():
     class Waves(Optimization):
         """x^4 - 8 x^2 + x has minima near -2.03 and 1.97."""
@@ -194,10 +187,6 @@ def test_a_search_in_phases():
     assert sum(b.count for b in optimum.search.branches) + optimum.search.failures == 4
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="carrying.carried takes moving borders from the guess: the best branch is lost on the way",
-)
 def test_the_answer_is_no_worse_than_its_best_branch():
     optimum = optimize(FastestMass, elements=6, lengths="free", starts=3)
     assert optimum.objective <= optimum.search.branches[0].objective + 1e-6
@@ -206,7 +195,6 @@ def test_the_answer_is_no_worse_than_its_best_branch():
 COARSE = "prepared._coarse halves the elements but not the groups of elements that make a piece"
 
 
-@pytest.mark.xfail(strict=True, reason=COARSE)
 def test_branches_keep_the_pieces_of_the_caller():
     # eight pieces in either case; 40 elements carry them exactly, and so do 20
     controls = {"mass.u": dict(kind="constant", elements=5)}
@@ -215,7 +203,6 @@ def test_branches_keep_the_pieces_of_the_caller():
     assert optimum.search.branches[0].objective == pytest.approx(optimum.objective, abs=1e-8)
 
 
-@pytest.mark.xfail(strict=True, raises=SolveError, reason=COARSE)
 def test_a_limit_on_steps_is_that_of_the_mesh_asked_for():
     # steps of 12 / 40 are needed; pieces of twice the length would need twice as much
     controls = {"mass.u": dict(kind="constant", max_step=0.35)}

@@ -87,6 +87,23 @@ def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[s
     return path
 
 
+def require_place(path: Any) -> None:
+    """ModelError for a place to which no record can be written; a name that ends in "/" becomes a folder."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ModelError(f"record={path!r}: expected a folder or the name of a .json file")
+    place = Path(path)
+    if str(path).endswith(("/", os.sep)):
+        place.mkdir(parents=True, exist_ok=True)
+    if place.is_dir():
+        return
+    if place.suffix.lower() != ".json":
+        raise ModelError(
+            f"record={path}: found neither a folder nor a name that ends in .json, expected one of them"
+        )
+    if not place.parent.is_dir():
+        raise ModelError(f"record={path}: there is no folder {place.parent}; make it first")
+
+
 def compare_records(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
     """What differs between two records, line by line: where, the first value and the second; "" if nothing does.
 

@@ -7,9 +7,9 @@ span of the rows before it says nothing new, or cannot be: it follows from them 
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.failures.meaning import MEANING, first_guess
+from gantrytau_optimica.failures.meaning import MEANING
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.program import Program, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
 
 COARSE = 4  # elements on which dependence is looked for; it does not change with their number
 MOST = 3000  # unknowns up to which dense matrices are quick

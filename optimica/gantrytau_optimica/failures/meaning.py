@@ -119,16 +119,3 @@ def row_sizes(program: Program, w: np.ndarray) -> np.ndarray:
     found = np.zeros(program.assembled.rows)
     np.maximum.at(found, row, np.where(np.isfinite(value), value, 0.0))
     return np.where(found > 1e-9, found, 1.0)
-
-
-def first_guess(program: Program) -> np.ndarray:
-    """The guess as unknowns of the program, inside of their bounds."""
-    places, problem = program.places, program.problem
-    w = np.zeros(places.size)
-    w[places.free] = [number.guess for number in problem.free]
-    for layout, phase in zip(places.layouts, problem.phases, strict=True):
-        w[layout.knots] = layout.mesh.borders[list(layout.mesh.moving)]
-        for number, signal in enumerate(phase.signals):
-            mine = layout.of(number)
-            w[mine] = signal.guess(layout.moment[mine - layout.first])
-    return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)

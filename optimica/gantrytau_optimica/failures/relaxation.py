@@ -9,11 +9,11 @@ import numpy as np
 
 from gantrytau_optimica.building import Built
 from gantrytau_optimica.failures.elastic import Elastic, Soft, soft_conditions
-from gantrytau_optimica.failures.meaning import Meanings, first_guess, intervals
+from gantrytau_optimica.failures.meaning import Meanings, intervals
 from gantrytau_optimica.ipopt import WORDS, Solution
 from gantrytau_optimica.records import FreeNumber
 from gantrytau_optimica.trajectory import Trajectory
-from gantrytau_optimica.transcription.program import Program, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
 
 SMALL = 1e-6  # of its size: what gives way by less holds
 SINGLE = 4  # conditions that are tried alone

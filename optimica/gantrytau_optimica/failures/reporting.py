@@ -9,11 +9,11 @@ import numpy as np
 
 from gantrytau_optimica.building import Built
 from gantrytau_optimica.failures.dependence import dependent_conditions
-from gantrytau_optimica.failures.meaning import Meanings, first_guess, intervals, row_sizes, signal_words
+from gantrytau_optimica.failures.meaning import Meanings, intervals, row_sizes, signal_words
 from gantrytau_optimica.failures.nonfinite import not_finite
 from gantrytau_optimica.ipopt import FAR, NOT_BEGUN, WORDS, Solution
 from gantrytau_optimica.trajectory import Trajectory
-from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.program import Program, first_guess
 
 ORDER = ("boundary", "path", "step", "border", "continuity", "algebraic", "dynamics")
 MET = 1e-6  # of its size: what is violated by less is met

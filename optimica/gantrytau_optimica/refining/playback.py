@@ -113,6 +113,12 @@ class Playback:
         )
         return lines
 
+    def __repr__(self) -> str:
+        return (
+            f"<Playback of {self.optimum.name}: limits passed by {self.violation:.2g} of their range, conditions missed by "
+            f"{self.defect:.2g}>"
+        )
+
     def __str__(self) -> str:
         return "\n".join(["Played back:", *(f"  {line}" for line in self.lines())])
 

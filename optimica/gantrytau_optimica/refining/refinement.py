@@ -16,6 +16,7 @@ from gantrytau_optimica.transcription.program import transcribe
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
+REPLAYED = 1e-7  # relative: what tolerances of solver and integration leave in an objective played back
 SMALL = (
     30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
 )
@@ -30,6 +31,7 @@ class Round:
     violation: float
     defect: float
     iterations: int
+    error: float  # of the objective as played back
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ class Refinement:
     rounds: tuple[Round, ...]
     switches: tuple[Switch, ...]
     reached: bool
+
+    def __repr__(self) -> str:
+        return f"<{self}>"
 
     def __str__(self) -> str:
         first, last = self.rounds[0], self.rounds[-1]
@@ -69,6 +74,16 @@ def with_ramps(problem: ControlProblem, meshes: Sequence[Mesh]) -> ControlProble
 
     phases = (changed(phase, mesh) for phase, mesh in zip(problem.phases, meshes, strict=True))
     return replace(problem, phases=tuple(phases))
+
+
+def without_ramps(problem: ControlProblem) -> ControlProblem:
+    """The problem with inputs that are free at every point instead of ramps."""
+
+    def changed(phase: Phase) -> Phase:
+        inputs = (replace(s, pieces=Pieces()) if s.pieces.kind == "ramps" else s for s in phase.inputs)
+        return replace(phase, inputs=tuple(inputs))
+
+    return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
 
 
 def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum]) -> Optimum:
@@ -131,7 +146,9 @@ def _round(optimum: Optimum) -> Round:
     defect = max((abs(d.amount) / d.size for d in played.defects), default=0.0)
     if not played.complete:
         defect = np.inf
-    return Round(elements, optimum.objective, played.violation, defect, optimum.iterations)
+    return Round(
+        elements, optimum.objective, played.violation, defect, optimum.iterations, played.objective_error
+    )
 
 
 def _holds(rounds: list[Round], accuracy: float) -> bool:
@@ -139,7 +156,9 @@ def _holds(rounds: list[Round], accuracy: float) -> bool:
     last = rounds[-1]
     if len(rounds) < 2 or max(last.violation, last.defect) > accuracy:
         return False
-    return abs(last.objective - rounds[-2].objective) <= accuracy * max(abs(last.objective), 1e-6)
+    size = max(abs(last.objective), 1e-6)
+    unmoved = abs(last.objective - rounds[-2].objective) <= accuracy * size
+    return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * size
 
 
 def _movable(phase: Phase) -> bool:

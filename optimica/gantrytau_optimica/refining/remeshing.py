@@ -33,7 +33,8 @@ def better_mesh(
     knots = _apart(np.array([s.share for s in changes]))
     parts = _parts(played, accuracy)
     if roughness:
-        parts = np.maximum(parts, np.where(_rough(trajectory) > ROUGH * np.sqrt(accuracy), 2, 1))
+        rough = _rough(trajectory) > ROUGH * np.sqrt(accuracy)
+        parts = np.maximum(parts, np.where(rough | _at_junctions(trajectory), 2, 1))
     every = _with_knots(borders, parts, knots)
     same = every.size == borders.size and np.allclose(every, borders, atol=1e-9)
     if same and trajectory.mesh.elements < PROVEN:  # only a finer mesh shows that this one was fine enough
@@ -51,6 +52,15 @@ def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np
         near = max(LEAST, NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2]))
         kept = kept[np.abs(kept - knot) > near]
     return np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
+
+
+def _at_junctions(trajectory: Trajectory) -> np.ndarray:
+    """Elements at a limit beside one that is not, or at an end of the horizon: the input may leave it inside, (n,)."""
+    free = _open(trajectory)
+    if not np.any(free) and trajectory.mesh.elements > 2:
+        return np.zeros(free.size, bool)
+    beside = np.append(free[1:], True) | np.insert(free[:-1], 0, True)
+    return ~free & beside & (trajectory.mesh.widths > 4 * LEAST)
 
 
 def _open(trajectory: Trajectory) -> np.ndarray:

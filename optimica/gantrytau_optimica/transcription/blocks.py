@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import Phase, PointValue
+from gantrytau_optimica.records import ControlProblem, Phase, PointValue
 from gantrytau_optimica.transcription.assembly import Block
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -118,6 +118,17 @@ def share_of(phase: Phase, time: ca.SX) -> ca.SX:
     return (time - phase.start_time) / (phase.final_time - phase.start_time)
 
 
+def fixed_share(problem: ControlProblem, phase: Phase, time: ca.SX, free: np.ndarray) -> tuple[float, bool]:
+    """A time as share of the horizon for these free numbers, and whether it is the same for all others."""
+    evaluate = ca.Function("share", [problem.numbers], [share_of(phase, time)])
+    value = float(evaluate(free))
+    random = np.random.default_rng(1)
+    others = (
+        free * random.uniform(0.5, 1.5, free.size) + random.uniform(0.1, 0.9, free.size) for _ in range(3)
+    )
+    return value, all(abs(float(evaluate(other)) - value) <= 1e-12 for other in others)
+
+
 def places_of_points(
     places: Places, free: np.ndarray, borders: Sequence[np.ndarray], inside_only: bool = True
 ) -> list[Place]:
@@ -131,9 +142,7 @@ def places_of_points(
             if isinstance(point.time, str):
                 value, fixed = float(point.time == "final"), True
             else:
-                evaluate = ca.Function("share", [problem.numbers], [share_of(layout.phase, point.time)])
-                value, other = float(evaluate(free)), float(evaluate(1.37 * free + 0.11))  # any other values
-                fixed = abs(value - other) <= 1e-12
+                value, fixed = fixed_share(problem, layout.phase, point.time, free)
             if not inside_only and not fixed:
                 value = min(max(value, 0.0), 1.0)
             if not -1e-6 <= value <= 1 + 1e-6:
@@ -170,12 +179,32 @@ def single_block(
         if ca.depends_on(value, problem.time):
             value = ca.substitute(value, problem.time, time)
         old.append(one.point.symbol)
+        value = _with_courses(places, layout, one, value)
         new.append(ca.substitute(value, signals(layout.phase), here))
     if old:
         column = ca.substitute(column, ca.vertcat(*old), ca.vertcat(*new))
     matrix = sparse.vstack(gather).tocsr()
     return Block(
         ca.vertcat(*local), ca.SX(0, 1), ca.SX(0, 1), ca.densify(column), np.zeros((0, 1)), matrix, scatter
+    )
+
+
+def _with_courses(places: Places, layout: Layout, one: Place, value: ca.SX) -> ca.SX:
+    """The expression with inputs known by samples as numbers."""
+    wanted = [c for c in layout.phase.courses if ca.depends_on(value, c.symbol)]
+    if not wanted:
+        return value
+    phase = layout.phase
+    if one.place is None or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
+        raise ModelError(
+            f"{places.problem.name}: {wanted[0].name} is known by samples, which needs fixed times; give start_time and "
+            "final_time as numbers, or the course as a function of time"
+        )
+    borders = layout.mesh.borders[one.element : one.element + 2]
+    share = borders[0] + one.place * (borders[1] - borders[0])
+    time = np.array([float(phase.start_time) + share * (float(phase.final_time) - float(phase.start_time))])
+    return ca.substitute(
+        value, ca.vertcat(*(c.symbol for c in wanted)), ca.DM([float(c.value(time)[0]) for c in wanted])
     )
 
 

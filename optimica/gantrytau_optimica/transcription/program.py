@@ -24,15 +24,21 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import ControlProblem, Limit
+from gantrytau_optimica.records import ControlProblem, Limit, Phase
 from gantrytau_optimica.sorting import bare_limit, signal_limits
 from gantrytau_optimica.transcription.assembly import Assembled, Block, assemble
-from gantrytau_optimica.transcription.blocks import Place, places_of_points, running, single_block
+from gantrytau_optimica.transcription.blocks import (
+    Place,
+    fixed_share,
+    places_of_points,
+    running,
+    single_block,
+)
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
 
-FEW = 1e-9  # of an element, by which a moving point may stand outside of it
+FEW = 1e-5  # of an element, by which a moving point may stand outside of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,6 +341,10 @@ def _sample_sums(places: Places, layout: Layout) -> list[Block]:
         weight = float(ca.jacobian(problem.objective, one.symbol))
         start, final = float(layout.phase.start_time), float(layout.phase.final_time)
         element, place = layout.mesh.locate((one.times - start) / (final - start))
+        after = (place > 1 - 1e-9) & (
+            element < layout.mesh.elements - 1
+        )  # at a jump what holds from then on counts
+        element, place = np.where(after, element + 1, element), np.where(after, 0.0, place)
         value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
         error = ((one.expression - value) / deviation) ** 2
         weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
@@ -353,6 +363,36 @@ def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:
     for place, number in zip(places.free, places.problem.free, strict=True):
         lower[place], upper[place] = number.min, number.max
     return lower / places.scale, upper / places.scale
+
+
+def first_guess(program: Program) -> np.ndarray:
+    """The guess as unknowns of the program, inside of their bounds."""
+    places, problem = program.places, program.problem
+    w = np.zeros(places.size)
+    w[places.free] = [number.guess for number in problem.free]
+    for layout, phase in zip(places.layouts, problem.phases, strict=True):
+        w[layout.knots] = layout.mesh.borders[list(layout.mesh.moving)]
+        for number, signal in enumerate(phase.signals):
+            mine = layout.of(number)
+            w[mine] = signal.guess(layout.moment[mine - layout.first])
+    return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)
+
+
+MOST_ASKED = 200  # times at which values are asked for and that become borders
+
+
+def asked_shares(phase: Phase, problem: ControlProblem) -> np.ndarray:
+    """Shares of the horizon at which values are asked for, where they are fixed: motions may have kinks there."""
+    found = [np.zeros(0)]
+    for point in phase.points:
+        if not isinstance(point.time, str):
+            share, fixed = fixed_share(problem, phase, point.time, np.array([n.guess for n in problem.free]))
+            found += [np.array([share])] if fixed else []
+    if phase.sums and phase.start_time.is_constant() and phase.final_time.is_constant():
+        start, final = float(phase.start_time), float(phase.final_time)
+        found += [(np.unique(np.concatenate([s.times for s in phase.sums])) - start) / (final - start)]
+    shares = np.unique(np.concatenate(found))
+    return shares[(shares > 0) & (shares < 1)] if shares.size <= MOST_ASKED else np.zeros(0)
 
 
 def check_freedom(program: Program) -> None:
