@@ -116,11 +116,11 @@ class Prepared:
             return solved_or_raise(best)
         if coarse.assembled is program.assembled:
             return solved_or_raise(best)
-        near = Solver(program, replace(policy, near=True))
+        close = Solver(program, replace(policy, near=True))
         found: list[Optimum] = []
         for branch in best.search.branches[:MOST_BRANCHES]:
             nearby = carried(list(branch.optimum.phases.values()), program)
-            for solver in (near, self.solver):
+            for solver in (close, self.solver):
                 found.append(self._solved(built, program, solver, nearby))
                 if found[-1].success or found[-1].status == "interrupted":
                     break
@@ -235,7 +235,8 @@ def _relocated(program: Program, w: np.ndarray, confined: bool) -> Program:
         rows = [
             Limit(
                 share_of(problem.phases[one.phase], one.point.time),
-                *borders[one.phase][one.element : one.element + 2].tolist(),
+                float(borders[one.phase][one.element]),
+                float(borders[one.phase][one.element + 1]),
                 f"the time of {one.point.symbol} stays within its element",
             )
             for one in now
