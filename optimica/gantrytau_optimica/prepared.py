@@ -120,8 +120,8 @@ class Prepared:
         found: list[Optimum] = []
         for branch in best.search.branches[:MOST_BRANCHES]:
             nearby = carried(list(branch.optimum.phases.values()), program)
-            for solver in (close, self.solver):
-                found.append(self._solved(built, program, solver, nearby))
+            for one in (close, self.solver):
+                found.append(self._solved(built, program, one, nearby))
                 if found[-1].success or found[-1].status == "interrupted":
                     break
         optimum = min((o for o in found if o.success), key=lambda o: o.objective, default=found[0])
