@@ -25,6 +25,7 @@ from gantrytau_optimica.transcription.program import Program, first_guess, trans
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 FEW = 30  # elements, from which on first guesses are tried on half as many
+STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh if its branch was lost
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
@@ -86,11 +87,17 @@ class Prepared:
         again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
 
         def solve(program: Program, first: np.ndarray) -> Optimum:
-            """From nearby first, where it stays on its branch."""
-            found = self._solved(optimum.built, program, Solver(program, replace(again, near=True)), first)
-            if found.success or found.status in ("interrupted", "time limit reached"):
+            """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none."""
+            found = self._solved(optimum.built, program, Solver(program, again), first)
+            worse = found.objective - optimum.objective > STRAYED * max(abs(optimum.objective), 1e-9)
+            if (found.success and not worse) or found.status in ("interrupted", "time limit reached"):
                 return found
-            return self._solved(optimum.built, program, Solver(program, again), first)
+            close = self._solved(optimum.built, program, Solver(program, replace(again, near=True)), first)
+            return (
+                close
+                if close.success and not (found.success and found.objective < close.objective)
+                else found
+            )
 
         return refined(optimum, self.refine, solve)
 

@@ -83,8 +83,8 @@ def oscillator_in_least_time() -> tuple[float, float]:
 def test_the_oscillator_next_to_shooting():
     switch, end = oscillator_in_least_time()
     assert end == pytest.approx(2.2811848, abs=1e-7)
-    optimum = held(optimize(FastestOscillator, elements=20, refine=1e-7), 1e-7)
-    assert optimum.final_time == near(end, 1e-7)
+    optimum = held(optimize(FastestOscillator, elements=20, refine=1e-8), 1e-8)
+    assert optimum.final_time == near(end, 1e-8)
     assert np.min(np.abs(optimum.breaks - switch)) < 1e-4
     assert optimum.playback.defect < 1e-7
 
@@ -103,7 +103,7 @@ def test_singular_arcs():
     assert optimum.objective == pytest.approx(value, abs=2e-7)
     shares = optimum.signal("tube.u")(np.linspace(0.2, 0.65, 10))
     np.testing.assert_allclose(
-        shares, np.mean(shares), atol=1e-2
+        shares, np.mean(shares), atol=5e-3
     )  # constant on the arc, which hardly matters
     rocket = held(optimize(Goddard, elements=20, refine=ACCURACY))
     assert -rocket.objective == near(goddard_by_its_singular_arc())

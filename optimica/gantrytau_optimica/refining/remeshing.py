@@ -36,7 +36,8 @@ def better_mesh(
     parts = _parts(played, accuracy)
     if roughness:
         rough = _rough(trajectory) > ROUGH * np.sqrt(accuracy)
-        parts = np.maximum(parts, np.where(rough | _at_junctions(trajectory), 2, 1))
+        joined = any("between" in (s.before, s.after) for s in changes)
+        parts = np.maximum(parts, np.where(rough | (joined & _at_junctions(trajectory)), 2, 1))
     every = _with_knots(borders, parts, knots)
     same = every.size == borders.size and np.allclose(every, borders, atol=1e-9)
     if same and trajectory.mesh.elements < PROVEN:  # only a finer mesh shows that this one was fine enough

@@ -32,6 +32,7 @@ from gantrytau_optimica.transcription.blocks import (
     fixed_share,
     places_of_points,
     running,
+    share_of,
     single_block,
 )
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
@@ -105,8 +106,6 @@ class Program:
     def _share(self, one: Place, w: np.ndarray) -> float:
         if isinstance(one.point.time, str):
             return float(one.point.time == "final")
-        from gantrytau_optimica.transcription.blocks import share_of
-
         share = share_of(self.problem.phases[one.phase], one.point.time)
         return float(ca.Function("share", [self.problem.numbers], [share])(w[self.places.free]))
 
