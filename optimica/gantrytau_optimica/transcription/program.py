@@ -35,6 +35,7 @@ from gantrytau_optimica.transcription.blocks import (
     share_of,
     single_block,
 )
+from gantrytau_optimica.transcription.costs import differences, running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
@@ -155,13 +156,13 @@ def transcribe(
         blocks.append(_point_block(places, layout, path, mine.start, total))
         if layout.begin.size:
             blocks.append(_begin_block(places, layout, mine.begin, total))
-        objective += _running_costs(places, layout)
+        objective += running_costs(places, layout)
     if problem.boundary:
         rows = np.arange(count, total)
         scatter = sparse.csr_matrix((np.ones(rows.size), (rows, rows - count)), shape=(total, rows.size))
         blocks.append(single_block(places, where, [limit.expression for limit in problem.boundary], scatter))
-    objective.append(single_block(places, where, [_without_sums(problem)], sparse.csr_matrix([[1.0]])))
-    objective += [b for layout in places.layouts for b in _sample_sums(places, layout)]
+    objective.append(single_block(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]])))
+    objective += [b for layout in places.layouts for b in sample_sums(places, layout)]
     matrix = sparse.vstack(
         [m for mine, _, _ in linear for m in mine.linear] + [sparse.csr_matrix((total - count, places.size))]
     )
@@ -220,7 +221,7 @@ def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start:
         if step is None or chain.size < 2:
             continue
         rows = np.arange(chain.size - 1)
-        linear.append(_differences(places, chain))
+        linear.append(differences(places, chain))
         moments = layout.moment[chain[1:] - layout.first]
         groups.append(
             Rows(
@@ -245,15 +246,6 @@ def _rows(places: Places, layout: Layout, number: int, path: list[Limit], start:
             groups.append(Rows("border", name, number, np.array([stop + i]), np.array([np.nan]), low, np.inf))
         stop += stretches.size
     return _PhaseRows(start, stop, groups, linear, begin)
-
-
-def _differences(places: Places, chain: np.ndarray) -> Sparse:
-    """Steps between consecutive unknowns, divided by their size."""
-    rows = np.arange(chain.size - 1)
-    size = places.scale[chain[0]]
-    return places.pick(
-        [rows, rows], [chain[1:], chain[:-1]], [np.full(rows.size, v / size) for v in (1.0, -1.0)], rows.size
-    )
 
 
 def _stretches(places: Places, layout: Layout) -> tuple[Sparse, np.ndarray]:
@@ -288,68 +280,6 @@ def _begin_block(places: Places, layout: Layout, start: int, total: int) -> Bloc
     exact = places.pick([rows], [layout.begin], [np.ones(nz)], nz)
     gather = sparse.vstack([block.gather[:nx], exact, block.gather[nx + nz :]]).tocsr()
     return replace(block, gather=gather)
-
-
-def _running_costs(places: Places, layout: Layout) -> list[Block]:
-    """The integral of the integrand, and the penalties on steps of piecewise inputs."""
-    found, phase = [], layout.phase
-    if not phase.integrand.is_zero():
-        run = running(places, layout)
-        weights = np.tile(layout.scheme.weights, layout.mesh.elements)[None, :]
-        element, place = layout.points
-        found.append(
-            run.block(phase.integrand * run.horizon * run.width, element, place, sparse.csr_matrix(weights))
-        )
-    for signal, chain in layout.chains.items():
-        pieces, size = phase.signals[signal].pieces, places.scale[chain[0]]
-        if pieces.step_penalty and chain.size > 1:
-            step = ca.SX.sym("step")
-            weights = np.full((1, chain.size - 1), pieces.step_penalty * size**2)
-            found.append(
-                Block(
-                    step,
-                    ca.SX(0, 1),
-                    ca.SX(0, 1),
-                    step**2,
-                    np.zeros((0, chain.size - 1)),
-                    _differences(places, chain),
-                    sparse.csr_matrix(weights),
-                )
-            )
-    return found
-
-
-def _without_sums(problem: ControlProblem) -> ca.SX:
-    """The objective less its sums over samples, which have blocks of their own."""
-    symbols = list({s.symbol.element_hash(): s.symbol for s in problem.sums}.values())
-    return (
-        ca.substitute(problem.objective, ca.vertcat(*symbols), ca.SX.zeros(len(symbols), 1))
-        if symbols
-        else problem.objective
-    )
-
-
-def _sample_sums(places: Places, layout: Layout) -> list[Block]:
-    problem, found = places.problem, []
-    if layout.phase.sums and layout.knots.size:
-        raise ModelError(
-            f"{problem.name}: lengths='free' and sums over samples do not go together; give the lengths of the elements"
-        )
-    for one in layout.phase.sums:
-        run = running(places, layout)
-        weight = float(ca.jacobian(problem.objective, one.symbol))
-        start, final = float(layout.phase.start_time), float(layout.phase.final_time)
-        element, place = layout.mesh.locate((one.times - start) / (final - start))
-        after = (place > 1 - 1e-9) & (
-            element < layout.mesh.elements - 1
-        )  # at a jump what holds from then on counts
-        element, place = np.where(after, element + 1, element), np.where(after, 0.0, place)
-        value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
-        error = ((one.expression - value) / deviation) ** 2
-        weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
-        known = np.vstack([one.values, one.deviations])
-        found.append(run.block(error, element, place, weights, extra=((value, deviation), known)))
-    return found
 
 
 def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ from gantrytau_optimica.records import ControlProblem, Limit, Phase
 from gantrytau_optimica.sorting import bare_limit
 from gantrytau_optimica.transcription.assembly import Block, assemble
 from gantrytau_optimica.transcription.blocks import places_of_points, running, single_block
+from gantrytau_optimica.transcription.costs import running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import (
@@ -36,9 +37,6 @@ from gantrytau_optimica.transcription.program import (
     Rows,
     _bounds,
     _rows,
-    _running_costs,
-    _sample_sums,
-    _without_sums,
 )
 from gantrytau_optimica.transcription.scheme import Collocation
 
@@ -180,7 +178,7 @@ def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Colloca
             (np.ones(boundary.size), (boundary, boundary - count)), shape=(total, boundary.size)
         )
         blocks.append(single_block(places, where, [limit.expression for limit in problem.boundary], scatter))
-    objective = [single_block(places, where, [_without_sums(problem)], sparse.csr_matrix([[1.0]]))]
+    objective = [single_block(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]]))]
     objective += [b for layout, *_ in parts for b in _costs(places, layout)]
     lower, upper = np.zeros(total), np.zeros(total)
     for group in groups:
@@ -286,7 +284,7 @@ def _costs(places: Places, layout: ShootingLayout) -> list[Block]:
     """The integral by the same method, penalties on steps of inputs, and sums over samples."""
     phase = layout.phase
     bare = replace(layout, phase=replace(phase, integrand=ca.SX(0)))
-    found = [*_running_costs(places, bare), *_sample_sums(places, layout)]
+    found = [*running_costs(places, bare), *sample_sums(places, layout)]
     if not phase.integrand.is_zero():
         n = layout.mesh.elements
         for j, (place, weight) in enumerate(zip(PLACES, WEIGHTS, strict=True)):

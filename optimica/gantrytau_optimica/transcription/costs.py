@@ -1,0 +1,83 @@
+"""What is summed into the objective: integrals, penalties on steps, and errors at samples."""
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from gantrytau import ModelError
+from gantrytau_optimica.records import ControlProblem
+from gantrytau_optimica.transcription.assembly import Block
+from gantrytau_optimica.transcription.blocks import running
+from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
+
+
+def running_costs(places: Places, layout: Layout) -> list[Block]:
+    """The integral of the integrand, and the penalties on steps of piecewise inputs."""
+    found, phase = [], layout.phase
+    if not phase.integrand.is_zero():
+        run = running(places, layout)
+        weights = np.tile(layout.scheme.weights, layout.mesh.elements)[None, :]
+        element, place = layout.points
+        found.append(
+            run.block(phase.integrand * run.horizon * run.width, element, place, sparse.csr_matrix(weights))
+        )
+    for signal, chain in layout.chains.items():
+        pieces, size = phase.signals[signal].pieces, places.scale[chain[0]]
+        if pieces.step_penalty and chain.size > 1:
+            step = ca.SX.sym("step")
+            weights = np.full((1, chain.size - 1), pieces.step_penalty * size**2)
+            found.append(
+                Block(
+                    step,
+                    ca.SX(0, 1),
+                    ca.SX(0, 1),
+                    step**2,
+                    np.zeros((0, chain.size - 1)),
+                    differences(places, chain),
+                    sparse.csr_matrix(weights),
+                )
+            )
+    return found
+
+
+def without_sums(problem: ControlProblem) -> ca.SX:
+    """The objective less its sums over samples, which have blocks of their own."""
+    symbols = list({s.symbol.element_hash(): s.symbol for s in problem.sums}.values())
+    return (
+        ca.substitute(problem.objective, ca.vertcat(*symbols), ca.SX.zeros(len(symbols), 1))
+        if symbols
+        else problem.objective
+    )
+
+
+def sample_sums(places: Places, layout: Layout) -> list[Block]:
+    """The sums over samples of a phase, a small function at every sample. Raises ModelError where borders move."""
+    problem, found = places.problem, []
+    if layout.phase.sums and layout.knots.size:
+        raise ModelError(
+            f"{problem.name}: lengths='free' and sums over samples do not go together; give the lengths of the elements"
+        )
+    for one in layout.phase.sums:
+        run = running(places, layout)
+        weight = float(ca.jacobian(problem.objective, one.symbol))
+        start, final = float(layout.phase.start_time), float(layout.phase.final_time)
+        element, place = layout.mesh.locate((one.times - start) / (final - start))
+        after = (place > 1 - 1e-9) & (
+            element < layout.mesh.elements - 1
+        )  # at a jump what holds from then on counts
+        element, place = np.where(after, element + 1, element), np.where(after, 0.0, place)
+        value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
+        error = ((one.expression - value) / deviation) ** 2
+        weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
+        known = np.vstack([one.values, one.deviations])
+        found.append(run.block(error, element, place, weights, extra=((value, deviation), known)))
+    return found
+
+
+def differences(places: Places, chain: np.ndarray) -> Sparse:
+    """Steps between consecutive unknowns, divided by their size."""
+    rows = np.arange(chain.size - 1)
+    size = places.scale[chain[0]]
+    return places.pick(
+        [rows, rows], [chain[1:], chain[:-1]], [np.full(rows.size, v / size) for v in (1.0, -1.0)], rows.size
+    )
