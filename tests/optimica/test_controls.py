@@ -115,38 +115,6 @@ def test_linear_pieces_keep_limits_everywhere():
     assert optimum.final_time == pytest.approx(1 / np.sqrt(0.25 - 0.01 / 3), abs=1e-6)
 
 
-def test_linear_pieces_over_groups_are_straight_and_continuous():
-    class Pushed(Effort):
-        """Reward for the way, so that the best force is a parabola: u = 6 (1 - t)^2 would be best."""
-
-        def objective(self):
-            return -12 * final(self.mass.x)
-
-        def constraints(self):
-            yield final(self.mass.v) == 1
-
-    optimum = optimize(Pushed, elements=6, controls={"mass.u": dict(kind="linear", elements=3)})
-    force = optimum.signal("mass.u")
-    ends = force(np.array([0.0, 0.5, 1.0]))
-    t = np.linspace(0.0, 1.0, 25)
-    np.testing.assert_allclose(force(t), np.interp(t, [0.0, 0.5, 1.0], ends), atol=1e-9)
-
-
-def test_linear_pieces_keep_limits_everywhere():
-    controls = {"mass.u": dict(kind="linear", elements=2)}
-    optimum = optimize(FastestMass, elements=20, controls=controls)
-    t = np.linspace(0.0, optimum.final_time, 1001)
-    force = optimum.signal("mass.u")(t)
-    assert np.max(np.abs(force)) <= 1 + 1e-7
-    assert np.max(np.abs(np.diff(force))) < 0.05  # no jump: at most 2 in a tenth of the time
-    # ten groups: from +1 to -1 within the two in the middle, T^2 (1/4 - 0.1^2 / 3) = 1
-    assert optimum.final_time == pytest.approx(1 / np.sqrt(0.25 - 0.01 / 3), abs=1e-6)
-
-
-@pytest.mark.xfail(
-    strict=True,
-    reason="layout.pieces_of: places of a group's ends are those of the guess, though borders move",
-)
 def test_linear_pieces_over_groups_are_refused_where_borders_move():
     controls = {"mass.u": dict(kind="linear", elements=2)}
     with pytest.raises(ModelError, match="over several elements and lengths='free' do not go together"):
