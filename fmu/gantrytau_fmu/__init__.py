@@ -1,0 +1,1 @@
+"""FMUs of gantrytau models, written and read, and systems of FMUs simulated together."""
