@@ -1,0 +1,320 @@
+"""The variables of an FMU, made of the formulas of a model: who they are to the outside and to the runtime."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae
+from gantrytau.flat_model import FlatVariable
+from gantrytau.symbols import split_derivative
+from gantrytau_fmu.code import Entry, output_places
+from gantrytau_fmu.expressions import Graph
+from gantrytau_fmu.formulas import Formulas, column, formulas_of, numbers_of
+from gantrytau_fmu.interface import Unknown, Variable
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """Variables and model structure of an FMU (see Interface), and the tables of the runtime, in the same order."""
+
+    formulas: Formulas
+    variables: tuple[Variable, ...]
+    entries: tuple[Entry, ...]
+    constants: tuple[float, ...]
+    nominals: tuple[float, ...]
+    outputs: tuple[Unknown, ...]
+    derivatives: tuple[Unknown, ...]
+    indicators: tuple[int, ...]
+    terminals: dict[str, dict[str, int]]
+    description: str
+    wanted: tuple[ca.SX, ...]
+    graph: Graph
+
+
+def fmi_name(name: str) -> str:
+    """`der(der(x))` is `der(x,2)` in the structured naming convention (FMI 3.0.2, section 2.4.7.5.1)."""
+    base, order = split_derivative(name)
+    return name if order < 2 else f"der({base},{order})"
+
+
+@dataclass(eq=False)
+class _Builder:
+    dae: Dae
+    formulas: Formulas
+    places: dict[str, int]
+    outputs: frozenset[str]
+    variables: list[Variable] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    constants: list[float] = field(default_factory=list)
+    places_of: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        flat = self.dae.flat
+        everything = (*flat.parameters, *flat.variables, *flat.propagated)
+        self.declared = {n: (v, k) for v in everything for k, n in enumerate(v.elements)}
+        self.taken: set[str] = set()
+
+    def add(self, name: str, kind: str, index: int, *, fixed: bool = False, attributes: str = "", **more) -> int:
+        """A variable of the model by its name there; attributes: those that its declaration gives."""
+        base, order = split_derivative(name)
+        declaration, place = self.declared.get(base, (None, 0))
+        reference = len(self.variables)
+        unit, words = "", ""
+        if declaration is not None:
+            unit, words = declaration.unit or "", declaration.description
+            if order:
+                unit = _per_second(unit, order)
+                words = f"{'second ' if order == 2 else ''}time derivative of {base}" if order < 3 else f"time derivative {order} of {base}"
+            elif attributes:
+                more = {**self.limits(declaration, place), **more}
+        more.setdefault("unit", unit)
+        more.setdefault("description", words)
+        found = fmi_name(name)
+        while found in self.taken:
+            found += "_"
+        self.taken.add(found)
+        self.variables.append(Variable(name=found, reference=reference, **more))
+        self.entries.append(Entry(kind, index, fixed, found))
+        self.places_of.setdefault(name, reference)
+        return reference
+
+    def limits(self, declaration: FlatVariable, place: int) -> dict[str, float]:
+        """min, max and nominal as numbers, where they are declared and finite."""
+        found = {}
+        for word in ("min", "max", "nominal"):
+            values = getattr(declaration, word)
+            if values is not None:
+                number = float(self.dae.table.number(values[place])[0])
+                if np.isfinite(number) and (word != "nominal" or number > 0):
+                    found[word] = number
+        return found
+
+
+def _per_second(unit: str, order: int) -> str:
+    """The unit of a derivative, with one '/' as Modelica writes it."""
+    if not unit:
+        return ""
+    seconds = "s" if order == 1 else f"s{order}"
+    above, _, below = unit.partition("/")
+    if not below:
+        return f"{above}/{seconds}"
+    factors = [*below.strip("()").split(".")]
+    times = [f for f in factors if f.rstrip("0123456789") == "s"]
+    power = order + sum(int(f[1:] or 1) for f in times)
+    rest = [f for f in factors if f not in times]
+    joined = ".".join([*rest, "s" if power == 1 else f"s{power}"])
+    return f"{above}/({joined})" if rest else f"{above}/{joined}"
+
+
+def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
+    """What an FMU of a translated model holds; outputs: scalar names of what it shows."""
+    formulas = formulas_of(dae, _evaluated(dae, outputs))
+    graph, places, wanted = output_places(formulas)
+    builder = _Builder(dae, formulas, places, frozenset(outputs))
+    builder.add("time", "TIME", 0, causality="independent", variability="continuous", unit="s", description="time")
+    _parameters(builder)
+    _inputs(builder)
+    _states(builder, outputs)
+    _outputs(builder, outputs)
+    indicators = _frictions(builder)
+    depends = Dependencies(formulas, wanted)
+    found = builder.places_of
+    shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
+    return Contents(
+        formulas=formulas,
+        variables=tuple(builder.variables),
+        entries=tuple(builder.entries),
+        constants=tuple(builder.constants),
+        nominals=tuple(_nominal(builder, n) for n in formulas.states),
+        outputs=tuple(_unknown(builder, depends, n) for n in shown),
+        derivatives=tuple(
+            _entry(builder, found[f"der({n})"], depends.rates[k]) for k, n in enumerate(formulas.states)
+        ),
+        indicators=indicators,
+        terminals={},
+        description=f"{dae.name}, a model of gantrytau",
+        wanted=tuple(wanted),
+        graph=graph,
+    )
+
+
+def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
+    """What needs an output function: outputs that are no states, and parameters that follow from others."""
+    direct = {*dae.states, *(s.name for s in dae.flat.sampled)}
+    dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
+    varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
+    return [*dependent, *varying]
+
+
+def _nominal(builder: _Builder, name: str) -> float:
+    declaration, place = builder.declared.get(split_derivative(name)[0], (None, 0))
+    return builder.limits(declaration, place).get("nominal", 1.0) if declaration is not None else 1.0
+
+
+def _parameters(builder: _Builder) -> None:
+    table, formulas = builder.dae.table, builder.formulas
+    early = formulas.start_parameters
+    for place, name in enumerate(table.independent):
+        fixed = name in early
+        builder.add(
+            name,
+            "PARAMETER",
+            place,
+            fixed=fixed,
+            attributes="limits",
+            causality="parameter",
+            variability="fixed" if fixed else "tunable",
+            initial="exact",
+            start=table.values[name],
+        )
+    for name, expression in table.expressions.items():
+        if expression.is_constant():
+            _constant(builder, name, table.values[name], "local")
+            continue
+        tunable = any(s.name() not in early for s in ca.symvar(expression))
+        more = dict(variability="tunable" if tunable else "fixed", initial="calculated")
+        builder.add(name, "OUTPUT", builder.places[name], causality="local", **more)
+
+
+def _constant(builder: _Builder, name: str, value: float, causality: str) -> None:
+    more = dict(causality=causality, variability="constant", initial="exact", start=value)
+    builder.add(name, "CONSTANT", len(builder.constants), **more)
+    builder.constants.append(value)
+
+
+def _inputs(builder: _Builder) -> None:
+    start = numbers_of(builder.dae, builder.formulas.arrays)["u"]
+    for place, name in enumerate(builder.formulas.inputs):
+        builder.add(
+            name,
+            "INPUT",
+            place,
+            attributes="limits",
+            causality="input",
+            variability="continuous",
+            start=float(start[place]),
+        )
+
+
+def _states(builder: _Builder, outputs: Sequence[str]) -> None:
+    formulas, shown = builder.formulas, set(outputs)
+    starts = np.array(builder.dae.table.number(formulas.starts)) if formulas.states else []
+    references = []
+    for place, name in enumerate(formulas.states):
+        solved = place in formulas.initial_states
+        more = {} if solved else dict(start=float(starts[place]))
+        references.append(
+            builder.add(
+                name,
+                "STATE",
+                place,
+                fixed=solved,
+                attributes="limits",
+                causality="output" if name in shown else "local",
+                variability="continuous",
+                initial="calculated" if solved else "exact",
+                **more,
+            )
+        )
+    for place, name in enumerate(formulas.states):
+        builder.add(
+            f"der({name})",
+            "DERIVATIVE",
+            place,
+            causality="local",
+            variability="continuous",
+            initial="calculated",
+            derivative=references[place],
+        )
+
+
+def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
+    formulas, dae = builder.formulas, builder.dae
+    for place, name in enumerate(formulas.held):
+        causality = "output" if name in set(outputs) else "local"
+        more = dict(causality=causality, variability="discrete", initial="calculated")
+        builder.add(name, "HELD", len(formulas.inputs) + place, **more)
+    for name in outputs:
+        if name in builder.places_of and not name.startswith("der("):
+            continue
+        expression = dae.expression(name)
+        if expression.is_constant():
+            _constant(builder, name, float(expression), "output")
+            continue
+        more = dict(causality="output", variability="continuous", initial="calculated")
+        builder.add(name, "OUTPUT", builder.places[name], attributes="limits", **more)
+        builder.places_of[name] = len(builder.variables) - 1
+
+
+def _frictions(builder: _Builder) -> tuple[int, ...]:
+    """Mode and event indicator of each friction with exact stick-slip; references of the indicators."""
+    indicators = []
+    for place, name in enumerate(builder.formulas.frictions):
+        owner = name.rpartition(".")[0]
+        prefix = f"{owner}." if owner else ""
+        words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
+        more = dict(causality="local", variability="discrete", initial="calculated", type="integer")
+        builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
+        words = f"{owner or name}: an event where it falls through zero"
+        more = dict(causality="local", variability="continuous", initial="calculated")
+        indicators.append(builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more))
+    return tuple(indicators)
+
+
+class Dependencies:
+    """On which states and inputs rates and outputs depend, through the implicit blocks and the sampled variables.
+
+    rates, outputs, samples: boolean rows over (states, inputs).
+    """
+
+    def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
+        arrays = formulas.arrays
+        self._n, self._m = arrays["x"].numel(), len(formulas.inputs)
+        held = arrays["u"].numel() - self._m
+        z = np.zeros((arrays["z"].numel(), self._n + self._m + held), dtype=bool)
+        place = 0
+        for block in formulas.blocks:
+            rows = self._rows(formulas, block.residual, z)
+            z[place : place + len(block.names)] = rows.any(axis=0)
+            place += len(block.names)
+        samples = self._rows(formulas, formulas.samples, z)
+        own = samples[:, self._n + self._m :]
+        for _ in range(held):
+            own |= own @ own
+        known = np.eye(self._n + self._m + held, dtype=bool)
+        known[self._n + self._m :] = samples | own @ samples
+        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, : self._n + self._m]
+        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, : self._n + self._m]
+        self.samples = known[self._n + self._m :, : self._n + self._m]
+
+    @staticmethod
+    def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
+        """Direct dependence of a vector on (x, u), with that through z added."""
+        arrays = formulas.arrays
+        names = ["x", "u", "z"]
+        function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
+        places = [list(arrays).index(n) for n in names]
+        patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
+        x, u, through = [p.reshape(expression.numel(), arrays[n].numel()) for n, p in zip(names, patterns, strict=True)]
+        return np.hstack([x, u]) | (through @ z if z.size else np.zeros((expression.numel(), 1), dtype=bool))
+
+
+def _unknown(builder: _Builder, depends: Dependencies, name: str) -> Unknown:
+    formulas, reference = builder.formulas, builder.places_of[name]
+    entry = builder.entries[reference]
+    if entry.kind == "STATE":
+        states = [n == name for n in formulas.states]
+        return _entry(builder, reference, np.array([*states, *[False] * len(formulas.inputs)]))
+    if entry.kind == "HELD":
+        return _entry(builder, reference, depends.samples[entry.index - len(formulas.inputs)])
+    if entry.kind == "CONSTANT":
+        return Unknown(reference, (), ())
+    return _entry(builder, reference, depends.outputs[entry.index])
+
+
+def _entry(builder: _Builder, reference: int, row: np.ndarray) -> Unknown:
+    names = (*builder.formulas.states, *builder.formulas.inputs)
+    found = sorted(builder.places_of[names[k]] for k in np.flatnonzero(row))
+    return Unknown(reference, tuple(found), ("dependent",) * len(found))

@@ -1,0 +1,212 @@
+"""`export_fmu`: from a model to a file that simulation tools import."""
+
+import hashlib
+import re
+import warnings
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from gantrytau import Dae, Model, translate
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau_fmu.archive import binary_path, write_fmu
+from gantrytau_fmu.code import ModelCode, model_code
+from gantrytau_fmu.compiling import NoCompiler, compile_libraries
+from gantrytau_fmu.contents import Contents, contents_of
+from gantrytau_fmu.description import build_description, model_description
+from gantrytau_fmu.documentation import documentation, licenses
+from gantrytau_fmu.interface import Experiment, Interface, Interfaces
+from gantrytau_fmu.platforms import Platform, chosen
+from gantrytau_fmu.terminals import icon, terminals_and_icons
+
+SOLVERS = ("dopri5", "rodas4")
+BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
+RUNTIME = (
+    "instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c fmi2.c fmi3.c"
+)
+HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
+MODERATE, LARGE = 30_000, 150_000  # operations from which on the compiler is asked for less
+
+
+def export_fmu(
+    model: Model | Dae,
+    path: str | Path,
+    *,
+    fmi: Literal["3.0", "2.0"] = "3.0",
+    interfaces: Sequence[Interfaces] | Interfaces = BOTH,
+    solver: Literal["dopri5", "rodas4"] = "dopri5",
+    tolerance: float = 1e-6,
+    platforms: str | Sequence[str] = ("native",),
+    given: Sequence[str] = (),
+    find: Sequence[str] = (),
+    states: Sequence[str] | None = None,
+    sources: bool = True,
+    description: str = "",
+    author: str = "",
+    copyright: str = "",
+    license: str = "",
+    version: str = "",
+    experiment: Experiment | None = None,
+) -> Path:
+    """Write a model as FMU and return its path.
+
+    fmi: version of the standard; interfaces: "model-exchange", "co-simulation" or both; solver, tolerance: of
+    Co-Simulation, explicit or for stiff models; platforms: "native", "all" or names such as "x86_64-windows" (all but
+    "native" need the extra `cross`); given: known variables instead of the declared inputs, and parameters to be kept
+    that else shape the equations; find: the outputs (all variables that are not parameters); states: preferred states;
+    sources: put the C sources into the file. Derivatives of given variables that the model needs become inputs, too.
+    Without a compiler a source FMU is written, with a warning. An existing file is replaced when the new one is
+    complete. Raises ModelError for wrong arguments, unwritable paths and failed compilations, and what `translate`
+    raises. FMI 2.0.4 and 3.0.2.
+    """
+    wanted_interfaces = _interfaces(interfaces)
+    _check(fmi, solver, tolerance)
+    targets = chosen(platforms)
+    dae = _translated(model, given, find, states)
+    contents = contents_of(dae, _outputs(dae, find))
+    name = dae.name
+    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    token = _token(contents, fmi, solver, tolerance)
+    code = _code(contents, name, token, wanted_interfaces, tolerance)
+    interface = Interface(
+        name=name,
+        identifier=identifier,
+        token=token,
+        variables=contents.variables,
+        outputs=contents.outputs,
+        derivatives=contents.derivatives,
+        indicators=contents.indicators,
+        interfaces=wanted_interfaces,
+        experiment=experiment or Experiment(tolerance=tolerance),
+        description=description or contents.description,
+        author=author,
+        copyright=copyright,
+        license=license,
+        version=version,
+        generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        terminals=contents.terminals,
+        solver=solver,
+    )
+    texts = source_files(code.text, solver)
+    binaries = _compiled(texts, targets, identifier, code.operations)
+    return write_fmu(path, _members(interface, fmi, texts, binaries, sources or not binaries))
+
+
+def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfaces, ...]:
+    found = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
+    for one in found:
+        if one not in BOTH:
+            raise ModelError(
+                f"export_fmu: found the interface {one!r}, expected model-exchange or co-simulation{did_you_mean(str(one), BOTH)}"
+            )
+    if not found:
+        raise ModelError("export_fmu: found no interfaces, expected model-exchange, co-simulation or both")
+    return tuple(one for one in BOTH if one in found)
+
+
+def _check(fmi: str, solver: str, tolerance: float) -> None:
+    if fmi not in ("2.0", "3.0"):
+        raise ModelError(f"export_fmu: found fmi={fmi!r}, expected '3.0' or '2.0'")
+    if solver not in SOLVERS:
+        raise ModelError(f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models")
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 1e-12 <= tolerance < 1:
+        raise ModelError(f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1")
+
+
+def _translated(
+    model: Model | Dae, given: Sequence[str], find: Sequence[str], states: Sequence[str] | None
+) -> Dae:
+    if isinstance(model, Dae):
+        if given or states is not None:
+            raise ModelError(
+                "export_fmu: found a translated model with given= or states=, expected these where it is translated; give "
+                "the model itself, or translate(model, given=..., states=...)"
+            )
+        return model
+    return translate(model, given=given, find=find, states=states, events=True)
+
+
+def _outputs(dae: Dae, find: Sequence[str]) -> tuple[str, ...]:
+    """Scalar names of the outputs; those that are inputs or parameters are known anyway."""
+    if isinstance(find, str):
+        raise ModelError(f"export_fmu: found find='{find}', expected a list of names; write ['{find}']")
+    names = [n for name in find for n in dae.expand(name)] if find else list(dae.variables)
+    parameters = set(dae.parameters)
+    for name in names:
+        if name in parameters:
+            raise ModelError(
+                f"export_fmu: find: {name} is a parameter, expected variables; parameters are in the FMU anyway"
+            )
+    return tuple(dict.fromkeys(n for n in names if n not in set(dae.inputs) and not n.startswith("wanted ")))
+
+
+def _token(contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
+    """The same for the same model: a hash of its formulas and variables, in the form of a UUID."""
+    text = f"{contents.variables}{fmi}{solver}{tolerance}{contents.formulas.rates}{contents.formulas.residuals}"
+    digits = hashlib.sha256(text.encode()).hexdigest()
+    return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
+
+
+def _code(
+    contents: Contents, name: str, token: str, interfaces: Sequence[Interfaces], tolerance: float
+) -> ModelCode:
+    return model_code(
+        contents.formulas,
+        name=name,
+        token=token,
+        variables=contents.entries,
+        constants=contents.constants,
+        nominals=contents.nominals,
+        interfaces=interfaces,
+        tolerance=tolerance,
+        outputs=contents.wanted,
+        graph=contents.graph,
+    )
+
+
+def source_files(model: str, solver: str) -> dict[str, str]:
+    """All C files of an FMU by name; only fmu.c is compiled, it includes the others."""
+    folder = resources.files("gantrytau_fmu") / "runtime"
+    names = RUNTIME.format(solver=solver).split()
+    found = {n: (folder / n).read_text(encoding="utf-8") for n in (*HEADERS, *names)}
+    lines = ["/* The one translation unit of this FMU. */", '#include "core.h"', '#include "model.c"']
+    lines += [f'#include "{n}"' for n in names]
+    return {"fmu.c": "\n".join(lines) + "\n", "model.c": model, **found}
+
+
+def _compiled(
+    texts: dict[str, str], targets: Sequence[Platform], identifier: str, operations: int
+) -> dict[Platform, bytes]:
+    level = "-O2" if operations < MODERATE else "-O1" if operations < LARGE else "-O0"
+    try:
+        return compile_libraries(texts, platforms=targets, identifier=identifier, optimisation=level)
+    except NoCompiler as error:
+        warnings.warn(f"{error}. The FMU holds C sources only; tools that compile them can use it", stacklevel=3)
+        return {}
+
+
+def _members(
+    interface: Interface,
+    fmi: Literal["3.0", "2.0"],
+    texts: dict[str, str],
+    binaries: dict[Platform, bytes],
+    sources: bool,
+) -> dict[str, bytes]:
+    """The files in the archive by their names there."""
+    names = sorted(texts) if sources else []
+    members = {"modelDescription.xml": model_description(interface, fmi, names)}
+    members |= {binary_path(p, fmi, interface.identifier): data for p, data in binaries.items()}
+    members |= {f"sources/{n}": texts[n].encode() for n in names}
+    members |= {f"documentation/{n}": data for n, data in licenses(interface).items()}
+    members["documentation/index.html"] = documentation(interface, fmi)
+    if fmi == "2.0":
+        return {**members, "model.png": icon()}
+    if names:
+        members["sources/buildDescription.xml"] = build_description(interface, fmi, names)
+    terminals = terminals_and_icons(interface)
+    if terminals:
+        members |= {"terminalsAndIcons/terminalsAndIcons.xml": terminals, "terminalsAndIcons/icon.png": icon()}
+    return members
+

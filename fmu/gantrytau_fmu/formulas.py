@@ -1,0 +1,247 @@
+"""The formulas of an FMU, taken from a Dae: what the runtime evaluates, in the arrays that it holds.
+
+t time, x states, u what is known from outside (inputs, then sampled variables), z unknowns of the blocks that
+have no closed form, p parameters, m modes of frictions with exact stick-slip (1 forward, -1 backward, 0 locked).
+The force of such a friction is one of the z; its equation depends on the mode.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae
+from gantrytau.errors import ModelError
+from gantrytau.symbols import split_derivative
+from gantrytau.system import System
+
+HOLD = 0.01  # s, time in which the speed left at the instant of locking dies away
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitBlock:
+    """Equations 0 = residual for some of the z; linear: in them; frictions: the forces of frictions are among them."""
+
+    names: tuple[str, ...]
+    unknowns: ca.SX
+    residual: ca.SX
+    linear: bool
+    frictions: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Formulas:
+    """Expressions in the symbols of `arrays`, by name of the array.
+
+    outputs: expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
+    breakaway force by turns; initial: residuals that determine `initial_states`; starts: of the states in parameters.
+    """
+
+    dae: Dae
+    arrays: Mapping[str, ca.SX]
+    states: tuple[str, ...]
+    rates: ca.SX
+    inputs: tuple[str, ...]
+    held: tuple[str, ...]
+    samples: ca.SX
+    clocks: tuple[int, ...]
+    periods: ca.SX
+    blocks: tuple[ImplicitBlock, ...]
+    outputs: Mapping[str, ca.SX]
+    frictions: tuple[str, ...]
+    friction: ca.SX
+    initial: ca.SX
+    initial_states: tuple[int, ...]
+    starts: ca.SX
+    parameters: tuple[str, ...]
+
+    @property
+    def residuals(self) -> ca.SX:
+        """Of all blocks, one below the other."""
+        return column([b.residual for b in self.blocks])
+
+    @property
+    def z_names(self) -> tuple[str, ...]:
+        """Names of the unknowns of all blocks."""
+        return tuple(n for b in self.blocks for n in b.names)
+
+    @property
+    def start_parameters(self) -> frozenset[str]:
+        """Parameters on which start values or sampling periods depend: they act during initialisation only."""
+        return frozenset(s.name() for s in ca.symvar(column([self.starts, self.periods])))
+
+
+def column(parts: Sequence[ca.SX]) -> ca.SX:
+    """Vectors below each other; no vectors give an empty one."""
+    parts = [p for p in parts if p.numel()]
+    return ca.SX(ca.vertcat(*parts)) if parts else ca.SX(0, 1)
+
+
+def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
+    """The formulas of a translated model; outputs: scalar names of what is wanted."""
+    system = dae.system()
+    flat = dae.flat
+    sampled, frictions = flat.sampled, flat.frictions
+    wanted = system.resolve([dae.expression(n) for n in outputs]) if outputs else []
+    updates = system.express([s.expression for s in sampled])
+    laws = [[f.coulomb, f.smooth, f.breakaway] for f in frictions]
+    laws = [system.express(law) for law in laws]
+    speeds = system.resolve([dae.expression(f.speed) for f in frictions])
+    accelerations = system.resolve([dae.expression(f"der({f.speed})") for f in frictions])
+    initial = system.express([e.residual for e in flat.initial_equations])
+    everything = [system.ode, system.residuals, *wanted, *updates, *speeds, *accelerations, *initial]
+    differentiated = _input_derivatives(dae, column(everything))
+    free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
+    forces = [_symbol(system, f.force) for f in frictions]
+    m = ca.SX.sym("m", len(frictions))
+    friction_rows = [
+        ca.if_else(m[k] == 0, a + v / HOLD, force - m[k] * law[0] - law[1])
+        for k, (a, v, force, law) in enumerate(zip(accelerations, speeds, forces, laws, strict=True))
+    ]
+    blocks = _blocks(system, frictions, forces, friction_rows)
+    arrays = {
+        "t": system.time,
+        "x": system.x,
+        "u": column([*free, *differentiated.values(), *(_symbol(system, s.name) for s in sampled)]),
+        "z": column([b.unknowns for b in blocks]),
+        "p": system.p,
+        "m": m,
+    }
+    periods, clocks = _clocks(system, sampled)
+    inputs = (*dae.inputs, *differentiated)
+    rows, chosen = _initial(dae, system, column(initial), arrays, blocks)
+    return Formulas(
+        dae=dae,
+        arrays=arrays,
+        states=dae.states,
+        rates=system.ode,
+        inputs=inputs,
+        held=tuple(s.name for s in sampled),
+        samples=column(updates),
+        clocks=clocks,
+        periods=periods,
+        blocks=blocks,
+        outputs=dict(zip(outputs, wanted, strict=True)),
+        frictions=tuple(f.force for f in frictions),
+        friction=column([e for v, law in zip(speeds, laws, strict=True) for e in (v, law[2])]),
+        initial=rows,
+        initial_states=chosen,
+        starts=_starts(dae, set(chosen)),
+        parameters=system.parameters,
+    )
+
+
+def _symbol(system: System, name: str) -> ca.SX:
+    return system.u.elements()[system.inputs.index(name)]
+
+
+def _input_derivatives(dae: Dae, everything: ca.SX) -> dict[str, ca.SX]:
+    """Derivatives of inputs that occur: they are inputs, too."""
+    known = set(dae.known)
+    found = {}
+    for leaf in ca.symvar(everything):
+        base, order = split_derivative(leaf.name())
+        if order and base in known:
+            found[leaf.name()] = leaf
+    return dict(sorted(found.items(), key=lambda item: (split_derivative(item[0])[1], dae.known.index(split_derivative(item[0])[0]))))
+
+
+def _blocks(system: System, frictions: Sequence, forces: list[ca.SX], rows: list[ca.SX]) -> tuple[ImplicitBlock, ...]:
+    """The implicit blocks; those that depend on forces of frictions become one with the equations of these."""
+    found: list[ImplicitBlock] = []
+    place = 0
+    names, unknowns, residuals = [f.force for f in frictions], list(forces), list(rows)
+    merged = {f.name() for f in forces}
+    for block in (b for b in system.dae.blocks if b.solution is None):
+        own = [system.algebraics[place + k] for k in range(len(block.tears))]
+        place += len(own)
+        residual = column([a.residual for a in own])
+        if merged & {leaf.name() for leaf in ca.symvar(residual)}:
+            names += [a.name for a in own]
+            unknowns += [a.symbol for a in own]
+            residuals.append(residual)
+            merged |= {a.name for a in own}
+        else:
+            symbols = column([a.symbol for a in own])
+            found.append(_block([a.name for a in own], symbols, residual, False))
+    if frictions:
+        found.append(_block(names, column(unknowns), column(residuals), True))
+    return tuple(found)
+
+
+def _block(names: Sequence[str], unknowns: ca.SX, residual: ca.SX, frictions: bool) -> ImplicitBlock:
+    linear = not ca.depends_on(ca.jacobian(residual, unknowns), unknowns)
+    return ImplicitBlock(tuple(names), unknowns, residual, linear, frictions)
+
+
+def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:
+    """Different periods, and which of them each sampled variable follows."""
+    periods: list[ca.SX] = []
+    texts: list[str] = []
+    clocks = []
+    for expression in system.express([s.period for s in sampled]):
+        if str(expression) not in texts:
+            texts.append(str(expression))
+            periods.append(expression)
+        clocks.append(texts.index(str(expression)))
+    return column(periods), tuple(clocks)
+
+
+def _starts(dae: Dae, solved: set[int]) -> ca.SX:
+    """Start values of the states: as declared where the declared value held, numbers else."""
+    declared = {n: s for v in dae.flat.variables if v.start for n, s in zip(v.elements, v.start, strict=True)}
+    found = []
+    for place, (name, spoken) in enumerate(zip(dae.choice.states, dae.states, strict=True)):
+        number = dae.start[name]
+        start = declared.get(spoken)
+        if start is not None and not start.is_constant() and place not in solved:
+            start = dae.table.reduce(start)
+            if abs(float(dae.table.number(start)[0]) - number) <= 1e-12 * (1 + abs(number)):
+                found.append(start)
+                continue
+        found.append(ca.SX(number))
+    return column(found)
+
+
+def numbers_of(dae: Dae, arrays: Mapping[str, ca.SX]) -> dict[str, np.ndarray]:
+    """Values of all arrays where the model starts, modes locked."""
+    values = {**dae.start, **dae.table.values, dae.flat.time.name(): dae.start.get(dae.flat.time.name(), 0.0)}
+    return {
+        n: np.zeros(a.numel()) if n == "m" else np.array([values.get(s.name(), 0.0) for s in a.elements()])
+        for n, a in arrays.items()
+    }
+
+
+def _initial(
+    dae: Dae, system: System, rows: ca.SX, arrays: Mapping[str, ca.SX], blocks: Sequence[ImplicitBlock]
+) -> tuple[ca.SX, tuple[int, ...]]:
+    """The initial equations that determine states, and which: those that may move and move them best."""
+    from scipy.linalg import qr
+
+    if not rows.numel():
+        return rows, ()
+    residual = column([b.residual for b in blocks])
+    at = list(numbers_of(dae, arrays).values())
+
+    def number(expression: ca.SX) -> np.ndarray:
+        return np.array(ca.Function("at", list(arrays.values()), [ca.densify(expression)])(*at))
+
+    x, z = arrays["x"], arrays["z"]
+    slopes = number(ca.jacobian(rows, x))
+    if z.numel():
+        slopes -= number(ca.jacobian(rows, z)) @ np.linalg.solve(
+            number(ca.jacobian(residual, z)), number(ca.jacobian(residual, x))
+        )
+    fixed = set(dae.settings["fixed"])
+    may_move = [k for k, n in enumerate(dae.choice.states) if n not in fixed]
+    rank = np.linalg.matrix_rank(slopes[:, may_move], tol=1e-9 * max(1.0, np.abs(slopes).max(initial=0.0)))
+    _, _, columns = qr(slopes[:, may_move], pivoting=True)
+    chosen = tuple(sorted(may_move[k] for k in columns[:rank]))
+    _, _, kept = qr(slopes[:, list(chosen)].T, pivoting=True) if rank else (None, None, [])
+    if rank < rows.numel():
+        raise ModelError(
+            f"export_fmu: {dae.name}: found {rows.numel()} initial equations, of which only {rank} determine states that are not "
+            "fixed; remove those that repeat others or that contradict fixed starts"
+        )
+    return rows[sorted(int(k) for k in kept[:rank])], chosen

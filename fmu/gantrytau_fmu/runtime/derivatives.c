@@ -1,0 +1,162 @@
+/* Exact directional derivatives; the implicit unknowns follow by the implicit function theorem. */
+
+/* g: rates of the states, then residuals of the blocks, in the direction of dt, dx, du, dz, dp. */
+static void gt_slopes(gt_instance *it, int parameters)
+{
+    double more[GT_ROOM(GT_STATES + GT_ALGEBRAICS)];
+    int i;
+    gt_rates_forward(it->a, it->g, it->w);
+    if (!parameters) return;
+    gt_rates_by_parameters(it->a, more, it->w);
+    for (i = 0; i < GT_STATES + GT_ALGEBRAICS; i++) it->g[i] += more[i];
+}
+
+/* Factors of all blocks at the present point. */
+static gt_status gt_factors(gt_instance *it)
+{
+    int number;
+    for (number = 0; number < GT_BLOCKS; number++)
+        if (!gt_factor_block(it, gt_blocks + number))
+            return gt_block_fails(it, gt_blocks + number, 0, "do not determine them (they depend on each other)");
+    return GT_OK;
+}
+
+/* dz that keeps all residuals at zero, then g and, if wanted, dy; blocks must be factored. */
+static void gt_along(gt_instance *it, int parameters)
+{
+    double step[GT_LARGEST_BLOCK_ROOM];
+    int number;
+    memset(it->dz, 0, sizeof it->dz);
+    for (number = 0; number < GT_BLOCKS; number++) {
+        const gt_block *block = gt_blocks + number;
+        gt_slopes(it, parameters);
+        gt_direction(it, block, it->g + GT_STATES + block->first, step);
+        memcpy(it->dz + block->first, step, block->count * sizeof(double));
+    }
+    gt_slopes(it, parameters);
+}
+
+static void gt_clear_direction(gt_instance *it)
+{
+    it->dt = 0;
+    memset(it->dx, 0, sizeof it->dx);
+    memset(it->du, 0, sizeof it->du);
+    memset(it->dp, 0, sizeof it->dp);
+}
+
+static gt_status gt_ready(gt_instance *it)
+{
+    gt_status status = it->mode == GT_INITIALIZATION ? gt_initial_equations(it) : GT_OK;
+    if (status == GT_OK) status = gt_refresh(it);
+    if (status == GT_OK && it->factors_stale) {
+        status = gt_factors(it);
+        it->factors_stale = status != GT_OK;
+    }
+    return status;
+}
+
+static gt_status gt_is_unknown(gt_instance *it, unsigned reference)
+{
+    gt_status status = gt_known_reference(it, reference);
+    if (status != GT_OK) return status;
+    switch ((gt_kind)gt_variables[reference].kind) {
+    case GT_DERIVATIVE: case GT_OUTPUT: case GT_STATE: case GT_HELD: case GT_CONSTANT: return GT_OK;
+    default: return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is no unknown, expected an output or the derivative of a state", GT_NAME,
+                           gt_name(reference));
+    }
+}
+
+/* The place of a known in the direction; NULL with a log line if it is none. */
+static double *gt_seed(gt_instance *it, unsigned reference)
+{
+    if (gt_known_reference(it, reference) != GT_OK) return NULL;
+    switch ((gt_kind)gt_variables[reference].kind) {
+    case GT_TIME: return &it->dt;
+    case GT_STATE: return it->dx + gt_variables[reference].index;
+    case GT_INPUT: case GT_HELD: return it->du + gt_variables[reference].index;
+    case GT_PARAMETER: return it->dp + gt_variables[reference].index;
+    default:
+        gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is no known, expected an input, a state or a parameter", GT_NAME, gt_name(reference));
+        return NULL;
+    }
+}
+
+/* Rates in g, outputs in dy if wanted, for the direction in dt, dx, du, dp. */
+static void gt_differentiate(gt_instance *it, int outputs, int parameters)
+{
+    double more[GT_ROOM(GT_OUTPUTS)];
+    int i;
+    gt_along(it, parameters);
+    if (!outputs) return;
+    gt_outputs_forward(it->a, it->dy, it->w);
+    if (!parameters) return;
+    gt_outputs_by_parameters(it->a, more, it->w);
+    for (i = 0; i < GT_OUTPUTS; i++) it->dy[i] += more[i];
+}
+
+static double gt_slope(const gt_instance *it, unsigned reference)
+{
+    const gt_variable *variable = gt_variables + reference;
+    switch ((gt_kind)variable->kind) {
+    case GT_DERIVATIVE: return it->g[variable->index];
+    case GT_OUTPUT: return it->dy[variable->index];
+    case GT_STATE: return it->dx[variable->index];
+    default: return 0;
+    }
+}
+
+static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, size_t n, int *outputs)
+{
+    size_t i;
+    *outputs = 0;
+    for (i = 0; i < n; i++) {
+        if (gt_is_unknown(it, unknown[i]) != GT_OK) return GT_ERROR;
+        *outputs |= gt_variables[unknown[i]].kind == GT_OUTPUT;
+    }
+    return GT_OK;
+}
+
+static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
+                                const double *d_known, double *d_unknown)
+{
+    int outputs, parameters = 0;
+    size_t i;
+    if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
+    gt_clear_direction(it);
+    for (i = 0; i < m; i++) {
+        double *seed = gt_seed(it, known[i]);
+        if (!seed) return GT_ERROR;
+        if (!isfinite(d_known[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the seed %g for %s, expected a finite number", GT_NAME, d_known[i],
+                          gt_name(known[i]));
+        *seed += d_known[i];
+        parameters |= gt_variables[known[i]].kind == GT_PARAMETER;
+    }
+    gt_differentiate(it, outputs, parameters);
+    for (i = 0; i < n; i++) d_unknown[i] = gt_slope(it, unknown[i]);
+    return GT_OK;
+}
+
+/* The transposed product, one column after another: as exact, and no code of its own. */
+static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
+                            const double *d_unknown, double *d_known)
+{
+    int outputs;
+    size_t i, j;
+    if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
+    for (i = 0; i < n; i++)
+        if (!isfinite(d_unknown[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the seed %g for %s, expected a finite number", GT_NAME, d_unknown[i],
+                          gt_name(unknown[i]));
+    for (j = 0; j < m; j++) {
+        double *seed, sum = 0;
+        gt_clear_direction(it);
+        seed = gt_seed(it, known[j]);
+        if (!seed) return GT_ERROR;
+        *seed = 1;
+        gt_differentiate(it, outputs, gt_variables[known[j]].kind == GT_PARAMETER);
+        for (i = 0; i < n; i++) sum += d_unknown[i] * gt_slope(it, unknown[i]);
+        d_known[j] = sum;
+    }
+    return GT_OK;
+}

@@ -1,0 +1,201 @@
+/* Events: sampled variables at multiples of their period, and friction that locks, slides forward or backward.
+ *
+ * While a friction is locked its force is an unknown that keeps the speed at zero; it breaks away when that
+ * force passes its limit. A sliding one locks when its speed comes to zero.
+ */
+
+#define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
+#define GT_MARGIN 1e-9       /* of the breakaway force */
+#define GT_ON_TIME 1e-9      /* of a period: instants that close are the same */
+
+/* Speed and breakaway force of each friction, (2, GT_MODES), rows first. */
+static gt_status gt_laws(gt_instance *it, double *laws)
+{
+    const gt_status status = gt_refresh(it);
+    if (status == GT_OK && GT_MODES) gt_friction(it->a, laws, it->w);
+    return status;
+}
+
+static double gt_indicator(const gt_instance *it, const double *laws, int i)
+{
+    const double speed = laws[2 * i], breakaway = laws[2 * i + 1], force = it->now.z[gt_friction_unknowns[i]];
+    if (it->now.m[i] != 0) return it->now.m[i] * speed + it->now.rest[i];
+    return breakaway - fabs(force) + GT_MARGIN * (1 + breakaway);
+}
+
+static gt_status gt_get_indicators(gt_instance *it, double *indicators)
+{
+    double laws[GT_ROOM(2 * GT_MODES)];
+    const gt_status status = gt_laws(it, laws);
+    int i;
+    for (i = 0; i < GT_MODES && status == GT_OK; i++) indicators[i] = gt_indicator(it, laws, i);
+    return status;
+}
+
+static void gt_set_mode(gt_instance *it, int i, double mode, double speed)
+{
+    static const char *const words[] = {"slides backward", "is locked", "slides forward"};
+    it->now.m[i] = mode;
+    it->now.rest[i] = GT_REST + fmax(0, -mode * speed);
+    it->now.stale = it->outputs_stale = 1;
+    gt_say(it, GT_OK, GT_LOG_EVENTS, "%s: %s %s from time = %.9g s on", GT_NAME, gt_z_names[gt_friction_unknowns[i]],
+           words[(int)mode + 1], it->now.time);
+}
+
+/* Release the locked frictions that cannot hold, the worst first, until all hold. */
+static gt_status gt_settle(gt_instance *it)
+{
+    double laws[GT_ROOM(2 * GT_MODES)];
+    int round, i;
+    for (round = 0; round <= 2 * GT_MODES; round++) {
+        int worst = -1;
+        double least = 0;
+        const gt_status status = gt_laws(it, laws);
+        if (status != GT_OK) return status;
+        for (i = 0; i < GT_MODES; i++) {
+            const double spare = gt_indicator(it, laws, i);
+            if (it->now.m[i] == 0 && spare < least) {
+                least = spare;
+                worst = i;
+            }
+        }
+        if (worst < 0) return GT_OK;
+        gt_set_mode(it, worst, it->now.z[gt_friction_unknowns[worst]] > 0 ? 1 : -1, laws[2 * worst]);
+    }
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the frictions find no state of sticking and sliding at time = %.9g s; take smooth "
+                  "friction", GT_NAME, it->now.time);
+}
+
+static gt_status gt_begin_modes(gt_instance *it)
+{
+    double laws[GT_ROOM(2 * GT_MODES)];
+    gt_status status;
+    int i;
+    if (!GT_MODES) return GT_OK;
+    status = gt_laws(it, laws);
+    if (status != GT_OK) return status;
+    for (i = 0; i < GT_MODES; i++)
+        gt_set_mode(it, i, laws[2 * i] > GT_REST ? 1 : laws[2 * i] < -GT_REST ? -1 : 0, laws[2 * i]);
+    it->now.stale = 1;
+    return gt_settle(it);
+}
+
+/* Lock what has come to rest and release what breaks away; *changed tells whether a mode has changed. */
+static gt_status gt_friction_events(gt_instance *it, int *changed)
+{
+    double laws[GT_ROOM(2 * GT_MODES)], before[GT_ROOM(GT_MODES)];
+    gt_status status;
+    int i;
+    *changed = 0;
+    if (!GT_MODES) return GT_OK;
+    memcpy(before, it->now.m, sizeof before);
+    status = gt_laws(it, laws);
+    if (status != GT_OK) return status;
+    for (i = 0; i < GT_MODES; i++)
+        if (it->now.m[i] != 0 && gt_indicator(it, laws, i) <= 0.5 * GT_REST) gt_set_mode(it, i, 0, 0);
+    status = gt_settle(it);
+    for (i = 0; i < GT_MODES; i++) *changed |= it->now.m[i] != before[i];
+    return status;
+}
+
+static double gt_next_tick(const gt_instance *it, int clock, const double *periods)
+{
+    return it->now.start + it->now.ticks[clock] * periods[clock];
+}
+
+static gt_status gt_check_clocks(gt_instance *it)
+{
+    double periods[GT_ROOM(GT_CLOCKS)];
+    int i;
+    if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
+    for (i = 0; i < GT_CLOCKS; i++)
+        if (!(periods[i] > 0) || !isfinite(periods[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the sampling period of %s is %g s, expected one above zero", GT_NAME,
+                          gt_clock_names[i], periods[i]);
+    return GT_OK;
+}
+
+/* The earliest sampling instant to come; INFINITY if there is none. */
+static double gt_next_sample(gt_instance *it)
+{
+    double periods[GT_ROOM(GT_CLOCKS)], next = INFINITY;
+    int i;
+    if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
+    for (i = 0; i < GT_CLOCKS; i++) next = fmin(next, gt_next_tick(it, i, periods));
+    return next;
+}
+
+/* Take the samples that are due; all updates use the values before the instant. */
+static gt_status gt_sample(gt_instance *it, int *sampled)
+{
+    double periods[GT_ROOM(GT_CLOCKS)], held[GT_ROOM(GT_HELD_COUNT)];
+    int due[GT_ROOM(GT_CLOCKS)], i;
+    gt_status status;
+    *sampled = 0;
+    if (!GT_CLOCKS) return GT_OK;
+    gt_parameters(it);
+    gt_periods(it->a, periods, it->w);
+    for (i = 0; i < GT_CLOCKS; i++) {
+        due[i] = gt_next_tick(it, i, periods) <= it->now.time + GT_ON_TIME * periods[i];
+        *sampled |= due[i];
+    }
+    if (!*sampled) return GT_OK;
+    status = gt_refresh(it);
+    if (status != GT_OK) return status;
+    gt_samples(it->a, held, it->w);
+    for (i = 0; i < GT_HELD_COUNT; i++)
+        if (due[gt_held_clocks[i]] && !isfinite(held[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the sample of %s is not a finite number at time = %.9g s", GT_NAME,
+                          gt_held_names[i], it->now.time);
+    for (i = 0; i < GT_HELD_COUNT; i++)
+        if (due[gt_held_clocks[i]]) it->now.u[GT_INPUTS + i] = held[i];
+    for (i = 0; i < GT_CLOCKS; i++)
+        if (due[i]) it->now.ticks[i] = floor((it->now.time - it->now.start) / periods[i] + GT_ON_TIME) + 1;
+    it->now.stale = it->outputs_stale = 1;
+    return GT_OK;
+}
+
+static gt_status gt_update(gt_instance *it, gt_event_info *info)
+{
+    int sampled = 0, changed = 0;
+    gt_status status = gt_sample(it, &sampled);
+    memset(info, 0, sizeof *info);
+    if (status == GT_OK) status = gt_friction_events(it, &changed);
+    if (status != GT_OK) return status;
+    info->again = sampled || changed;
+    info->next = gt_next_sample(it);
+    info->next_defined = GT_CLOCKS > 0;
+    return GT_OK;
+}
+
+static gt_status gt_set_time(gt_instance *it, double time)
+{
+    if (!isfinite(time))
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the time %g, expected a finite number in s", GT_NAME, time);
+    if (it->now.time != time) it->now.stale = it->outputs_stale = 1;
+    it->now.time = it->time = time;
+    return GT_OK;
+}
+
+static gt_status gt_set_states(gt_instance *it, const double *x)
+{
+    int i;
+    for (i = 0; i < GT_STATES; i++)
+        if (!isfinite(x[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the value %g for the state %s, expected a finite number; the integrator of "
+                          "the importing tool may take steps that are too long", GT_NAME, x[i], gt_x_names[i]);
+    memcpy(it->now.x, x, GT_STATES * sizeof(double));
+    it->now.stale = it->outputs_stale = 1;
+    return GT_OK;
+}
+
+static void gt_get_states(const gt_instance *it, double *x)
+{
+    memcpy(x, it->now.x, GT_STATES * sizeof(double));
+}
+
+static void gt_get_nominals(const gt_instance *it, double *nominals)
+{
+    (void)it;
+    memcpy(nominals, gt_x_nominals, GT_STATES * sizeof(double));
+}

@@ -1,0 +1,80 @@
+/* Initialisation: the states that initial equations determine, modes, first samples. */
+
+#define GT_INITIAL_ITERATIONS 30
+
+static gt_status gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop)
+{
+    if (!isfinite(start) || (stop_defined && !(isfinite(stop) && stop > start)))
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found start = %g s and stop = %g s, expected finite numbers, start before stop",
+                      GT_NAME, start, stop);
+    if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the tolerance %g, expected a number between 0 and 1", GT_NAME, tolerance);
+    it->now.start = it->now.time = it->time = start;
+    it->now.stop = stop;
+    it->now.stop_defined = stop_defined;
+    if (tolerance_defined) it->now.tolerance = fmax(tolerance, 1e-12);
+    it->now.stale = it->outputs_stale = 1;
+    return GT_OK;
+}
+
+/* Residuals of the initial equations at the present states; GT_DISCARD where there are none. */
+static gt_status gt_initial_residual(gt_instance *it, double *residual)
+{
+    int i;
+    it->now.stale = 1;
+    gt_point_at(it, &it->now.time, it->now.x);
+    if (gt_solve(it, 0) != GT_OK) return GT_ERROR;
+    gt_initial(it->a, residual, it->w);
+    for (i = 0; i < GT_INITIAL; i++)
+        if (!isfinite(residual[i])) return GT_DISCARD;
+    return GT_OK;
+}
+
+/* Newton's method with differences for the Jacobian: the residuals are exact, so the solution is. */
+static gt_status gt_initial_equations(gt_instance *it)
+{
+    double residual[GT_ROOM(GT_INITIAL)], moved[GT_ROOM(GT_INITIAL)], matrix[GT_ROOM(GT_INITIAL * GT_INITIAL)];
+    double scales[GT_ROOM(GT_INITIAL)];
+    int pivots[GT_ROOM(GT_INITIAL)], iteration, i, j;
+    double size = INFINITY;
+    gt_start_values(it);
+    if (GT_INITIAL == 0 || it->now.initialized || (!it->now.stale && !it->parameters_stale)) return GT_OK;
+    for (iteration = 0; iteration < GT_INITIAL_ITERATIONS; iteration++) {
+        if (gt_initial_residual(it, residual) != GT_OK) break;
+        if (size <= 1e-12) return gt_refresh(it);
+        for (j = 0; j < GT_INITIAL; j++) {
+            double *x = it->now.x + gt_initial_states[j];
+            const double kept = *x, step = 1e-6 * (1 + fabs(kept));
+            *x = kept + step;
+            if (gt_initial_residual(it, moved) != GT_OK) return GT_ERROR;
+            for (i = 0; i < GT_INITIAL; i++) matrix[i + j * GT_INITIAL] = (moved[i] - residual[i]) / step;
+            *x = kept;
+        }
+        if (!gt_factor(GT_INITIAL, matrix, pivots, scales)) break;
+        gt_solve_factored(GT_INITIAL, matrix, pivots, scales, residual);
+        for (size = 0, j = 0; j < GT_INITIAL; j++) {
+            double *x = it->now.x + gt_initial_states[j];
+            *x -= residual[j];
+            size = fmax(size, fabs(residual[j]) / (1 + fabs(*x)));
+        }
+    }
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the initial equations for %s%s could not be solved at time = %.9g s; check start values, "
+                  "inputs and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
+}
+
+static gt_status gt_initialize(gt_instance *it)
+{
+    gt_event_info info;
+    double rates[GT_ROOM(GT_STATES)];
+    gt_status status = gt_initial_equations(it);
+    if (status == GT_OK) status = gt_refresh(it);
+    if (status != GT_OK) return status;
+    it->now.initialized = 1;
+    memset(it->now.ticks, 0, sizeof it->now.ticks);
+    status = gt_check_clocks(it);
+    if (status == GT_OK) status = gt_begin_modes(it);
+    if (status == GT_OK && !it->cosimulation) return gt_get_rates(it, rates); /* samples are taken in the first event mode */
+    if (status == GT_OK) status = gt_update(it, &info);
+    if (status == GT_OK) status = gt_get_rates(it, rates);
+    return status;
+}

@@ -1,0 +1,130 @@
+/* One instance: its memory, its life, its log. The generated model.c stands before this file. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define GT_ROOM(n) ((n) + 1) /* ISO C knows no arrays of length zero */
+#define GT_LARGEST_BLOCK_ROOM GT_ROOM(GT_LARGEST_BLOCK)
+
+/* What a saved state holds: plain numbers, so that saving is a copy. */
+typedef struct {
+    double time;
+    double x[GT_ROOM(GT_STATES)];
+    double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables */
+    double z[GT_ROOM(GT_ALGEBRAICS)]; /* unknowns of the implicit blocks */
+    double p[GT_ROOM(GT_PARAMETERS)];
+    double m[GT_ROOM(GT_MODES)];      /* 1 forward, -1 backward, 0 locked */
+    double ticks[GT_ROOM(GT_CLOCKS)]; /* the next sampling instant of a clock is start + ticks * period */
+    double size;                      /* of the last step of the integrator, 0 before the first */
+    double start, stop, tolerance;
+    /* the last point where the equations were solved, from which others are reached */
+    double solved_time, solved_x[GT_ROOM(GT_STATES)], solved_u[GT_ROOM(GT_KNOWN)], solved_z[GT_ROOM(GT_ALGEBRAICS)];
+    double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
+    double sides[GT_ROOM(GT_BLOCKS)]; /* signs of the determinants of the blocks there */
+    int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
+    int stop_defined, mode, initialized, stale;
+} gt_state;
+
+struct gt_instance {
+    gt_state now;
+    gt_mode mode;
+    double time; /* as the caller knows it */
+    int cosimulation, fmi;
+    void *who;
+    gt_sink sink;
+    int logging[GT_LOG_CATEGORIES];
+    int parameters_stale, outputs_stale, starts_stale, factors_stale;
+    const double *a[GT_ARRAYS + 1];
+    double c[GT_ROOM(GT_HOISTED)], w[GT_ROOM(GT_WORK)], y[GT_ROOM(GT_OUTPUTS)];
+    double matrices[GT_ROOM(GT_MATRICES)]; /* factored Jacobians of the blocks, one after another */
+    int pivots[GT_ROOM(GT_ALGEBRAICS)];
+    double scales[GT_ROOM(GT_ALGEBRAICS)];
+    double dt, dx[GT_ROOM(GT_STATES)], du[GT_ROOM(GT_KNOWN)], dz[GT_ROOM(GT_ALGEBRAICS)], dp[GT_ROOM(GT_PARAMETERS)];
+    double g[GT_ROOM(GT_STATES + GT_ALGEBRAICS)], dy[GT_ROOM(GT_OUTPUTS)];
+    double k[7][GT_ROOM(GT_STATES)], trial[GT_ROOM(GT_STATES)], next[GT_ROOM(GT_STATES)];
+    double jacobian[GT_ROOM(GT_STATES * GT_STATES)], rate_of_time[GT_ROOM(GT_STATES)];
+    int order[GT_ROOM(GT_STATES)];
+    double rows[GT_ROOM(GT_STATES)];
+};
+
+static const char *const gt_category_names[] = GT_CATEGORY_NAMES;
+
+static gt_status gt_say(gt_instance *it, gt_status status, gt_category category, const char *format, ...)
+{
+    char text[1024];
+    va_list arguments;
+    if (!it->sink || !it->logging[category]) return status;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    it->sink(it->who, status, gt_category_names[category], text);
+    return status;
+}
+
+/* Calls between the parts that core.h does not name. */
+static gt_status gt_initial_equations(gt_instance *it);
+static gt_status gt_check_clocks(gt_instance *it);
+static gt_status gt_begin_modes(gt_instance *it);
+
+/* Where the functions of the model find their arguments; the order is that of ARRAYS in code.py. */
+static void gt_point_at(gt_instance *it, const double *time, const double *x)
+{
+    it->a[0] = time;
+    it->a[1] = x;
+}
+
+static void gt_reset(gt_instance *it)
+{
+    memset(&it->now, 0, sizeof it->now);
+    memcpy(it->now.x, gt_start_x, GT_STATES * sizeof(double));
+    memcpy(it->now.u, gt_start_u, GT_KNOWN * sizeof(double));
+    memcpy(it->now.z, gt_start_z, GT_ALGEBRAICS * sizeof(double));
+    memcpy(it->now.p, gt_start_p, GT_PARAMETERS * sizeof(double));
+    memcpy(it->now.solved_x, gt_start_x, GT_STATES * sizeof(double));
+    memcpy(it->now.solved_u, gt_start_u, GT_KNOWN * sizeof(double));
+    memcpy(it->now.solved_z, gt_start_z, GT_ALGEBRAICS * sizeof(double));
+    it->now.tolerance = GT_TOLERANCE;
+    it->now.stale = 1;
+    it->mode = GT_INSTANTIATED;
+    it->time = 0;
+    it->parameters_stale = it->outputs_stale = it->factors_stale = 1;
+    it->starts_stale = 0;
+    it->dt = 0;
+    it->a[2] = it->now.u;
+    it->a[3] = it->now.z;
+    it->a[4] = it->now.p;
+    it->a[5] = it->now.m;
+    it->a[6] = &it->dt;
+    it->a[7] = it->dx;
+    it->a[8] = it->du;
+    it->a[9] = it->dz;
+    it->a[10] = it->dp;
+    it->a[11] = it->c;
+    gt_point_at(it, &it->now.time, it->now.x);
+}
+
+static gt_instance *gt_new(const char *name, gt_sink sink, void *who, int cosimulation, int logging)
+{
+    gt_instance *it = calloc(1, sizeof *it);
+    (void)name;
+    if (!it) return NULL;
+    it->sink = sink;
+    it->who = who;
+    it->cosimulation = cosimulation;
+    it->logging[GT_LOG_EVENTS] = it->logging[GT_LOG_CALLS] = logging;
+    it->logging[GT_LOG_WARNING] = it->logging[GT_LOG_ERROR] = 1; /* what went wrong is always told */
+    gt_reset(it);
+    return it;
+}
+
+static void gt_free(gt_instance *it)
+{
+    free(it);
+}
+
+static void gt_logging(gt_instance *it, gt_category category, int on)
+{
+    it->logging[category] = on;
+}

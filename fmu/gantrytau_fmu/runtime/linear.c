@@ -1,0 +1,62 @@
+/* Small dense linear systems: LU factors with row pivoting of rows scaled by their largest element. */
+
+#define GT_SMALLEST_PIVOT 1e-13 /* of a scaled row: below, the rows depend on each other */
+
+/* Factor a (n, n), stored column after column, in place. Returns the sign of its determinant, 0 if it is
+ * singular or not finite. scales: 1 / largest element of each row. */
+static int gt_factor(int n, double *a, int *pivots, double *scales)
+{
+    int sign = 1, i, j, k;
+    for (i = 0; i < n; i++) {
+        double largest = 0;
+        for (j = 0; j < n; j++) largest = fmax(largest, fabs(a[i + j * n]));
+        if (!(largest > 0) || !isfinite(largest)) return 0;
+        scales[i] = 1 / largest;
+    }
+    for (j = 0; j < n; j++)
+        for (i = 0; i < n; i++) {
+            a[i + j * n] *= scales[i];
+            if (!isfinite(a[i + j * n])) return 0;
+        }
+    for (k = 0; k < n; k++) {
+        int best = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(a[i + k * n]) > fabs(a[best + k * n])) best = i;
+        pivots[k] = best;
+        if (!(fabs(a[best + k * n]) > GT_SMALLEST_PIVOT)) return 0;
+        if (best != k) {
+            sign = -sign;
+            for (j = 0; j < n; j++) {
+                const double kept = a[k + j * n];
+                a[k + j * n] = a[best + j * n];
+                a[best + j * n] = kept;
+            }
+        }
+        if (a[k + k * n] < 0) sign = -sign;
+        for (i = k + 1; i < n; i++) a[i + k * n] /= a[k + k * n];
+        for (j = k + 1; j < n; j++) {
+            const double factor = a[k + j * n];
+            if (factor != 0)
+                for (i = k + 1; i < n; i++) a[i + j * n] -= a[i + k * n] * factor;
+        }
+    }
+    return sign;
+}
+
+/* Solve with the factors: b (n) becomes the solution. */
+static void gt_solve_factored(int n, const double *a, const int *pivots, const double *scales, double *b)
+{
+    int i, k;
+    for (i = 0; i < n; i++) b[i] *= scales[i];
+    for (k = 0; k < n; k++) {
+        const double kept = b[pivots[k]];
+        b[pivots[k]] = b[k];
+        b[k] = kept;
+    }
+    for (k = 0; k < n; k++)
+        for (i = k + 1; i < n; i++) b[i] -= a[i + k * n] * b[k];
+    for (k = n - 1; k >= 0; k--) {
+        b[k] /= a[k + k * n];
+        for (i = 0; i < k; i++) b[i] -= a[i + k * n] * b[k];
+    }
+}

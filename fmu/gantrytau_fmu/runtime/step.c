@@ -1,0 +1,164 @@
+/* Co-Simulation: from one communication point to the next, with control of the error and events on the way. */
+
+#define GT_MOST_STEPS 100000
+#define GT_MOST_EVENTS 1000
+#define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
+#define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
+
+static double gt_error_norm(const gt_instance *it, const double *x, const double *next, const double *error)
+{
+    double sum = 0;
+    int i;
+    for (i = 0; i < GT_STATES; i++) {
+        const double scale = it->now.tolerance * (1e-3 * gt_x_nominals[i] + fmax(fabs(x[i]), fabs(next[i])));
+        const double part = error[i] / scale;
+        sum += part * part;
+    }
+    return GT_STATES ? sqrt(sum / GT_STATES) : 0;
+}
+
+/* Put the model where a step has led; z is solved anew. */
+static gt_status gt_move(gt_instance *it, double time, const double *x)
+{
+    double sides[GT_ROOM(GT_BLOCKS)];
+    gt_status status;
+    int i;
+    memcpy(sides, it->now.sides, sizeof sides);
+    it->now.time = time;
+    memcpy(it->now.x, x, GT_STATES * sizeof(double));
+    it->now.stale = it->outputs_stale = 1;
+    if (GT_BLOCKS == 0 && GT_MODES == 0) return GT_OK;
+    status = gt_refresh(it);
+    for (i = 0; i < GT_BLOCKS && status == GT_OK; i++)
+        if (!gt_blocks[i].frictions && sides[i] * it->now.sides[i] < 0)
+            status = gt_block_fails(it, gt_blocks + i, 0, "have passed a singular pose");
+    return status;
+}
+
+static int gt_crossed(gt_instance *it)
+{
+    double indicators[GT_ROOM(GT_MODES)];
+    int i;
+    if (!GT_MODES || gt_get_indicators(it, indicators) != GT_OK) return 0;
+    for (i = 0; i < GT_MODES; i++)
+        if (indicators[i] <= 0) return 1;
+    return 0;
+}
+
+/* The step of size h from (t, x) crosses: find the shortest that does, by halving. */
+static gt_status gt_locate(gt_instance *it, double t, double h, const double *x)
+{
+    double before = 0, behind = h, error[GT_ROOM(GT_STATES)];
+    gt_status status = GT_OK;
+    while (status == GT_OK && behind - before > GT_LOCATED + 4e-16 * fabs(t)) {
+        const double middle = before + 0.5 * (behind - before);
+        if (gt_try_step(it, t, middle, x, it->next, error) != GT_OK) return GT_DISCARD;
+        status = gt_move(it, t + middle, it->next);
+        if (gt_crossed(it)) behind = middle;
+        else before = middle;
+    }
+    if (status != GT_OK || gt_try_step(it, t, behind, x, it->next, error) != GT_OK) return GT_DISCARD;
+    return gt_move(it, t + behind, it->next);
+}
+
+/* The state that changes most for its size. */
+static int gt_fastest(const gt_instance *it)
+{
+    int fastest = 0, i;
+    double most = -1;
+    for (i = 0; i < GT_STATES; i++) {
+        const double rate = fabs(it->k[GT_FIRST_RATES][i]) / (gt_x_nominals[i] + fabs(it->now.x[i]));
+        if (rate > most) {
+            most = rate;
+            fastest = i;
+        }
+    }
+    return fastest;
+}
+
+static gt_status gt_too_short(gt_instance *it, double h)
+{
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the steps of the integrator became shorter than %.2g s at time = %.9g s, where the fastest "
+                  "state is %s; the motion may be meeting a singular pose or a limit of reach, or be too stiff for this solver",
+                  GT_NAME, h, it->now.time, gt_x_names[gt_fastest(it)]);
+}
+
+/* Integrate to `end`, or to an event before; *event tells which. */
+static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event)
+{
+    double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
+    const double shortest = GT_SHORTEST * fmax(fabs(end), end - it->now.time);
+    double h = it->now.size > 0 ? it->now.size : end - it->now.time;
+    gt_status status = gt_prepare(it);
+    int rejected = 0;
+    *event = 0;
+    while (status == GT_OK && end - it->now.time > shortest) {
+        const double t = it->now.time, rest = end - t;
+        const int last = h >= rest * (1 - 1e-9);
+        double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, norm;
+        if (++*count > GT_MOST_STEPS)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d steps of the integrator in one communication step, at time = %.9g s, "
+                          "where the fastest state is %s; take a shorter step, or the solver for stiff models",
+                          GT_NAME, GT_MOST_STEPS, t, gt_x_names[gt_fastest(it)]);
+        memcpy(x, it->now.x, GT_STATES * sizeof(double));
+        norm = gt_try_step(it, t, size, x, it->next, error) == GT_OK ? gt_error_norm(it, x, it->next, error) : INFINITY;
+        if (!(norm <= 1)) {
+            h = size * (norm < INFINITY ? fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER)) : 0.25);
+            rejected = 1;
+            if (h < shortest) return gt_too_short(it, h);
+            continue;
+        }
+        status = gt_move(it, last ? end : t + size, it->next);
+        if (status == GT_OK && gt_crossed(it)) {
+            status = gt_locate(it, t, size, x);
+            *event = 1;
+            return status;
+        }
+        {
+            const double grown = norm < 1e-4 ? 5 : 0.9 * pow(norm, -1. / GT_ORDER), growth = fmin(rejected ? 1 : 5, grown);
+            if (!last || growth < 1 || size * growth > h) h = size * growth;
+        }
+        it->now.size = h;
+        rejected = 0;
+        if (status == GT_OK && !last) status = gt_accepted(it);
+    }
+    if (status == GT_OK) it->now.time = end;
+    return status;
+}
+
+/* The friction events and samples at the present time. */
+static gt_status gt_handle_events(gt_instance *it, int *events)
+{
+    int again = 1;
+    while (again) {
+        gt_event_info info;
+        const gt_status status = gt_update(it, &info);
+        if (status != GT_OK) return status;
+        again = info.again;
+        *events += again;
+        if (*events > GT_MOST_EVENTS)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, at time = %.9g s; take a shorter "
+                          "step, or smooth friction", GT_NAME, GT_MOST_EVENTS, it->now.time);
+    }
+    return GT_OK;
+}
+
+static gt_status gt_step(gt_instance *it, double time, double size, double *reached)
+{
+    const double end = time + size;
+    int count = 0, events = 0, event = 0;
+    gt_status status = GT_OK;
+    it->now.time = time;
+    while (status == GT_OK) {
+        double next;
+        if (GT_CLOCKS || GT_MODES) status = gt_handle_events(it, &events);
+        next = GT_CLOCKS ? gt_next_sample(it) : INFINITY;
+        if (status == GT_OK)
+            status = gt_integrate(it, next < end - GT_ON_TIME * size ? next : end, &count, &event);
+        if (!event && it->now.time >= end) break;
+    }
+    it->time = it->now.time;
+    *reached = it->now.time;
+    if (status == GT_DISCARD) status = gt_too_short(it, it->now.size);
+    return status;
+}

@@ -1,0 +1,131 @@
+/* Values by reference. */
+
+static const char *gt_name(unsigned reference)
+{
+    return gt_variables[reference].name;
+}
+
+static gt_status gt_known_reference(gt_instance *it, unsigned reference)
+{
+    if (reference < GT_VARIABLES) return GT_OK;
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the value reference %u, expected one below %u; take references from the model "
+                  "description of this FMU", GT_NAME, reference, (unsigned)GT_VARIABLES);
+}
+
+static void gt_start_values(gt_instance *it)
+{
+    double x[GT_ROOM(GT_STATES)];
+    int i;
+    if (!it->starts_stale) return;
+    it->starts_stale = 0;
+    gt_parameters(it);
+    gt_starts(it->a, x, it->w);
+    for (i = 0; i < GT_STATES; i++)
+        if (!it->now.given[i]) it->now.x[i] = x[i];
+}
+
+static gt_status gt_get_outputs(gt_instance *it)
+{
+    gt_status status = gt_refresh(it);
+    if (status != GT_OK || !it->outputs_stale) return status;
+    gt_outputs(it->a, it->y, it->w);
+    it->outputs_stale = 0;
+    return GT_OK;
+}
+
+static gt_status gt_get(gt_instance *it, unsigned reference, double *value)
+{
+    const gt_variable *variable;
+    gt_status status = gt_known_reference(it, reference);
+    if (status != GT_OK) return status;
+    variable = gt_variables + reference;
+    if (it->mode == GT_INITIALIZATION || it->mode == GT_INSTANTIATED) gt_start_values(it);
+    switch ((gt_kind)variable->kind) {
+    case GT_TIME: *value = it->now.time; break;
+    case GT_CONSTANT: *value = gt_constants[variable->index]; break;
+    case GT_PARAMETER: *value = it->now.p[variable->index]; break;
+    case GT_INPUT: case GT_HELD: *value = it->now.u[variable->index]; break;
+    case GT_STATE:
+        if (variable->fixed && it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
+        *value = it->now.x[variable->index];
+        break;
+    case GT_DERIVATIVE: {
+        double rates[GT_ROOM(GT_STATES)];
+        if (it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
+        if (status == GT_OK) status = gt_get_rates(it, rates);
+        if (status == GT_OK) *value = rates[variable->index];
+        break;
+    }
+    case GT_OUTPUT:
+        if (it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
+        if (status == GT_OK) status = gt_get_outputs(it);
+        if (status == GT_OK) {
+            *value = it->y[variable->index];
+            if (!isfinite(*value))
+                status = gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is not a finite number at time = %.9g s; the model has no solution "
+                                "there (a pose out of reach or singular): keep away from it", GT_NAME, variable->name, it->now.time);
+        }
+        break;
+    case GT_INDICATOR: {
+        double indicators[GT_ROOM(GT_MODES)];
+        status = gt_get_indicators(it, indicators);
+        if (status == GT_OK) *value = indicators[variable->index];
+        break;
+    }
+    case GT_MODE:
+        status = gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is an integer, expected a floating-point variable", GT_NAME, variable->name);
+    }
+    return status;
+}
+
+static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value)
+{
+    const gt_status status = gt_known_reference(it, reference);
+    if (status != GT_OK) return status;
+    if (gt_variables[reference].kind != GT_MODE)
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is a floating-point variable, expected an integer", GT_NAME, gt_name(reference));
+    *value = (int)it->now.m[gt_variables[reference].index];
+    return GT_OK;
+}
+
+static gt_status gt_refuse(gt_instance *it, unsigned reference, const char *why)
+{
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s cannot be set: %s", GT_NAME, gt_name(reference), why);
+}
+
+static gt_status gt_set(gt_instance *it, unsigned reference, double value)
+{
+    const int early = it->mode == GT_INSTANTIATED || it->mode == GT_INITIALIZATION;
+    const gt_variable *variable;
+    gt_status status = gt_known_reference(it, reference);
+    double *place;
+    if (status != GT_OK) return status;
+    variable = gt_variables + reference;
+    if (!isfinite(value)) return gt_refuse(it, reference, "found NaN or an infinite value, expected a finite number");
+    switch ((gt_kind)variable->kind) {
+    case GT_PARAMETER:
+        if (variable->fixed && !early) return gt_refuse(it, reference, "it is a fixed parameter; set it before initialisation ends");
+        place = it->now.p + variable->index;
+        break;
+    case GT_INPUT: place = it->now.u + variable->index; break;
+    case GT_STATE:
+        if (!early && it->cosimulation)
+            return gt_refuse(it, reference, "it is a state, which can be set before initialisation ends; to go back, restore a saved state");
+        if (early && variable->fixed) return gt_refuse(it, reference, "it follows from initial equations; set what they depend on");
+        if (early) it->now.given[variable->index] = 1;
+        place = it->now.x + variable->index;
+        break;
+    case GT_CONSTANT: return gt_refuse(it, reference, "it shapes the equations and is constant; keep it as a parameter by naming it in "
+                                       "given= of export_fmu");
+    case GT_TIME: return gt_refuse(it, reference, "it is the independent variable");
+    default: return gt_refuse(it, reference, "it is calculated");
+    }
+    if (*place == value) return GT_OK;
+    *place = value;
+    if (variable->kind == GT_PARAMETER) {
+        it->parameters_stale = 1;
+        if (variable->fixed) it->starts_stale = 1;
+    }
+    it->now.stale = it->outputs_stale = 1;
+    return GT_OK;
+}
