@@ -23,6 +23,7 @@ from gantrytau.errors import (
     SolveError,
     StructureError,
 )
+from gantrytau.events import sampled, stick_slip
 from gantrytau.extraction import Mechanism, extract_mechanism
 from gantrytau.flat_model import FlatModel
 from gantrytau.flattening import flatten
@@ -103,9 +104,11 @@ __all__ = [
     "outer",
     "require",
     "root",
+    "sampled",
     "simulate",
     "sin",
     "sqrt",
+    "stick_slip",
     "tan",
     "tanh",
     "time",

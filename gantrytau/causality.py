@@ -7,6 +7,7 @@ import casadi as ca
 
 from gantrytau.blocks import block_pattern
 from gantrytau.errors import ModelError, StructureError
+from gantrytau.events import event_names
 from gantrytau.guide import Guide
 from gantrytau.iteration import Implicit, solved_one_by_one
 from gantrytau.solution import Block, solve_blocks
@@ -68,8 +69,8 @@ def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iter
     leaves = [leaf.name() for name in find for n in dae.expand(name) for leaf in ca.symvar(dae.expression(n))]
     if any(split_derivative(n)[1] > orders.get(split_derivative(n)[0], 99) for n in leaves):
         parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
-        known, states = (*dae.known, *parameters), dae.settings["states"]
-        yield translate_flat(dae.flat, given=known, find=find, states=states, start=dae.start)
+        known, states = (*dae.inputs, *parameters), dae.settings["states"]
+        yield translate_flat(dae.flat, given=known, find=find, states=states, start=dae.start, events=True)
     yield _flipped(dae, given, find)
 
 
@@ -81,7 +82,7 @@ def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":
         return dae
     parameters = [n for n in scalars if n in dae.table.symbols]
     chosen = {k: dae.settings[k] for k in ("find", "states")}
-    return translate_flat(dae.flat, given=(*dae.known, *parameters), **chosen)
+    return translate_flat(dae.flat, given=(*dae.inputs, *parameters), **chosen, events=True)
 
 
 def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
@@ -139,7 +140,11 @@ def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
         alias = dae.reduced.aliases[name]
         if alias.root is not None and alias.order == 0:
             roots.setdefault(alias.root, name)
-    return translate_flat(dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start)
+    for name in event_names(dae.flat):  # known anyway
+        roots.pop(name, None)
+    return translate_flat(
+        dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start, events=True
+    )
 
 
 def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gantrytau.aliases import Reduced, alias_expression
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.events import event_names
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.index_reduction import Indexed, Key
 from gantrytau.parameters import ParameterTable
@@ -28,6 +29,7 @@ class Dae:
     """A differential-algebraic system of index one, sorted into blocks that are solved one after another.
 
     Made by `translate`. Names are those of the model; a vector's name stands for its elements.
+    known: the inputs, then sampled variables, then the forces of friction that sticks.
     """
 
     flat: FlatModel
@@ -42,7 +44,7 @@ class Dae:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        return f"<Dae {self.name}: {len(self.states)} states, {len(self.known)} inputs, {len(self.blocks)} blocks>"
+        return f"<Dae {self.name}: {len(self.states)} states, {len(self.inputs)} inputs, {len(self.blocks)} blocks>"
 
     @property
     def name(self) -> str:
@@ -62,7 +64,8 @@ class Dae:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is known from outside, scalars."""
-        return self.known
+        events = set(event_names(self.flat))
+        return tuple(n for n in self.known if n not in events)
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from gantrytau.errors import InitializationError, StructureError
+from gantrytau.events import event_names
 from gantrytau.flat_model import FlatModel, Loop
 from gantrytau.flattening import flatten
 from gantrytau.model import Model
@@ -97,12 +98,12 @@ def check(model: Model) -> Diagnosis:
     try:
         flat = flatten(model)
         check_units(flat)
-        return diagnose(translate_flat(flat))
+        return diagnose(translate_flat(flat, events=True))
     except (StructureError, InitializationError) as error:
         if flat is None:
             cls = model if isinstance(model, type) else type(model)
             return Diagnosis(cls.__name__, 0, 0, missing=str(error))
-        unknowns, equations = _sizes(flat, len(flat.inputs))
+        unknowns, equations = _sizes(flat, len(flat.inputs) + len(event_names(flat)))
         return Diagnosis(flat.name, unknowns, equations, loops=flat.loops, missing=str(error))
 
 

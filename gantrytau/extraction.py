@@ -24,6 +24,7 @@ import numpy as np
 
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, StructureError
+from gantrytau.events import refuse_events
 from gantrytau.model import Model
 from gantrytau.strata import EVERYTHING, FOLLOWS, Strata
 from gantrytau.symbols import derivative_name
@@ -110,6 +111,7 @@ def extract_mechanism(
     StructureError where tool, joints and forces do not determine each other.
     """
     dae = model if isinstance(model, Dae) else translate(model)
+    refuse_events(dae.flat)
     roles = _roles(dae, {"T": tool, "q": joints, "f": forces})
     strata = Strata(_moved_by_tool(dae, roles), roles)
     functions = _pieces(strata)

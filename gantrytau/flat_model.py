@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.declarations import StateSelect
+from gantrytau.events import Sampled, StickSlip
 from gantrytau.statements import Equation, Requirement
 
 
@@ -66,7 +67,7 @@ class FlatModel:
     are no unknowns but `definitions`: expressions, by scalar name, of variables and of definitions before
     them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
     scalars known from outside; absent: declared names that this model has no use for, and why;
-    requirements: conditions on parameters.
+    requirements: conditions on parameters; sampled, frictions: scalars that are set at instants, no unknowns either.
     """
 
     name: str
@@ -84,6 +85,8 @@ class FlatModel:
     hints: Mapping[str, str]
     absent: Mapping[str, str]
     requirements: tuple[Requirement, ...]
+    sampled: tuple[Sampled, ...] = ()
+    frictions: tuple[StickSlip, ...] = ()
 
     def find(self, name: str) -> FlatVariable | None:
         """The variable, parameter or propagated quantity of that name."""

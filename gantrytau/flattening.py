@@ -12,6 +12,7 @@ from gantrytau.closures import Closure
 from gantrytau.connections import connection_equations
 from gantrytau.declarations import Parameter, evaluate
 from gantrytau.errors import GantryTauError, ModelError, did_you_mean
+from gantrytau.events import Sampling, Sticking, expressed, read_events, with_expressions, with_starts
 from gantrytau.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
 from gantrytau.model import Declared, Model
@@ -41,6 +42,7 @@ class _Stated:
     connections: list[tuple[str, Connection]] = field(default_factory=list)
     ways: list[tuple[str, str, int, Branch | Root]] = field(default_factory=list)
     requirements: list[Requirement] = field(default_factory=list)
+    events: list[tuple[str, str, int, Sampling | Sticking]] = field(default_factory=list)
 
 
 def _stated(instance: Instance) -> _Stated:
@@ -52,6 +54,8 @@ def _stated(instance: Instance) -> _Stated:
                 found.connections.append((path, statement))
             elif isinstance(statement, Requirement):
                 found.requirements.append(replace(statement, path=path, model=name))
+            elif isinstance(statement, (Sampling, Sticking)):
+                found.events.append((path, name, number, statement))
             elif isinstance(statement, (Branch, Root)):
                 found.ways.append((path, name, number, statement))
             else:
@@ -82,15 +86,20 @@ def write_out(instance: Instance) -> FlatModel:
         spread = Spread(instance, tree)
         written = spread.substituted(equations)
         written_initial = spread.substituted(stated.initial)
-        _refuse_nan((*written, *written_initial))
-        spread.refuse_undefined((*written, *written_initial))
+        events = read_events(stated.events, instance.symbols)
+        written_events = spread.substituted(expressed(events, instance.symbols))
+        sampled, frictions = with_expressions(events, written_events)
+        everything = (*written, *written_initial, *written_events)
+        _refuse_nan(everything)
+        spread.refuse_undefined(everything)
         absent = _absent(statements, tree)
-        _refuse_absent((*written, *written_initial), absent)
+        _refuse_absent(everything, absent)
         _refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
         kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
         parameters = tuple(_parameter(p) for p in placed if kinds[p.name] == "parameter")
         variables = tuple(_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated"))
+        variables = with_starts(variables, events)
         passed = tuple(_variable(p) for p in placed if kinds[p.name] == "propagated")
     return FlatModel(
         name=type(instance.root).__name__,
@@ -107,7 +116,9 @@ def write_out(instance: Instance) -> FlatModel:
         inputs=_free_inputs(instance, equations),
         hints=_hints(instance),
         absent=absent,
-        requirements=tuple(stated.requirements),
+        requirements=(*stated.requirements, *events.requirements),
+        sampled=sampled,
+        frictions=frictions,
     )
 
 

@@ -32,9 +32,18 @@ def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, sym
         numbers = table.number(ca.vertcat(*variable.start))
         for name, number in zip(variable.elements, numbers, strict=True):
             _place(variable, name, float(number), table, reduced, values, owners, fixed)
+    for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
+        values[event.name] = _own_start(flat, table, event.name)
     values.update(table.values)
     values[flat.time.name()] = 0.0
     return Guess(values, frozenset(owners), frozenset(fixed))
+
+
+def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
+    variable = next(v for v in flat.variables if name in v.elements)
+    if variable.start is None:
+        return 0.0
+    return float(table.number(variable.start[variable.elements.index(name)])[0])
 
 
 def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:

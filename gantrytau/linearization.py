@@ -16,6 +16,7 @@ import numpy as np
 from gantrytau.consistency import Level, solve_levels
 from gantrytau.dae import Dae
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
+from gantrytau.events import refuse_events
 from gantrytau.initialization import given_scalars, named_values
 from gantrytau.model import Model
 from gantrytau.parameters import with_values
@@ -90,6 +91,7 @@ def linearize(
     no such point, StructureError if the equations are singular there, ModelError for unknown names.
     """
     dae = model if isinstance(model, Dae) else translate(model)
+    refuse_events(dae.flat)
     if parameters:
         dae = _with_parameters(dae, parameters)
     columns = dae.known if inputs is None else tuple(n for name in names(inputs) for n in dae.expand(name))

@@ -12,6 +12,7 @@ import numpy as np
 
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
+from gantrytau.events import refuse_sticking
 from gantrytau.flat_model import FlatModel
 from gantrytau.integration import Run
 from gantrytau.model import Model
@@ -47,7 +48,8 @@ def simulate(
     when there is no consistent start, ModelError for wrong names and values.
     """
     _check(start, stop, tolerance, points)
-    dae = model if isinstance(model, Dae) else translate(model)
+    dae = model if isinstance(model, Dae) else translate(model, events=True)
+    refuse_sticking(dae.flat)
     if parameters:
         dae = retranslate(dae, _with_parameters(dae, parameters))
     wanted = names(outputs or ())
@@ -101,9 +103,9 @@ def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> FlatModel:
 
 def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:
     for name, signal in signals.items():
-        if name not in dae.known:
+        if name not in dae.inputs:
             raise ModelError(
-                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.known) or 'none'}); "
+                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.inputs) or 'none'}); "
                 "to impose it, translate with given=..., to change a parameter use parameters="
             )
         if isinstance(signal, Samples) and (signal.times[0] > start or signal.times[-1] < stop):

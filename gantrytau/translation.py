@@ -12,6 +12,7 @@ from gantrytau.dae import Dae
 from gantrytau.declarations import StateSelect
 from gantrytau.determinacy import massless, refuse_undetermined
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
+from gantrytau.events import event_names, refuse_events
 from gantrytau.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening import flatten
 from gantrytau.guess import starting_guess
@@ -35,18 +36,20 @@ def translate(
     find: Sequence[str] = (),
     states: Sequence[str] | None = None,
     units: bool = True,
+    events: bool = False,
 ) -> Dae:
     """Turn a model into a system of index one, sorted into blocks.
 
     given: names that are known instead of the declared inputs, as functions of time (parameters named here
     stay symbols); find: names and derivatives that must be available; states: names preferred as states;
-    units: check the dimensions of all equations. Raises ModelError for faults of writing, StructureError if
-    the equations cannot determine the unknowns, InitializationError if no consistent start is found.
+    units: check the dimensions of all equations; events: accept what is sampled, and friction that sticks, as
+    known after the inputs. Raises ModelError for faults of writing, StructureError if the equations cannot
+    determine the unknowns, InitializationError if no consistent start is found.
     """
     flat = flatten(model)
     if units:
         check_units(flat)
-    return translate_flat(flat, given=given, find=find, states=states)
+    return translate_flat(flat, given=given, find=find, states=states, events=events)
 
 
 def translate_flat(
@@ -56,8 +59,11 @@ def translate_flat(
     find: Sequence[str] = (),
     states: Sequence[str] | None = None,
     start: Mapping[str, float] | None = None,
+    events: bool = False,
 ) -> Dae:
     """Like `translate`, from the flattened model; `start`: numbers of symbols that replace start values."""
+    if not events:
+        refuse_events(flat)
     given, find, states = (names(x) for x in (given, find, states or ()))
     settings = dict(given=given, find=find, states=states)
     flat = _with_wanted(flat, find)
@@ -83,12 +89,18 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
     """The parameters, and which scalars are known as functions of time."""
     scalars = [n for name in given for n in expand(flat, name)]
     parameters = {n for p in flat.parameters for n in p.elements}
+    events = event_names(flat)
     known = tuple(n for n in scalars if n not in parameters)
     for name in known:
         if name.startswith("der("):
             raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
+        if name in events:
+            raise ModelError(
+                f"given: {name} is set at instants (by sampled or stick_slip), expected another variable; leave it "
+                "out, it is known anyway"
+            )
     table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
-    return table, known or flat.inputs
+    return table, (*(known or flat.inputs), *events)
 
 
 def _translated(
@@ -102,6 +114,7 @@ def _translated(
     """From the flat model without redundant constraints to the sorted system."""
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     indexed = reduce_index(reduced, flat)
+    _refuse_differentiated(flat, reduced, indexed)
     guess = starting_guess(flat, table, reduced, all_symbols(indexed, reduced.known))
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in guess.values}
     guess = replace(guess, values={**guess.values, **better})
@@ -146,7 +159,7 @@ def names(found: Sequence[str]) -> tuple[str, ...]:
 def retranslate(dae: Dae, flat: FlatModel) -> Dae:
     """The same translation of a flat model with other parameter values."""
     chosen = {k: dae.settings[k] for k in ("given", "find", "states")}
-    return translate_flat(flat, **chosen)
+    return translate_flat(flat, **chosen, events=True)
 
 
 def all_symbols(indexed: Indexed, known: frozenset[str]) -> list[str]:
@@ -184,13 +197,45 @@ def _with_wanted(flat: FlatModel, find: Sequence[str]) -> FlatModel:
     """Derivatives that are asked for become outputs with an equation, so that they are known in time."""
     wanted = [n for name in find for n in expand(flat, name) if n.startswith("der(")]
     wanted = [n for n in wanted if n not in flat.derivatives]
+    wanted += _sampled_derivatives(flat)
     if not wanted:
         return flat
     variables, equations, derivatives = list(flat.variables), list(flat.equations), dict(flat.derivatives)
     for name in dict.fromkeys(wanted):
-        derivatives[name] = ca.SX.sym(name)
+        derivatives.setdefault(name, ca.SX.sym(name))
         helper = f"wanted {name}"
         symbol = ca.SX.sym(helper)
         variables.append(FlatVariable(helper, "output", (), (helper,), symbol, None, ""))
         equations.append(Equation(symbol, derivatives[name], "", "wanted", 1))
     return replace(flat, variables=tuple(variables), equations=tuple(equations), derivatives=derivatives)
+
+
+def _sampled_derivatives(flat: FlatModel) -> list[str]:
+    """Derivatives of variables that only what is set at instants depends on."""
+    if not (flat.sampled or flat.frictions):
+        return []
+    used = [s.expression for s in flat.sampled]
+    used += [e for f in flat.frictions for e in (f.coulomb, f.smooth, f.breakaway)]
+    variables = {n for v in flat.variables for n in v.elements}
+    there = {leaf.name() for e in flat.equations for leaf in ca.symvar(e.residual)}
+    leaves = [split_derivative(leaf.name()) for leaf in ca.symvar(ca.vertcat(*used))]
+    found = [derivative_name(base, order) for base, order in leaves if order and base in variables]
+    return [n for n in found if n not in there]
+
+
+def _refuse_differentiated(flat: FlatModel, reduced: Reduced, indexed: Indexed) -> None:
+    """ModelError where the equations differentiate what jumps at instants."""
+    events = event_names(flat)
+    if not events:
+        return
+    where = [(a.root, a.order, n) for n, a in reduced.aliases.items()]
+    for (i, _), residual in indexed.residuals.items():
+        leaves = [split_derivative(leaf.name()) for leaf in ca.symvar(residual)]
+        where += [(base, order, reduced.equations[i].name) for base, order in leaves]
+    for name, order, place in where:
+        if name in events and order:
+            what = "sampled" if any(s.name == name for s in flat.sampled) else "friction that sticks"
+            raise ModelError(
+                f"{name} is {what} and jumps at instants, but {place} has it differentiated; pass it through a filter "
+                "(gantrytau.mechanics.filters.LowPass), or let it drive a force instead of a motion"
+            )

@@ -10,6 +10,7 @@ from fractions import Fraction
 import casadi as ca
 
 from gantrytau.errors import ModelError
+from gantrytau.events import unit_equations
 from gantrytau.flat_model import FlatModel
 from gantrytau.symbols import split_derivative
 from gantrytau.units import ONE, Dimension, dimension, unit_text
@@ -69,7 +70,7 @@ def check_units(flat: FlatModel) -> None:
     ]
     symbols += list(flat.derivatives.values())
     given = [units[s.name()] for s in symbols]
-    for equations in (flat.equations, flat.initial_equations):
+    for equations in (flat.equations, flat.initial_equations, unit_equations(flat)):
         sides = [side for e in equations for side in (e.left, e.right)]
         found = _infer(symbols, given, sides, lambda place, _eqs=equations: _eqs[place // 2].name)
         for equation, left, right in zip(equations, found[::2], found[1::2], strict=True):

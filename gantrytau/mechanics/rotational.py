@@ -3,7 +3,20 @@
 Angle phi of a flange is absolute, its torque tau is positive into the component.
 """
 
-from gantrytau import Connector, Flow, Input, Model, Output, Parameter, Real, between, der, if_else, tanh
+from gantrytau import (
+    Connector,
+    Flow,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Real,
+    between,
+    der,
+    if_else,
+    stick_slip,
+    tanh,
+)
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 
@@ -144,6 +157,21 @@ class LinearFriction(TanhFriction):
         slope = self.w / self.w_s
         sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
         yield self.tau == self.tau_c * sign + self.tau_v * self.w
+
+
+class StickSlipFriction(Friction):
+    """Coulomb and viscous friction that sticks exactly, up to a breakaway torque; for FMUs, which have events."""
+
+    tau_c = Parameter(0.0, unit="N.m", min=0.0, description="Coulomb friction")
+    tau_v = Parameter(0.0, unit="N.m.s/rad", min=0.0, description="viscous friction")
+    tau_s = Parameter(
+        tau_c, unit="N.m", min=0.0, description="breakaway torque, at least the Coulomb friction"
+    )
+
+    def equations(self):
+        yield from super().equations()
+        smooth = self.tau_v * self.w
+        yield stick_slip(self.tau, self.w, coulomb=self.tau_c, smooth=smooth, breakaway=self.tau_s)
 
 
 class Torque(Model):

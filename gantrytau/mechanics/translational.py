@@ -3,7 +3,20 @@
 Position s of a flange is absolute, its force f is positive into the component.
 """
 
-from gantrytau import Connector, Flow, Input, Model, Output, Parameter, Real, between, der, if_else, tanh
+from gantrytau import (
+    Connector,
+    Flow,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Real,
+    between,
+    der,
+    if_else,
+    stick_slip,
+    tanh,
+)
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 
@@ -128,6 +141,18 @@ class LinearFriction(TanhFriction):
         slope = self.v / self.v_s
         sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
         yield self.f == self.f_c * sign + self.f_v * self.v
+
+
+class StickSlipFriction(Friction):
+    """Coulomb and viscous friction that sticks exactly, up to a breakaway force; for FMUs, which have events."""
+
+    f_c = Parameter(0.0, unit="N", min=0.0, description="Coulomb friction")
+    f_v = Parameter(0.0, unit="kg/s", min=0.0, description="viscous friction")
+    f_s = Parameter(f_c, unit="N", min=0.0, description="breakaway force, at least the Coulomb friction")
+
+    def equations(self):
+        yield from super().equations()
+        yield stick_slip(self.f, self.v, coulomb=self.f_c, smooth=self.f_v * self.v, breakaway=self.f_s)
 
 
 class Force(Model):

@@ -61,9 +61,33 @@ def block_text(dae: "Dae") -> str:
         f"known: {', '.join(dae.known) or 'nothing'}",
         f"states: {', '.join(dae.states) or 'none'}",
     ]
+    lines += _events(dae)
     for section in sections(dae):
         lines += _section(section)
     return "\n".join(lines) + "\n"
+
+
+def _events(dae: "Dae") -> list[str]:
+    """What is set at instants."""
+    lines = []
+    for held in dae.flat.sampled:
+        text = written_at(held.name, [held.expression, held.period], PlainSyntax())
+        value, period = (e.text for e in text.expressions)
+        where = [f"      with {name} = {expression}" for name, expression in text.definitions]
+        lines += [
+            f"sampled: {held.name} = {value}    # every {period} s, from {held.path or 'the model'}",
+            *where,
+        ]
+    for force in dae.flat.frictions:
+        text = written_at(force.force, [force.coulomb, force.smooth, force.breakaway], PlainSyntax())
+        coulomb, smooth, breakaway = (e.text for e in text.expressions)
+        where = [f"      with {name} = {expression}" for name, expression in text.definitions]
+        lines += [
+            f"stick-slip: {force.force} = sign({force.speed})*({coulomb}) + ({smooth}); at rest what holds "
+            f"{force.speed} = 0, up to {breakaway}    # from {force.path or 'the model'}",
+            *where,
+        ]
+    return lines
 
 
 def _section(section: Section) -> list[str]:
