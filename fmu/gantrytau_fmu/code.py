@@ -87,7 +87,7 @@ def model_code(
         GT_TOLERANCE=number_text(tolerance),
         **sizes,
     )
-    lines = ["/* Generated from a model; changes are lost. */", "#include <math.h>", '#include "core.h"', ""]
+    lines = ["/* Generated from a model; changes are lost. */", "#include <math.h>", '#include "core.h"', '#include "functions.c"', ""]
     lines += [f"#define {key} {value}" for key, value in defines.items()]
     lines += ["", *(piece.code for piece in pieces)]
     lines += _tables(formulas, variables, constants, nominals)

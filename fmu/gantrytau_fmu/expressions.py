@@ -19,7 +19,7 @@ NAMES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_
 INFIX = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
 INFIX |= {"AND": "&&", "OR": "||"}
 CALLS = dict(EXP="exp", LOG="log", POW="pow", CONSTPOW="pow", SQRT="sqrt", SIN="sin", COS="cos", TAN="tan")
-CALLS |= dict(ASIN="asin", ACOS="acos", ATAN="atan", SINH="sinh", COSH="cosh", TANH="tanh", ASINH="asinh")
+CALLS |= dict(ASIN="asin", ACOS="acos", ATAN="atan", SINH="sinh", COSH="cosh", TANH="gt_tanh", ASINH="asinh")
 CALLS |= dict(ACOSH="acosh", ATANH="atanh", ATAN2="atan2", FLOOR="floor", CEIL="ceil", FMOD="fmod", ERF="erf")
 CALLS |= dict(FABS="fabs", COPYSIGN="copysign", FMIN="fmin", FMAX="fmax", HYPOT="hypot", LOG1P="log1p", EXPM1="expm1")
 CALLS |= dict(REMAINDER="remainder")
@@ -39,6 +39,10 @@ FORMS |= OTHERS
 COMMUTING = {"ADD", "MUL", "EQ", "NE", "AND", "OR", "FMIN", "FMAX"}
 UNHOISTED = {"NEG", "TWICE"}  # cheaper again than a load
 
+SIGNS = {"ADD": (1.0, 1.0), "SUB": (1.0, -1.0), "NEG": (-1.0,), "TWICE": (2.0,)}
+WIDEST = 1  # nodes in a sum that is multiplied out: measured, more cost more operations than they save
+
+Form = tuple[dict[int, int], int]  # a sum: factor by node, and what is added; both rarely change
 Node = tuple  # ("INPUT", array, index), ("CONST", value) or (operation, node number, ...)
 
 
@@ -62,6 +66,7 @@ class Graph:
     nodes: list[Node] = field(default_factory=list)
     rarely: list[bool] = field(default_factory=list)
     hoisted: dict[int, int] = field(default_factory=dict)
+    forms: dict[int, Form] = field(default_factory=dict)
     _numbers: dict[Node, int] = field(default_factory=dict)
 
     def enter(self, name: str, arguments: Mapping[str, ca.SX], results: ca.SX) -> list[int]:
@@ -82,18 +87,85 @@ class Graph:
         return roots
 
     def operation(self, name: str, inside: list[int]) -> int:
-        """The node of an operation; a division by what rarely changes becomes a multiplication."""
+        """The node of an operation, simplified where it is linear."""
         if name in ("ASSIGN", "LIFT"):
             return inside[0]
         if name not in FORMS:
             raise ModelError(f"export_fmu: the model uses the operation {name}, expected those of gantrytau; reword it")
-        if name == "DIV" and self.rarely[inside[1]] and not self.rarely[inside[0]]:
-            if self.nodes[inside[1]][0] == "CONST":
-                return self.node("DIV", *inside)
-            return self.operation("MUL", [inside[0], self.node("INV", inside[1])])
+        if name in ("DIV", "INV"):
+            one = self.node("CONST", 1.0)
+            return self._product(one if name == "INV" else inside[0], self._reciprocal(inside[-1]))
+        if name == "MUL":
+            return self._product(*inside)
+        if name in SIGNS:
+            factors = [self.node("CONST", sign) for sign in SIGNS[name]]
+            return self._sum([(factor, i) for factor, i in zip(factors, inside, strict=True)])
         if name in COMMUTING:
             inside = sorted(inside)
         return self.node(name, *inside)
+
+    def _reciprocal(self, number: int) -> int:
+        key = self.nodes[number]
+        return self.node("CONST", 1.0 / key[1]) if key[0] == "CONST" and key[1] else self.node("INV", number)
+
+    def _product(self, a: int, b: int) -> int:
+        if self.rarely[a] and self.rarely[b]:
+            return self._folded("MUL", a, b)
+        if self.rarely[a]:
+            return self._sum([(a, b)])
+        if self.rarely[b]:
+            return self._sum([(b, a)])
+        return self.node("MUL", *sorted((a, b)))
+
+    def _folded(self, name: str, a: int, b: int) -> int:
+        """The sum or product of two nodes that rarely change; numbers are computed."""
+        values = [self.nodes[i][1] if self.nodes[i][0] == "CONST" else None for i in (a, b)]
+        neutral = 0.0 if name == "ADD" else 1.0
+        if None not in values:
+            return self.node("CONST", values[0] + values[1] if name == "ADD" else values[0] * values[1])
+        if name == "MUL" and 0.0 in values:
+            return self.node("CONST", 0.0)
+        if neutral in values:
+            return (a, b)[values.index(neutral) ^ 1]
+        return self.node(name, *sorted((a, b)))
+
+    def _sum(self, terms: Iterable[tuple[int, int]]) -> int:
+        """Sum of factor * node, the factors rarely changing: written in few nodes with factors computed once."""
+        terms = list(terms)
+        found = self._combined(terms, self.forms)
+        if len(found[0]) > WIDEST:
+            found = self._combined(terms, {})
+        return self._written(*found)
+
+    def _combined(self, terms: Sequence[tuple[int, int]], forms: Mapping[int, Form]) -> Form:
+        factors: dict[int, int] = {}
+        constant = self.node("CONST", 0.0)
+        for factor, number in terms:
+            if self.rarely[number]:
+                constant = self._folded("ADD", constant, self._folded("MUL", factor, number))
+                continue
+            inner, rest = forms.get(number, ({number: self.node("CONST", 1.0)}, self.node("CONST", 0.0)))
+            constant = self._folded("ADD", constant, self._folded("MUL", factor, rest))
+            for base, weight in inner.items():
+                before = factors.get(base, self.node("CONST", 0.0))
+                factors[base] = self._folded("ADD", before, self._folded("MUL", factor, weight))
+        return {b: f for b, f in factors.items() if self.nodes[f] != ("CONST", 0.0)}, constant
+
+    def _written(self, factors: dict[int, int], constant: int) -> int:
+        """The node of a sum; its form is kept, so that sums of it can be simplified."""
+        found = None if self.nodes[constant] == ("CONST", 0.0) else constant
+        for base, factor in sorted(factors.items(), key=lambda item: self.nodes[item[1]] == ("CONST", -1.0)):
+            key = self.nodes[factor]
+            if key == ("CONST", -1.0):
+                found = self.node("NEG", base) if found is None else self.node("SUB", found, base)
+                continue
+            term = base if key == ("CONST", 1.0) else self.node("MUL", *sorted((base, factor)))
+            found = term if found is None else self.node("ADD", *sorted((found, term)))
+        if found is None:
+            return self.node("CONST", 0.0)
+        if not self.rarely[found]:
+            self.forms[found] = (factors, constant)
+        return found
 
     def node(self, *key) -> int:
         """The number of a node, made when it is first asked for."""
