@@ -28,14 +28,17 @@ class Coordinates:
     """x' = ode(t, x, z, w), 0 = algebraic; invariants(t, x, w) are levels that must stay zero,
     rows the names of their equations.
 
-    states: names of x, every derivative below the highest; known: expression of each known symbol in
-    time and the sampled inputs w (values, then slopes); symbols: all symbols in terms of (t, x, z, w).
+    states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
+    that the model samples; known: expression of each known symbol in time and w (values of the sampled
+    inputs, their slopes, values of the held variables); definitions: all symbols in terms of (t, x, z, w);
+    renewed: what the held variables become at an instant.
     """
 
     dae: Dae
     states: tuple[str, ...]
     algebraics: tuple[str, ...]
     sampled: tuple[str, ...]
+    held: tuple[str, ...]
     x: ca.SX
     z: ca.SX
     w: ca.SX
@@ -48,6 +51,7 @@ class Coordinates:
     definitions: tuple[tuple[ca.SX, ca.SX], ...]
     pivots: ca.SX
     dropped: ca.Function
+    renewed: ca.Function
     conditioning: Conditioning
 
     @property
@@ -55,14 +59,19 @@ class Coordinates:
         """Whether there are constraints to hold."""
         return any(level.numel() for level in self.invariants)
 
+    @property
+    def stepwise(self) -> bool:
+        """Whether there are signals that are known interval by interval."""
+        return bool(self.sampled or self.held)
+
     def integrator(self, count: int, tolerance: float, *, compiled: bool = False) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
 
-        p = (start, interval) in s without samples; with samples, per interval u = (start, length, number,
-        values, slopes): the intervals may differ then.
+        p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
+        intervals may differ then.
         """
         tau = ca.SX.sym("tau")
-        if self.sampled:
+        if self.stepwise:
             u = ca.SX.sym("u", 3 + self.w.numel())
             t, h, w, p = u[0] + u[1] * (tau - u[2]), u[1], u[3:], ca.SX(0, 1)
             begin = u[0]

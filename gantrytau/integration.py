@@ -13,6 +13,7 @@ from gantrytau.coordinates import Coordinates, Point
 from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
+from gantrytau.sampling import instants
 from gantrytau.signals import Samples, Signal
 
 CHUNK = 10  # output intervals between two projections onto the constraints
@@ -46,28 +47,35 @@ class Run:
         parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
         fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
         fine[::parts] = grid
-        self.mesh = np.unique(np.concatenate([fine if coordinates.conditioning.needed else grid, knots]))
+        mesh = np.unique(np.concatenate([fine if coordinates.conditioning.needed else grid, knots]))
+        table, events = coordinates.dae.table, coordinates.dae.flat.sampled
+        periods = np.array([table.number(s.period)[0] for s in events])
+        self.instants = instants(mesh, coordinates.held, periods)
+        self.mesh = self.instants.mesh
         self.kept = np.searchsorted(self.mesh, grid)
         self.x = np.full((self.mesh.size, len(coordinates.states)), np.nan)
         self.z = np.full((self.mesh.size, len(coordinates.algebraics)), np.nan)
+        self.held = np.full((self.mesh.size, len(coordinates.held)), np.nan)  # from each place on
+        self.held[0] = [coordinates.dae.start[n] for n in coordinates.held]
         self.done = 0
         self.before = np.zeros(0)  # distance from a singular pose at the output point before the last
         self.integrators: dict[int, ca.Function] = {}
 
-    def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times, states and algebraics at the output points that were reached."""
+    def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Times, states, algebraics and held variables at the output points that were reached."""
         kept = self.kept[self.kept <= self.done]
-        return self.mesh[kept], self.x[kept], self.z[kept]
+        return self.mesh[kept], self.x[kept], self.z[kept], self.held[kept]
 
     def go(self) -> None:
         self.x[0], self.z[0] = self.coordinates.start(self.mesh[0], self._inputs(0))
+        self._renew(0)
         last = self.mesh.size - 1
         pressed: list[bool] = []
         with Progress(self.mesh[0], self.mesh[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
-            size = CHUNK if self.coordinates.constrained or self.samples else last
+            size = CHUNK if self.coordinates.constrained or self.coordinates.stepwise else last
             size = min(size, max(CHUNK, last // 50))
             while self.done < last:
-                count = min(size, last - self.done)
+                count = min(size, int(self.instants.stretch[self.done]))
                 try:
                     self._advance(count)
                 except RuntimeError as error:
@@ -75,34 +83,65 @@ class Run:
                         raise self._stopped(error) from error
                     size = 1
                     continue
+                self._renew(self.done)
                 progress.at(self.mesh[self.done])
                 if pressed:
                     raise KeyboardInterrupt
 
     def _inputs(self, k: int) -> np.ndarray:
-        """Values and slopes of the sampled inputs on the k-th interval of the mesh."""
+        """Values and slopes of the sampled inputs, and what is held, on the k-th interval of the mesh."""
         t = self.mesh[k]
         h = self.mesh[min(k + 1, self.mesh.size - 1)] - t
         values = np.array([np.interp(t, s.times, s.values) for s in self.samples])
         after = np.array([np.interp(t + h, s.times, s.values) for s in self.samples])
         slopes = (after - values) / h if h > 0 else 0.0 * values
-        return np.concatenate([values, slopes])
+        return np.concatenate([values, slopes, self.held[k]])
+
+    def _renew(self, k: int) -> None:
+        """Give new values to what is sampled at a place of the mesh, all from the values just before."""
+        due = self.instants.due[k]
+        if not due.any():
+            return
+        t = float(self.mesh[k])
+        new = np.array(self.coordinates.renewed(self.x[k], self.z[k], t, t, self._inputs(k))).ravel()
+        bad = [
+            n
+            for n, value, now in zip(self.coordinates.held, new, due, strict=True)
+            if now and not np.isfinite(value)
+        ]
+        if bad:
+            raise SolveError(
+                f"{self.coordinates.dae.name}: {bad[0]} is sampled at t = {t:.6g} s, and its new value is not finite; "
+                ".result holds the motion up to there: look for a division by zero or a root of a negative number",
+                time=t,
+                equations=[],
+            )
+        self.held[k, due] = new[due]
+        places = slice(k, k + 1)
+        inputs = self._inputs(k)[None]
+        self.z[places] = self.coordinates.settle(self.x[places], self.z[places], self.mesh[places], inputs)
+
+    def _courses(self, here: int, count: int) -> np.ndarray:
+        """What the integrator is told of each interval: start, length, number, and the inputs."""
+        h = np.diff(self.mesh[here : here + count + 1])
+        if not self.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
+            length = (self.mesh[here + count] - self.mesh[here]) / count
+            return np.repeat(np.array([[self.mesh[here], length, 0, *self.held[here]]]).T, count, axis=1)
+        inputs = np.array([self._inputs(here + k) for k in range(count)]).T
+        return np.vstack([self.mesh[here : here + count], h, np.arange(count), inputs])
 
     def _advance(self, count: int) -> None:
         here = self.done
-        h = np.diff(self.mesh[here : here + count + 1])
         if count not in self.integrators:
             self.integrators[count] = self.coordinates.integrator(count, self.tolerance)
-        uniform = not self.samples
-        rows = [self.mesh[here : here + count], h, np.arange(count)]
-        if self.samples:
-            rows += list(np.array([self._inputs(here + k) for k in range(count)]).T)
+        stepwise = self.coordinates.stepwise
+        self.held[here + 1 : here + count + 1] = self.held[here]
         found = self._integrate(
             count,
             x0=self.x[here] if self.coordinates.states else 0.0,
             z0=self.z[here],
-            p=[self.mesh[here], h[0]] if uniform else [],
-            u=[] if uniform else np.vstack(rows),
+            p=[] if stepwise else [self.mesh[here], self.mesh[here + 1] - self.mesh[here]],
+            u=self._courses(here, count) if stepwise else [],
         )
         x, z = np.array(found["xf"]).T, np.array(found["zf"]).T.reshape(count, -1)
         x = x if self.coordinates.states else np.zeros((count, 0))
@@ -229,10 +268,10 @@ class Run:
             1,
             x0=x if self.coordinates.states else 0.0,
             z0=z,
-            p=[] if half else [t, step],
-            u=[t, step, 0, *inputs] if half else [],
+            p=[] if self.coordinates.stepwise else [t, step],
+            u=[t, step, 0, *inputs] if self.coordinates.stepwise else [],
         )
-        there = np.concatenate([inputs[:half] + step * inputs[half:], inputs[half:]])
+        there = np.concatenate([inputs[:half] + step * inputs[half : 2 * half], inputs[half:]])
         near = np.array(found["xf"]).ravel()[: x.size]
         if not np.all(np.isfinite(near)):
             raise RuntimeError("the solution is not finite")

@@ -22,13 +22,15 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
     without value, or a sampled one that has to be differentiated.
     """
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
-    w, t0 = ca.SX.sym("w", 2 * len(sampled)), ca.SX.sym("t0")
+    held = tuple(s.name for s in dae.flat.sampled)
+    w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held)), ca.SX.sym("t0")
     chains, given = dae.reduced.chains, dependents(dae)
     states = _states(dae, {name for _, name in given})
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
     last = {(i, c): dae.indexed.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
     blocks = _highest_blocks(dae, states, last, highest)
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
+    known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
     definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions += [(chains.named(n), e) for n, e in known.items()]
     definitions += definitions_of(dae, given)
@@ -47,11 +49,14 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         _column([r for b in implicit for r in b.residuals]),
         ca.densify(ca.jacobian(_column(list(last.values())), _column(list(highest.values())))),
         dae.reduced.written(left_out),
+        dae.reduce(_column([s.expression for s in dae.flat.sampled])),
         *matrices,
         *levels,
     ]
     symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
-    _, (ode, algebraic, pivots, dropped, *rest) = ca.substitute_inplace(symbols, values, wanted, False)
+    _, (ode, algebraic, pivots, dropped, renewed, *rest) = ca.substitute_inplace(
+        symbols, values, wanted, False
+    )
     matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
     divisors = [pivots[row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
@@ -62,6 +67,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         states=states,
         algebraics=tuple(y.name() for y in tears),
         sampled=sampled,
+        held=held,
         x=x,
         z=z,
         w=w,
@@ -74,6 +80,7 @@ def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[s
         definitions=tuple(definitions),
         pivots=pivots,
         dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
+        renewed=ca.Function("renewed", [x, z, time, t0, w], [ca.densify(renewed)], {"cse": True}),
         conditioning=Conditioning(*constraints, divisors, matrices, [x, z, time, t0, w]),
     )
 
@@ -147,7 +154,7 @@ def _known_symbols(
             occurring.add(derivative_name(alias.root, alias.order + order))
     starts = {n for v in dae.flat.variables if v.start is not None for n in v.elements}
     known: dict[str, ca.SX] = {}
-    for name in dae.known:
+    for name in dae.inputs:
         signal = signals.get(name)
         top = max((k for b, k in map(split_derivative, occurring) if b == name), default=0)
         if isinstance(signal, Samples):

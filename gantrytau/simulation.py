@@ -25,6 +25,8 @@ from gantrytau.trajectories import result_of
 from gantrytau.translation import names, retranslate, translate
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
+OFTEN = 1e-2  # of that, where the integrator starts anew at hundreds of instants, in steps of first order
+LEAST = 1e-13  # of a step: rounding
 
 
 def simulate(
@@ -62,18 +64,19 @@ def simulate(
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)
     grid = np.linspace(start, stop, points)
-    run = Run(coordinates, signals, grid, MARGIN * tolerance)
+    margin = MARGIN * (OFTEN if dae.flat.sampled else 1.0)
+    run = Run(coordinates, signals, grid, max(margin * tolerance, min(LEAST, MARGIN * tolerance)))
     try:
         run.go()
     except SolveError as error:
         error.result = result_of(coordinates, signals, *run.so_far(), outputs)
         raise
     except KeyboardInterrupt:
-        times, x, z = run.so_far()
+        reached = run.so_far()
         raise SolveError(
-            f"{dae.name}: simulation interrupted at t = {times[-1]:.4g} s; .result holds what was computed",
-            time=float(times[-1]),
-            result=result_of(coordinates, signals, times, x, z, outputs),
+            f"{dae.name}: simulation interrupted at t = {reached[0][-1]:.4g} s; .result holds what was computed",
+            time=float(reached[0][-1]),
+            result=result_of(coordinates, signals, *reached, outputs),
         ) from None
     return result_of(coordinates, signals, *run.so_far(), outputs)
 

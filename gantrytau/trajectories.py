@@ -19,13 +19,14 @@ def result_of(
     times: np.ndarray,
     x: np.ndarray,
     z: np.ndarray,
+    held: np.ndarray,
     outputs: Sequence[str] | None,
 ) -> Result:
     """Every variable and derivative (or only `outputs`) at the given times."""
     dae = coordinates.dae
     samples = [signals[n] for n in coordinates.sampled]
     values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, Samples)]
-    w = np.vstack([*values, np.zeros((len(values), times.size))]) if values else np.zeros((0, times.size))
+    w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
     symbols, definitions = [v for v, _ in coordinates.definitions], [e for _, e in coordinates.definitions]

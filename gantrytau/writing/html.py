@@ -12,7 +12,7 @@ from gantrytau.symbols import split_derivative
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
-from gantrytau.writing.text import PlainSyntax, plain_number
+from gantrytau.writing.text import PlainSyntax, event_lines, plain_number
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
@@ -79,6 +79,7 @@ class _Page:
             f"<pre>{escape(str(self.dae.diagnosis))}</pre>",
             '<h2 id="components">By component, as written</h2>',
             *self._components(),
+            *self._events(),
             '<h2 id="blocks">By block, in the order of solution</h2>',
             *(self._block(section) for section in sections(self.dae)),
             '<h2 id="tables">Variables and parameters</h2>',
@@ -98,6 +99,10 @@ class _Page:
         if self.flat.initial_equations:
             groups["initial equations"] = list(self.flat.initial_equations)
         return [self._component(heading, found) for heading, found in groups.items()]
+
+    def _events(self) -> list[str]:
+        lines = [f"<pre>{escape(line)}</pre>" for line in event_lines(self.dae)]
+        return [_details("<b>set at instants</b>", lines, opened=True)] if lines else []
 
     def _component(self, heading: str, equations: list[Equation]) -> str:
         sides = [side for e in equations for side in (e.left, e.right)]

@@ -10,7 +10,7 @@ from gantrytau.writing.names import GREEK, Name, name_of
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import ATOM, CHOICE, POWER, PRODUCT, SUM, Arguments, Written, infix
-from gantrytau.writing.text import plain_number
+from gantrytau.writing.text import event_lines, plain_number
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
@@ -140,6 +140,8 @@ def latex_text(dae: "Dae") -> str:
     for words, names in (("Known", dae.known), ("States", dae.states)):
         spoken = ", ".join(f"${LatexSyntax().symbol(n).text}$" for n in names)
         lines.append(rf"\noindent {words}: {spoken or 'none'}.\par")
+    for line in event_lines(dae):
+        lines.append(rf"\noindent \texttt{{{escaped(' '.join(line.split()))}}}\par")
     for section in sections(dae):
         lines += ["", *_section(section)]
     return "\n".join(lines) + "\n"

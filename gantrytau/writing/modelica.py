@@ -21,6 +21,7 @@ from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
 from gantrytau.writing.sharing import Text, located, written, written_at
 from gantrytau.writing.syntax import CHOICE, Written, write
+from gantrytau.writing.text import event_lines
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
@@ -141,7 +142,8 @@ class _Writer:
 
     def _left_out(self) -> list[str]:
         redundant = (*self.dae.redundant, *self.dae.reduced.redundant)
-        return [f"  // left out, it follows from the others: {e.name}" for e in redundant]
+        left_out = [f"  // left out, it follows from the others: {e.name}" for e in redundant]
+        return [*left_out, *(f"  // an input here, in the model {line}" for line in event_lines(self.dae))]
 
     def _parameter(self, parameter: FlatParameter, k: int) -> str:
         value = self._expression(parameter.elements[k], parameter.value[k])

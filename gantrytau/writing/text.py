@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+import casadi as ca
+
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
@@ -61,33 +63,36 @@ def block_text(dae: "Dae") -> str:
         f"known: {', '.join(dae.known) or 'nothing'}",
         f"states: {', '.join(dae.states) or 'none'}",
     ]
-    lines += _events(dae)
+    lines += event_lines(dae)
     for section in sections(dae):
         lines += _section(section)
     return "\n".join(lines) + "\n"
 
 
-def _events(dae: "Dae") -> list[str]:
-    """What is set at instants."""
+def event_lines(dae: "Dae") -> list[str]:
+    """What is set at instants, line by line."""
     lines = []
     for held in dae.flat.sampled:
-        text = written_at(held.name, [held.expression, held.period], PlainSyntax())
-        value, period = (e.text for e in text.expressions)
-        where = [f"      with {name} = {expression}" for name, expression in text.definitions]
-        lines += [
-            f"sampled: {held.name} = {value}    # every {period} s, from {held.path or 'the model'}",
-            *where,
-        ]
-    for force in dae.flat.frictions:
-        text = written_at(force.force, [force.coulomb, force.smooth, force.breakaway], PlainSyntax())
-        coulomb, smooth, breakaway = (e.text for e in text.expressions)
-        where = [f"      with {name} = {expression}" for name, expression in text.definitions]
-        lines += [
-            f"stick-slip: {force.force} = sign({force.speed})*({coulomb}) + ({smooth}); at rest what holds "
-            f"{force.speed} = 0, up to {breakaway}    # from {force.path or 'the model'}",
-            *where,
-        ]
+        place = held.path or "the model"
+        (value, period), where = _written_out(held.name, [held.expression, held.period])
+        lines += [f"sampled: {held.name} = {value}    # every {period} s, from {place}", *where]
+    for friction in dae.flat.frictions:
+        place, force, speed = friction.path or "the model", friction.force, friction.speed
+        parts = [friction.coulomb, friction.smooth, friction.breakaway]
+        (coulomb, smooth, breakaway), where = _written_out(force, parts)
+        law = f"sign({speed})*({coulomb}) + {smooth}"
+        lines.append(
+            f"friction: {force} = {law}; at rest as {speed} = 0 needs, up to {breakaway}    # from {place}"
+        )
+        lines += where
     return lines
+
+
+def _written_out(place: str, expressions: list[ca.SX]) -> tuple[list[str], list[str]]:
+    """Expressions as texts, and lines with what they share."""
+    text = written_at(place, expressions, PlainSyntax())
+    where = [f"      with {name} = {expression}" for name, expression in text.definitions]
+    return [e.text for e in text.expressions], where
 
 
 def _section(section: Section) -> list[str]:

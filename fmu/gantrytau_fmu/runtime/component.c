@@ -141,10 +141,12 @@ static gt_status gt_call_serialize(gt_component *c, const char *function, const 
 
 static gt_status gt_call_deserialize(gt_component *c, const char *function, const void *bytes, size_t size,
                                      void **state) {
+    const void *null = NULL; /* what a state starts with */
     if (!gt_has(c, function, "the array of bytes", bytes, 1) ||
         !gt_has(c, function, "the address for the state", state, 1) ||
         !gt_counts(c, function, "bytes", size, gt_state_size(c->it)))
         return GT_ERROR;
+    if (memcmp(bytes, &null, sizeof null)) return GT_REFUSE(c, "%s: the bytes are no state of this FMU", function);
     if (!*state) *state = malloc(size);
     if (!*state) return GT_REFUSE(c, "%s: no memory for a state of %lu bytes", function, GT_COUNT(size));
     memcpy(*state, bytes, size);

@@ -1,0 +1,57 @@
+"""XML of others, looked through before a parser builds anything from it."""
+
+from gantrytau.errors import ModelError
+
+_DEPTH = 100  # of elements inside each other; readers recurse
+_ENCODINGS = (
+    "utf-8",
+    "utf8",
+    "us-ascii",
+    "ascii",
+    "iso-8859-1",
+    "windows-1252",
+    "utf-16",
+)  # read alike by all
+
+
+def check_xml(text: bytes, where: str) -> None:
+    """Raise ModelError, which begins with `where`, for XML that is malformed or that could harm its reader.
+
+    A document type is refused, as with it come entities: files of the machine, and billions of laughs.
+    """
+    from xml.parsers import expat
+
+    depth = 0
+
+    def declared(version: str, encoding: str | None, standalone: int) -> None:
+        if (encoding or "utf-8").lower() not in _ENCODINGS:
+            raise ModelError(
+                f"{where}: found the encoding {encoding}, expected UTF-8; export or fetch the file again"
+            )
+
+    def typed(*_: object) -> None:
+        raise ModelError(
+            f"{where}: found a document type (DTD), expected XML without one; do not trust this file"
+        )
+
+    def begun(*_: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEPTH:
+            raise ModelError(
+                f"{where}: found elements {depth} deep, expected no more than {_DEPTH}; export or fetch the file again"
+            )
+
+    def ended(_: object) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser = expat.ParserCreate()
+    parser.XmlDeclHandler, parser.StartDoctypeDeclHandler = declared, typed
+    parser.StartElementHandler, parser.EndElementHandler = begun, ended
+    try:
+        parser.Parse(text, True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise ModelError(
+            f"{where}: found no proper XML ({error}), expected a well-formed file; export or fetch the file again"
+        ) from error
