@@ -1,8 +1,7 @@
 /* Exact directional derivatives; the implicit unknowns follow by the implicit function theorem. */
 
 /* g: rates of the states, then residuals of the blocks, in the direction of dt, dx, du, dz, dp. */
-static void gt_slopes(gt_instance *it, int parameters)
-{
+static void gt_slopes(gt_instance *it, int parameters) {
     double more[GT_ROOM(GT_STATES + GT_ALGEBRAICS)];
     int i;
     gt_rates_forward(it->a, it->g, it->w);
@@ -12,8 +11,7 @@ static void gt_slopes(gt_instance *it, int parameters)
 }
 
 /* Factors of all blocks at the present point. */
-static gt_status gt_factors(gt_instance *it)
-{
+static gt_status gt_factors(gt_instance *it) {
     int number;
     for (number = 0; number < GT_BLOCKS; number++)
         if (!gt_factor_block(it, gt_blocks + number))
@@ -22,8 +20,7 @@ static gt_status gt_factors(gt_instance *it)
 }
 
 /* dz that keeps all residuals at zero, then g and, if wanted, dy; blocks must be factored. */
-static void gt_along(gt_instance *it, int parameters)
-{
+static void gt_along(gt_instance *it, int parameters) {
     double step[GT_LARGEST_BLOCK_ROOM];
     int number;
     memset(it->dz, 0, sizeof it->dz);
@@ -36,16 +33,14 @@ static void gt_along(gt_instance *it, int parameters)
     gt_slopes(it, parameters);
 }
 
-static void gt_clear_direction(gt_instance *it)
-{
+static void gt_clear_direction(gt_instance *it) {
     it->dt = 0;
     memset(it->dx, 0, sizeof it->dx);
     memset(it->du, 0, sizeof it->du);
     memset(it->dp, 0, sizeof it->dp);
 }
 
-static gt_status gt_ready(gt_instance *it)
-{
+static gt_status gt_ready(gt_instance *it) {
     gt_status status = it->mode == GT_INITIALIZATION ? gt_initial_equations(it) : GT_OK;
     if (status == GT_OK) status = gt_refresh(it);
     if (status == GT_OK && it->factors_stale) {
@@ -55,8 +50,7 @@ static gt_status gt_ready(gt_instance *it)
     return status;
 }
 
-static gt_status gt_is_unknown(gt_instance *it, unsigned reference)
-{
+static gt_status gt_is_unknown(gt_instance *it, unsigned reference) {
     gt_status status = gt_known_reference(it, reference);
     if (status != GT_OK) return status;
     switch ((gt_kind)gt_variables[reference].kind) {
@@ -67,8 +61,7 @@ static gt_status gt_is_unknown(gt_instance *it, unsigned reference)
 }
 
 /* The place of a known in the direction; NULL with a log line if it is none. */
-static double *gt_seed(gt_instance *it, unsigned reference)
-{
+static double *gt_seed(gt_instance *it, unsigned reference) {
     if (gt_known_reference(it, reference) != GT_OK) return NULL;
     switch ((gt_kind)gt_variables[reference].kind) {
     case GT_TIME: return &it->dt;
@@ -82,8 +75,7 @@ static double *gt_seed(gt_instance *it, unsigned reference)
 }
 
 /* Rates in g, outputs in dy if wanted, for the direction in dt, dx, du, dp. */
-static void gt_differentiate(gt_instance *it, int outputs, int parameters)
-{
+static void gt_differentiate(gt_instance *it, int outputs, int parameters) {
     double more[GT_ROOM(GT_OUTPUTS)];
     int i;
     gt_along(it, parameters);
@@ -94,8 +86,7 @@ static void gt_differentiate(gt_instance *it, int outputs, int parameters)
     for (i = 0; i < GT_OUTPUTS; i++) it->dy[i] += more[i];
 }
 
-static double gt_slope(const gt_instance *it, unsigned reference)
-{
+static double gt_slope(const gt_instance *it, unsigned reference) {
     const gt_variable *variable = gt_variables + reference;
     switch ((gt_kind)variable->kind) {
     case GT_DERIVATIVE: return it->g[variable->index];
@@ -105,8 +96,7 @@ static double gt_slope(const gt_instance *it, unsigned reference)
     }
 }
 
-static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, size_t n, int *outputs)
-{
+static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, size_t n, int *outputs) {
     size_t i;
     *outputs = 0;
     for (i = 0; i < n; i++) {
@@ -117,8 +107,7 @@ static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, siz
 }
 
 static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
-                                const double *d_known, double *d_unknown)
-{
+                                const double *d_known, double *d_unknown) {
     int outputs, parameters = 0;
     size_t i;
     if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
@@ -139,8 +128,7 @@ static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t
 
 /* The transposed product, one column after another: as exact, and no code of its own. */
 static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
-                            const double *d_unknown, double *d_known)
-{
+                            const double *d_unknown, double *d_known) {
     int outputs;
     size_t i, j;
     if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;

@@ -1,8 +1,7 @@
 /* One step of Dormand and Prince's method of order 5 (Hairer, Norsett, Wanner: Solving Ordinary Differential
  * Equations I, table II.5.2). k[0] holds the rates at the start. */
 
-static gt_status gt_try_step(gt_instance *it, double t, double h, const double *x, double *next, double *error)
-{
+static gt_status gt_try_step(gt_instance *it, double t, double h, const double *x, double *next, double *error) {
     double(*k)[GT_ROOM(GT_STATES)] = it->k;
     double *y = it->trial;
     int i;
@@ -29,14 +28,12 @@ static gt_status gt_try_step(gt_instance *it, double t, double h, const double *
 #define GT_ORDER 5
 #define GT_FIRST_RATES 0
 
-static gt_status gt_prepare(gt_instance *it)
-{
+static gt_status gt_prepare(gt_instance *it) {
     return gt_get_rates(it, it->k[0]);
 }
 
 /* After an accepted step the last rates are the first of the next. */
-static gt_status gt_accepted(gt_instance *it)
-{
+static gt_status gt_accepted(gt_instance *it) {
     memcpy(it->k[0], it->k[6], sizeof it->k[0]);
     return GT_OK;
 }

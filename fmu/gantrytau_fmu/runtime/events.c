@@ -9,22 +9,19 @@
 #define GT_ON_TIME 1e-9      /* of a period: instants that close are the same */
 
 /* Speed and breakaway force of each friction, (2, GT_MODES), rows first. */
-static gt_status gt_laws(gt_instance *it, double *laws)
-{
+static gt_status gt_laws(gt_instance *it, double *laws) {
     const gt_status status = gt_refresh(it);
     if (status == GT_OK && GT_MODES) gt_friction(it->a, laws, it->w);
     return status;
 }
 
-static double gt_indicator(const gt_instance *it, const double *laws, int i)
-{
+static double gt_indicator(const gt_instance *it, const double *laws, int i) {
     const double speed = laws[2 * i], breakaway = laws[2 * i + 1], force = it->now.z[gt_friction_unknowns[i]];
     if (it->now.m[i] != 0) return it->now.m[i] * speed + it->now.rest[i];
     return breakaway - fabs(force) + GT_MARGIN * (1 + breakaway);
 }
 
-static gt_status gt_get_indicators(gt_instance *it, double *indicators)
-{
+static gt_status gt_get_indicators(gt_instance *it, double *indicators) {
     double laws[GT_ROOM(2 * GT_MODES)];
     const gt_status status = gt_laws(it, laws);
     int i;
@@ -32,8 +29,7 @@ static gt_status gt_get_indicators(gt_instance *it, double *indicators)
     return status;
 }
 
-static void gt_set_mode(gt_instance *it, int i, double mode, double speed)
-{
+static void gt_set_mode(gt_instance *it, int i, double mode, double speed) {
     static const char *const words[] = {"slides backward", "is locked", "slides forward"};
     it->now.m[i] = mode;
     it->now.rest[i] = GT_REST + fmax(0, -mode * speed);
@@ -43,8 +39,7 @@ static void gt_set_mode(gt_instance *it, int i, double mode, double speed)
 }
 
 /* Release the locked frictions that cannot hold, the worst first, until all hold. */
-static gt_status gt_settle(gt_instance *it)
-{
+static gt_status gt_settle(gt_instance *it) {
     double laws[GT_ROOM(2 * GT_MODES)];
     int round, i;
     for (round = 0; round <= 2 * GT_MODES; round++) {
@@ -66,8 +61,7 @@ static gt_status gt_settle(gt_instance *it)
                   "friction", GT_NAME, it->now.time);
 }
 
-static gt_status gt_begin_modes(gt_instance *it)
-{
+static gt_status gt_begin_modes(gt_instance *it) {
     double laws[GT_ROOM(2 * GT_MODES)];
     gt_status status;
     int i;
@@ -81,8 +75,7 @@ static gt_status gt_begin_modes(gt_instance *it)
 }
 
 /* Lock what has come to rest and release what breaks away; *changed tells whether a mode has changed. */
-static gt_status gt_friction_events(gt_instance *it, int *changed)
-{
+static gt_status gt_friction_events(gt_instance *it, int *changed) {
     double laws[GT_ROOM(2 * GT_MODES)], before[GT_ROOM(GT_MODES)];
     gt_status status;
     int i;
@@ -98,13 +91,11 @@ static gt_status gt_friction_events(gt_instance *it, int *changed)
     return status;
 }
 
-static double gt_next_tick(const gt_instance *it, int clock, const double *periods)
-{
+static double gt_next_tick(const gt_instance *it, int clock, const double *periods) {
     return it->now.start + it->now.ticks[clock] * periods[clock];
 }
 
-static gt_status gt_check_clocks(gt_instance *it)
-{
+static gt_status gt_check_clocks(gt_instance *it) {
     double periods[GT_ROOM(GT_CLOCKS)];
     int i;
     if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
@@ -116,8 +107,7 @@ static gt_status gt_check_clocks(gt_instance *it)
 }
 
 /* The earliest sampling instant to come; INFINITY if there is none. */
-static double gt_next_sample(gt_instance *it)
-{
+static double gt_next_sample(gt_instance *it) {
     double periods[GT_ROOM(GT_CLOCKS)], next = INFINITY;
     int i;
     if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
@@ -126,8 +116,7 @@ static double gt_next_sample(gt_instance *it)
 }
 
 /* Take the samples that are due; all updates use the values before the instant. */
-static gt_status gt_sample(gt_instance *it, int *sampled)
-{
+static gt_status gt_sample(gt_instance *it, int *sampled) {
     double periods[GT_ROOM(GT_CLOCKS)], held[GT_ROOM(GT_HELD_COUNT)];
     int due[GT_ROOM(GT_CLOCKS)], i;
     gt_status status;
@@ -155,8 +144,7 @@ static gt_status gt_sample(gt_instance *it, int *sampled)
     return GT_OK;
 }
 
-static gt_status gt_update(gt_instance *it, gt_event_info *info)
-{
+static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     int sampled = 0, changed = 0;
     gt_status status = gt_sample(it, &sampled);
     memset(info, 0, sizeof *info);
@@ -168,8 +156,7 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info)
     return GT_OK;
 }
 
-static gt_status gt_set_time(gt_instance *it, double time)
-{
+static gt_status gt_set_time(gt_instance *it, double time) {
     if (!isfinite(time))
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the time %g, expected a finite number in s", GT_NAME, time);
     if (it->now.time != time) it->now.stale = it->outputs_stale = 1;
@@ -177,8 +164,7 @@ static gt_status gt_set_time(gt_instance *it, double time)
     return GT_OK;
 }
 
-static gt_status gt_set_states(gt_instance *it, const double *x)
-{
+static gt_status gt_set_states(gt_instance *it, const double *x) {
     int i;
     for (i = 0; i < GT_STATES; i++)
         if (!isfinite(x[i]))
@@ -189,13 +175,11 @@ static gt_status gt_set_states(gt_instance *it, const double *x)
     return GT_OK;
 }
 
-static void gt_get_states(const gt_instance *it, double *x)
-{
+static void gt_get_states(const gt_instance *it, double *x) {
     memcpy(x, it->now.x, GT_STATES * sizeof(double));
 }
 
-static void gt_get_nominals(const gt_instance *it, double *nominals)
-{
+static void gt_get_nominals(const gt_instance *it, double *nominals) {
     (void)it;
     memcpy(nominals, gt_x_nominals, GT_STATES * sizeof(double));
 }

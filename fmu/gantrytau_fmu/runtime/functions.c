@@ -1,8 +1,7 @@
 /* Functions of the model that the C library has, but slower. */
 
 /* Within two units in the last place: Lambert's continued fraction near zero, exponentials elsewhere. */
-static double gt_tanh(double x)
-{
+static double gt_tanh(double x) {
     const double size = fabs(x), s = x * x;
     if (size < 0.5) {
         const double above = 2027025. + s * (270270. + s * (6930. + s * 36.));

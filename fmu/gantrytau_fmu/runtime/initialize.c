@@ -2,8 +2,7 @@
 
 #define GT_INITIAL_ITERATIONS 30
 
-static gt_status gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop)
-{
+static gt_status gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     if (!isfinite(start) || (stop_defined && !(isfinite(stop) && stop > start)))
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found start = %g s and stop = %g s, expected finite numbers, start before stop",
                       GT_NAME, start, stop);
@@ -18,8 +17,7 @@ static gt_status gt_setup(gt_instance *it, int tolerance_defined, double toleran
 }
 
 /* Residuals of the initial equations at the present states; GT_DISCARD where there are none. */
-static gt_status gt_initial_residual(gt_instance *it, double *residual)
-{
+static gt_status gt_initial_residual(gt_instance *it, double *residual) {
     int i;
     it->now.stale = 1;
     gt_point_at(it, &it->now.time, it->now.x);
@@ -31,8 +29,7 @@ static gt_status gt_initial_residual(gt_instance *it, double *residual)
 }
 
 /* Newton's method with differences for the Jacobian: the residuals are exact, so the solution is. */
-static gt_status gt_initial_equations(gt_instance *it)
-{
+static gt_status gt_initial_equations(gt_instance *it) {
     double residual[GT_ROOM(GT_INITIAL)], moved[GT_ROOM(GT_INITIAL)], matrix[GT_ROOM(GT_INITIAL * GT_INITIAL)];
     double scales[GT_ROOM(GT_INITIAL)];
     int pivots[GT_ROOM(GT_INITIAL)], iteration, i, j;
@@ -62,8 +59,7 @@ static gt_status gt_initial_equations(gt_instance *it)
                   "inputs and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
 }
 
-static gt_status gt_initialize(gt_instance *it)
-{
+static gt_status gt_initialize(gt_instance *it) {
     gt_event_info info;
     double rates[GT_ROOM(GT_STATES)];
     gt_status status = gt_initial_equations(it);

@@ -51,8 +51,7 @@ struct gt_instance {
 
 static const char *const gt_category_names[] = GT_CATEGORY_NAMES;
 
-static gt_status gt_say(gt_instance *it, gt_status status, gt_category category, const char *format, ...)
-{
+static gt_status gt_say(gt_instance *it, gt_status status, gt_category category, const char *format, ...) {
     char text[1024];
     va_list arguments;
     if (!it->sink || !it->logging[category]) return status;
@@ -69,14 +68,12 @@ static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
 
 /* Where the functions of the model find their arguments; the order is that of ARRAYS in code.py. */
-static void gt_point_at(gt_instance *it, const double *time, const double *x)
-{
+static void gt_point_at(gt_instance *it, const double *time, const double *x) {
     it->a[0] = time;
     it->a[1] = x;
 }
 
-static void gt_reset(gt_instance *it)
-{
+static void gt_reset(gt_instance *it) {
     memset(&it->now, 0, sizeof it->now);
     memcpy(it->now.x, gt_start_x, GT_STATES * sizeof(double));
     memcpy(it->now.u, gt_start_u, GT_KNOWN * sizeof(double));
@@ -105,8 +102,7 @@ static void gt_reset(gt_instance *it)
     gt_point_at(it, &it->now.time, it->now.x);
 }
 
-static gt_instance *gt_new(const char *name, gt_sink sink, void *who, int cosimulation, int logging)
-{
+static gt_instance *gt_new(const char *name, gt_sink sink, void *who, int cosimulation, int logging) {
     gt_instance *it = calloc(1, sizeof *it);
     (void)name;
     if (!it) return NULL;
@@ -119,12 +115,10 @@ static gt_instance *gt_new(const char *name, gt_sink sink, void *who, int cosimu
     return it;
 }
 
-static void gt_free(gt_instance *it)
-{
+static void gt_free(gt_instance *it) {
     free(it);
 }
 
-static void gt_logging(gt_instance *it, gt_category category, int on)
-{
+static void gt_logging(gt_instance *it, gt_category category, int on) {
     it->logging[category] = on;
 }

@@ -4,8 +4,7 @@
 
 /* Factor a (n, n), stored column after column, in place. Returns the sign of its determinant, 0 if it is
  * singular or not finite. scales: 1 / largest element of each row. */
-static int gt_factor(int n, double *a, int *pivots, double *scales)
-{
+static int gt_factor(int n, double *a, int *pivots, double *scales) {
     int sign = 1, i, j, k;
     for (i = 0; i < n; i++) {
         double largest = 0;
@@ -44,8 +43,7 @@ static int gt_factor(int n, double *a, int *pivots, double *scales)
 }
 
 /* Solve with the factors: b (n) becomes the solution. */
-static void gt_solve_factored(int n, const double *a, const int *pivots, const double *scales, double *b)
-{
+static void gt_solve_factored(int n, const double *a, const int *pivots, const double *scales, double *b) {
     int i, k;
     for (i = 0; i < n; i++) b[i] *= scales[i];
     for (k = 0; k < n; k++) {

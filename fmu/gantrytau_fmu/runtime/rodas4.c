@@ -3,8 +3,7 @@
 
 #define GT_GAMMA 0.25
 
-static gt_status gt_try_step(gt_instance *it, double t, double h, const double *x, double *next, double *error)
-{
+static gt_status gt_try_step(gt_instance *it, double t, double h, const double *x, double *next, double *error) {
     static const double A[5][5] = {
         {1.544},
         {0.9466785280815826, 0.2557011698983284},
@@ -54,8 +53,7 @@ static gt_status gt_try_step(gt_instance *it, double t, double h, const double *
 #define GT_FIRST_RATES 6
 
 /* Rates, Jacobian and rate of time at the present point; the rates are kept in k[6]. */
-static gt_status gt_prepare(gt_instance *it)
-{
+static gt_status gt_prepare(gt_instance *it) {
     gt_status status = gt_get_rates(it, it->k[6]);
     int j;
     if (status == GT_OK) status = gt_ready(it);
@@ -69,7 +67,6 @@ static gt_status gt_prepare(gt_instance *it)
     return GT_OK;
 }
 
-static gt_status gt_accepted(gt_instance *it)
-{
+static gt_status gt_accepted(gt_instance *it) {
     return gt_prepare(it);
 }

@@ -10,16 +10,14 @@
 #define GT_FAR 0.1         /* size of a first step, relative to 1 + |z|, from which on the way is followed */
 #define GT_STEPS_ON_THE_WAY 64
 
-static double gt_norm(int n, const double *values)
-{
+static double gt_norm(int n, const double *values) {
     double sum = 0;
     int i;
     for (i = 0; i < n; i++) sum += values[i] * values[i];
     return sqrt(sum);
 }
 
-static void gt_parameters(gt_instance *it)
-{
+static void gt_parameters(gt_instance *it) {
     if (it->parameters_stale) {
         gt_fill(it->a, it->c, it->w);
         it->parameters_stale = 0;
@@ -27,8 +25,7 @@ static void gt_parameters(gt_instance *it)
     }
 }
 
-static gt_status gt_block_fails(gt_instance *it, const gt_block *block, int quiet, const char *why)
-{
+static gt_status gt_block_fails(gt_instance *it, const gt_block *block, int quiet, const char *why) {
     char names[400] = "";
     int i;
     if (quiet) return GT_DISCARD;
@@ -46,22 +43,19 @@ static gt_status gt_block_fails(gt_instance *it, const gt_block *block, int quie
                   "or check states, inputs and parameters", GT_NAME, names, why, *it->a[0]);
 }
 
-static int gt_factor_block(gt_instance *it, const gt_block *block)
-{
+static int gt_factor_block(gt_instance *it, const gt_block *block) {
     double *matrix = it->matrices + block->matrix;
     block->jacobian(it->a, matrix, it->w);
     return gt_factor(block->count, matrix, it->pivots + block->first, it->scales + block->first);
 }
 
-static void gt_direction(gt_instance *it, const gt_block *block, const double *residual, double *step)
-{
+static void gt_direction(gt_instance *it, const gt_block *block, const double *residual, double *step) {
     int i;
     for (i = 0; i < block->count; i++) step[i] = -residual[i];
     gt_solve_factored(block->count, it->matrices + block->matrix, it->pivots + block->first, it->scales + block->first, step);
 }
 
-static double gt_relative(const gt_block *block, const double *z, const double *step)
-{
+static double gt_relative(const gt_block *block, const double *z, const double *step) {
     double largest = 0;
     int i;
     for (i = 0; i < block->count; i++)
@@ -70,8 +64,7 @@ static double gt_relative(const gt_block *block, const double *z, const double *
 }
 
 /* GT_DISCARD: not found, told nowhere if quiet. direct: give up where the first step is far. */
-static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int direct)
-{
+static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int direct) {
     const gt_block *block = gt_blocks + number;
     double *z = it->now.z + block->first;
     double residual[GT_LARGEST_BLOCK_ROOM], step[GT_LARGEST_BLOCK_ROOM], old[GT_LARGEST_BLOCK_ROOM];
@@ -108,8 +101,7 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
     return gt_block_fails(it, block, quiet, "could not be solved");
 }
 
-static gt_status gt_solve_blocks(gt_instance *it, int quiet, int direct)
-{
+static gt_status gt_solve_blocks(gt_instance *it, int quiet, int direct) {
     int number;
     for (number = 0; number < GT_BLOCKS; number++) {
         const gt_status status = gt_solve_block(it, number, quiet, direct);
@@ -119,15 +111,13 @@ static gt_status gt_solve_blocks(gt_instance *it, int quiet, int direct)
     return GT_OK;
 }
 
-static void gt_between(int n, double share, const double *from, const double *to, double *found)
-{
+static void gt_between(int n, double share, const double *from, const double *to, double *found) {
     int i;
     for (i = 0; i < n; i++) found[i] = share == 1 ? to[i] : from[i] + share * (to[i] - from[i]);
 }
 
 /* From the last solved point to the present one in steps. */
-static gt_status gt_follow(gt_instance *it)
-{
+static gt_status gt_follow(gt_instance *it) {
     double x[GT_ROOM(GT_STATES)], u[GT_ROOM(GT_KNOWN)], time;
     const double *const there[3] = {it->a[0], it->a[1], it->a[2]};
     gt_status status = GT_OK;
@@ -154,8 +144,7 @@ static gt_status gt_follow(gt_instance *it)
 }
 
 /* Solve at the point that it->a shows, from the z of the last one; quiet: failures are not logged. */
-static gt_status gt_solve(gt_instance *it, int quiet)
-{
+static gt_status gt_solve(gt_instance *it, int quiet) {
     double z[GT_ROOM(GT_ALGEBRAICS)];
     gt_status status;
     gt_parameters(it);
@@ -171,8 +160,7 @@ static gt_status gt_solve(gt_instance *it, int quiet)
 }
 
 /* Make everything belong to the present states, inputs and parameters. */
-static gt_status gt_refresh(gt_instance *it)
-{
+static gt_status gt_refresh(gt_instance *it) {
     gt_status status;
     if (!it->now.stale && !it->parameters_stale) return GT_OK;
     gt_point_at(it, &it->now.time, it->now.x);
@@ -188,8 +176,7 @@ static gt_status gt_refresh(gt_instance *it)
     return GT_OK;
 }
 
-static gt_status gt_finite(gt_instance *it, int n, const double *values, const char *const *names, const char *what)
-{
+static gt_status gt_all_finite(gt_instance *it, int n, const double *values, const char *const *names, const char *what) {
     int i;
     for (i = 0; i < n; i++)
         if (!isfinite(values[i]))
@@ -200,17 +187,15 @@ static gt_status gt_finite(gt_instance *it, int n, const double *values, const c
 }
 
 /* Rates of the states at the present point. */
-static gt_status gt_get_rates(gt_instance *it, double *rates)
-{
+static gt_status gt_get_rates(gt_instance *it, double *rates) {
     gt_status status = gt_refresh(it);
     if (status != GT_OK) return status;
     gt_rates(it->a, rates, it->w);
-    return gt_finite(it, GT_STATES, rates, gt_x_names, "the derivative of ");
+    return gt_all_finite(it, GT_STATES, rates, gt_x_names, "the derivative of ");
 }
 
 /* Rates at a trial point of an integrator; GT_DISCARD where there are none. */
-static gt_status gt_rates_at(gt_instance *it, double time, const double *x, double *rates)
-{
+static gt_status gt_rates_at(gt_instance *it, double time, const double *x, double *rates) {
     double sum = 0;
     int i;
     gt_point_at(it, &time, x);

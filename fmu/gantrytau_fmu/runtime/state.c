@@ -8,8 +8,7 @@ typedef struct {
 } gt_saved;
 
 /* Fowler, Noll and Vo's hash 1a, 64 bits. */
-static uint64_t gt_hash(const void *start, size_t size)
-{
+static uint64_t gt_hash(const void *start, size_t size) {
     const unsigned char *bytes = start;
     uint64_t hash = UINT64_C(14695981039346656037);
     size_t i;
@@ -17,14 +16,12 @@ static uint64_t gt_hash(const void *start, size_t size)
     return hash;
 }
 
-static size_t gt_state_size(const gt_instance *it)
-{
+static size_t gt_state_size(const gt_instance *it) {
     (void)it;
     return sizeof(gt_saved);
 }
 
-static void gt_save(const gt_instance *it, void *block)
-{
+static void gt_save(const gt_instance *it, void *block) {
     gt_saved *saved = block;
     memset(saved, 0, sizeof *saved);
     saved->model = gt_hash(GT_TOKEN, sizeof GT_TOKEN);
@@ -34,8 +31,7 @@ static void gt_save(const gt_instance *it, void *block)
     saved->check = gt_hash(&saved->state, sizeof saved->state);
 }
 
-static gt_status gt_restore(gt_instance *it, const void *block, size_t size)
-{
+static gt_status gt_restore(gt_instance *it, const void *block, size_t size) {
     gt_saved saved;
     if (size != sizeof saved)
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found a saved state of %lu bytes, expected %lu; it belongs to another model or is "

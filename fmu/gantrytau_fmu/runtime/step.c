@@ -5,8 +5,7 @@
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
 
-static double gt_error_norm(const gt_instance *it, const double *x, const double *next, const double *error)
-{
+static double gt_error_norm(const gt_instance *it, const double *x, const double *next, const double *error) {
     double sum = 0;
     int i;
     for (i = 0; i < GT_STATES; i++) {
@@ -18,8 +17,7 @@ static double gt_error_norm(const gt_instance *it, const double *x, const double
 }
 
 /* Put the model where a step has led; z is solved anew. */
-static gt_status gt_move(gt_instance *it, double time, const double *x)
-{
+static gt_status gt_move(gt_instance *it, double time, const double *x) {
     double sides[GT_ROOM(GT_BLOCKS)];
     gt_status status;
     int i;
@@ -35,8 +33,7 @@ static gt_status gt_move(gt_instance *it, double time, const double *x)
     return status;
 }
 
-static int gt_crossed(gt_instance *it)
-{
+static int gt_crossed(gt_instance *it) {
     double indicators[GT_ROOM(GT_MODES)];
     int i;
     if (!GT_MODES || gt_get_indicators(it, indicators) != GT_OK) return 0;
@@ -46,8 +43,7 @@ static int gt_crossed(gt_instance *it)
 }
 
 /* The step of size h from (t, x) crosses: find the shortest that does, by halving. */
-static gt_status gt_locate(gt_instance *it, double t, double h, const double *x)
-{
+static gt_status gt_locate(gt_instance *it, double t, double h, const double *x) {
     double before = 0, behind = h, error[GT_ROOM(GT_STATES)];
     gt_status status = GT_OK;
     while (status == GT_OK && behind - before > GT_LOCATED + 4e-16 * fabs(t)) {
@@ -62,8 +58,7 @@ static gt_status gt_locate(gt_instance *it, double t, double h, const double *x)
 }
 
 /* The state that changes most for its size. */
-static int gt_fastest(const gt_instance *it)
-{
+static int gt_fastest(const gt_instance *it) {
     int fastest = 0, i;
     double most = -1;
     for (i = 0; i < GT_STATES; i++) {
@@ -76,16 +71,14 @@ static int gt_fastest(const gt_instance *it)
     return fastest;
 }
 
-static gt_status gt_too_short(gt_instance *it, double h)
-{
+static gt_status gt_too_short(gt_instance *it, double h) {
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the steps of the integrator became shorter than %.2g s at time = %.9g s, where the fastest "
                   "state is %s; the motion may be meeting a singular pose or a limit of reach, or be too stiff for this solver",
                   GT_NAME, h, it->now.time, gt_x_names[gt_fastest(it)]);
 }
 
 /* Integrate to `end`, or to an event before; *event tells which. */
-static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event)
-{
+static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event) {
     double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
     const double shortest = GT_SHORTEST * fmax(fabs(end), end - it->now.time);
     double h = it->now.size > 0 ? it->now.size : end - it->now.time;
@@ -127,8 +120,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
 }
 
 /* The friction events and samples at the present time. */
-static gt_status gt_handle_events(gt_instance *it, int *events)
-{
+static gt_status gt_handle_events(gt_instance *it, int *events) {
     int again = 1;
     while (again) {
         gt_event_info info;
@@ -143,8 +135,7 @@ static gt_status gt_handle_events(gt_instance *it, int *events)
     return GT_OK;
 }
 
-static gt_status gt_step(gt_instance *it, double time, double size, double *reached)
-{
+static gt_status gt_step(gt_instance *it, double time, double size, double *reached) {
     const double end = time + size;
     int count = 0, events = 0, event = 0;
     gt_status status = GT_OK;

@@ -1,19 +1,16 @@
 /* Values by reference. */
 
-static const char *gt_name(unsigned reference)
-{
+static const char *gt_name(unsigned reference) {
     return gt_variables[reference].name;
 }
 
-static gt_status gt_known_reference(gt_instance *it, unsigned reference)
-{
+static gt_status gt_known_reference(gt_instance *it, unsigned reference) {
     if (reference < GT_VARIABLES) return GT_OK;
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the value reference %u, expected one below %u; take references from the model "
                   "description of this FMU", GT_NAME, reference, (unsigned)GT_VARIABLES);
 }
 
-static void gt_start_values(gt_instance *it)
-{
+static void gt_start_values(gt_instance *it) {
     double x[GT_ROOM(GT_STATES)];
     int i;
     if (!it->starts_stale) return;
@@ -24,8 +21,7 @@ static void gt_start_values(gt_instance *it)
         if (!it->now.given[i]) it->now.x[i] = x[i];
 }
 
-static gt_status gt_get_outputs(gt_instance *it)
-{
+static gt_status gt_get_outputs(gt_instance *it) {
     gt_status status = gt_refresh(it);
     if (status != GT_OK || !it->outputs_stale) return status;
     gt_outputs(it->a, it->y, it->w);
@@ -33,8 +29,7 @@ static gt_status gt_get_outputs(gt_instance *it)
     return GT_OK;
 }
 
-static gt_status gt_get(gt_instance *it, unsigned reference, double *value)
-{
+static gt_status gt_get(gt_instance *it, unsigned reference, double *value) {
     const gt_variable *variable;
     gt_status status = gt_known_reference(it, reference);
     if (status != GT_OK) return status;
@@ -78,8 +73,7 @@ static gt_status gt_get(gt_instance *it, unsigned reference, double *value)
     return status;
 }
 
-static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value)
-{
+static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value) {
     const gt_status status = gt_known_reference(it, reference);
     if (status != GT_OK) return status;
     if (gt_variables[reference].kind != GT_MODE)
@@ -88,13 +82,11 @@ static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value)
     return GT_OK;
 }
 
-static gt_status gt_refuse(gt_instance *it, unsigned reference, const char *why)
-{
+static gt_status gt_refuse(gt_instance *it, unsigned reference, const char *why) {
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s cannot be set: %s", GT_NAME, gt_name(reference), why);
 }
 
-static gt_status gt_set(gt_instance *it, unsigned reference, double value)
-{
+static gt_status gt_set(gt_instance *it, unsigned reference, double value) {
     const int early = it->mode == GT_INSTANTIATED || it->mode == GT_INITIALIZATION;
     const gt_variable *variable;
     gt_status status = gt_known_reference(it, reference);
