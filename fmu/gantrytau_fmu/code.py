@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau_fmu.expressions import Graph, Piece, number_text
+from gantrytau_fmu.c_functions import CFunction, c_function
+from gantrytau_fmu.expressions import Graph
 from gantrytau_fmu.formulas import Formulas, column, numbers_of
+from gantrytau_fmu.operations import number_text
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
+SELDOM = {"gt_outputs", "gt_starts", "gt_initial", "gt_forward", "gt_by_parameters"}
 ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
 
 
@@ -94,11 +97,12 @@ def model_code(
     return ModelCode("\n".join(lines) + "\n", sum(p.operations for p in pieces))
 
 
-def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[Piece]:
+def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[CFunction]:
     formulas, s = writer.formulas, writer.symbols
     point = ca.vertcat(s["t"], s["x"], s["u"], s["z"])
     way = ca.vertcat(s["dt"], s["dx"], s["du"], s["dz"])
-    everything, wanted = column([formulas.rates, formulas.residuals]), column(outputs)
+    wanted = column(outputs)
+    everything = column([formulas.rates, formulas.residuals, wanted])
     named = {
         "gt_rates": formulas.rates,
         "gt_outputs": wanted,
@@ -107,10 +111,8 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[Piece]:
         "gt_friction": formulas.friction,
         "gt_periods": formulas.periods,
         "gt_samples": formulas.samples,
-        "gt_rates_forward": _along(everything, point, way),
-        "gt_rates_by_parameters": _along(everything, s["p"], s["dp"]),
-        "gt_outputs_forward": _along(wanted, point, way),
-        "gt_outputs_by_parameters": _along(wanted, s["p"], s["dp"]),
+        "gt_forward": _along(everything, point, way),
+        "gt_by_parameters": _along(everything, s["p"], s["dp"]),
     }
     for k, block in enumerate(formulas.blocks):
         named[f"gt_residual_{k}"] = block.residual
@@ -119,15 +121,15 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[Piece]:
         writer.enter(name, expression)
     graph = writer.graph
     graph.hoist(root for name, roots in writer.roots.items() for root in roots)
-    fill = graph.function("gt_fill", list(graph.hoisted), hoisting=True)
-    return [fill, *(graph.function(name, writer.roots[name]) for name in named)]
+    fill = c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True)
+    return [fill, *(c_function(graph, name, writer.roots[name], seldom=name in SELDOM) for name in named)]
 
 
 def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:
     return ca.jtimes(expression, point, way) if expression.numel() and point.numel() else ca.SX.zeros(*expression.shape)
 
 
-def _sizes(formulas: Formulas, outputs: int, variables: Sequence[Entry], pieces: Sequence[Piece], hoisted: int) -> dict:
+def _sizes(formulas: Formulas, outputs: int, variables: Sequence[Entry], pieces: Sequence[CFunction], hoisted: int) -> dict:
     counts = [len(b.names) for b in formulas.blocks]
     return dict(
         GT_VARIABLES=len(variables),

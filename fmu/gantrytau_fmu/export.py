@@ -24,8 +24,9 @@ from gantrytau_fmu.terminals import icon, terminals_and_icons
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
 RUNTIME = (
-    "instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c fmi2.c fmi3.c"
+    "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
 )
+INCLUDED = ("functions.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
 MODERATE, LARGE = 30_000, 150_000  # operations from which on the compiler is asked for less
 
@@ -172,7 +173,7 @@ def source_files(model: str, solver: str) -> dict[str, str]:
     names = RUNTIME.format(solver=solver).split()
     found = {n: (folder / n).read_text(encoding="utf-8") for n in (*HEADERS, *names)}
     lines = ["/* The one translation unit of this FMU. */", '#include "core.h"', '#include "model.c"']
-    lines += [f'#include "{n}"' for n in names]
+    lines += [f'#include "{n}"' for n in names if n not in INCLUDED]
     return {"fmu.c": "\n".join(lines) + "\n", "model.c": model, **found}
 
 

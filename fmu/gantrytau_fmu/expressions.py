@@ -1,9 +1,8 @@
-"""Expressions as one graph without repetitions, and C of it.
+"""Expressions as one graph without repetitions.
 
 CasADi's instruction lists of several functions are entered into the same graph. What depends on parameters
-alone is found there, so that it is computed once when a parameter is set, not at every call; the rest is
-written as C in pieces of bounded length, because compilers need more than proportional time for long
-straight-line code.
+alone is found there, so that it is computed once when a parameter is set, not at every call; sums of products
+with it are multiplied out where that saves operations.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,30 +11,10 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from gantrytau.errors import ModelError
+from gantrytau_fmu.operations import OPERATIONS
 
-PIECE = 1500  # operations per C function
 NAMES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_")}
 
-INFIX = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
-INFIX |= {"AND": "&&", "OR": "||"}
-CALLS = dict(EXP="exp", LOG="log", POW="pow", CONSTPOW="pow", SQRT="sqrt", SIN="sin", COS="cos", TAN="tan")
-CALLS |= dict(ASIN="asin", ACOS="acos", ATAN="atan", SINH="sinh", COSH="cosh", TANH="gt_tanh", ASINH="asinh")
-CALLS |= dict(ACOSH="acosh", ATANH="atanh", ATAN2="atan2", FLOOR="floor", CEIL="ceil", FMOD="fmod", ERF="erf")
-CALLS |= dict(FABS="fabs", COPYSIGN="copysign", FMIN="fmin", FMAX="fmax", HYPOT="hypot", LOG1P="log1p", EXPM1="expm1")
-CALLS |= dict(REMAINDER="remainder")
-OTHERS = {
-    "NEG": "-{0}",
-    "SQ": "{0} * {0}",
-    "TWICE": "2. * {0}",
-    "INV": "1. / {0}",
-    "NOT": "!{0}",
-    "SIGN": "(double)(({0} > 0.) - ({0} < 0.))",
-    "IF_ELSE_ZERO": "{0} != 0. ? {1} : 0.",
-}
-FORMS = {name: f"{{0}} {sign} {{1}}" for name, sign in INFIX.items()}
-FORMS |= {name: f"{call}({{0}})" for name, call in CALLS.items()}
-FORMS |= {n: f"{CALLS[n]}({{0}}, {{1}})" for n in "POW CONSTPOW ATAN2 FMOD COPYSIGN FMIN FMAX HYPOT REMAINDER".split()}
-FORMS |= OTHERS
 COMMUTING = {"ADD", "MUL", "EQ", "NE", "AND", "OR", "FMIN", "FMAX"}
 UNHOISTED = {"NEG", "TWICE"}  # cheaper again than a load
 
@@ -46,23 +25,12 @@ Form = tuple[dict[int, int], int]  # a sum: factor by node, and what is added; b
 Node = tuple  # ("INPUT", array, index), ("CONST", value) or (operation, node number, ...)
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A C function `static void name(const double *const *a, double *r, double *w)`; work: length of w."""
-
-    name: str
-    code: str
-    work: int
-    operations: int
-
-
 @dataclass(eq=False)
 class Graph:
     """Nodes by number; `slow`: names of the arrays that rarely change, whose expressions are hoisted."""
 
     arrays: Sequence[str]
     slow: str = "p"
-    hoisted_array: str = "c"
     nodes: list[Node] = field(default_factory=list)
     rarely: list[bool] = field(default_factory=list)
     hoisted: dict[int, int] = field(default_factory=dict)
@@ -90,7 +58,7 @@ class Graph:
         """The node of an operation, simplified where it is linear."""
         if name in ("ASSIGN", "LIFT"):
             return inside[0]
-        if name not in FORMS:
+        if name not in OPERATIONS:
             raise ModelError(f"export_fmu: the model uses the operation {name}, expected those of gantrytau; reword it")
         if name in ("DIV", "INV"):
             one = self.node("CONST", 1.0)
@@ -182,20 +150,21 @@ class Graph:
     def hoist(self, roots: Iterable[int]) -> None:
         """Give what rarely changes, and is used by the expressions of `roots`, places in the hoisted array."""
         roots = list(roots)
-        used = [number for number in self._reached(roots, stop=self.rarely) if not self.rarely[number]]
-        for number in sorted({*roots, *(i for n in used for i in self._inside(n))}):
+        used = [number for number in self.reached(roots, stop=self.rarely) if not self.rarely[number]]
+        for number in sorted({*roots, *(i for n in used for i in self.inside(n))}):
             worth = self.nodes[number][0] not in ("INPUT", "CONST", *UNHOISTED)
             if self.rarely[number] and worth and not self._fixed(number):
                 self.hoisted.setdefault(number, len(self.hoisted))
 
     def _fixed(self, number: int) -> bool:
-        return not any(self.nodes[n][0] == "INPUT" for n in self._reached([number]))
+        return not any(self.nodes[n][0] == "INPUT" for n in self.reached([number]))
 
-    def _inside(self, number: int) -> tuple[int, ...]:
+    def inside(self, number: int) -> tuple[int, ...]:
+        """The nodes that an operation works on."""
         key = self.nodes[number]
         return () if key[0] in ("INPUT", "CONST") else key[1:]
 
-    def _reached(self, roots: Iterable[int], stop: Sequence[bool] | None = None, known: Iterable[int] = ()) -> list[int]:
+    def reached(self, roots: Iterable[int], stop: Sequence[bool] | None = None, known: Iterable[int] = ()) -> list[int]:
         """All nodes that the roots need, in an order of computation; nothing is looked for behind `known`."""
         seen, waiting, known = set(), list(roots), set(known)
         while waiting:
@@ -204,93 +173,5 @@ class Graph:
                 continue
             seen.add(number)
             if number not in known and not (stop is not None and stop[number]):
-                waiting += [i for i in self._inside(number) if i not in seen]
+                waiting += [i for i in self.inside(number) if i not in seen]
         return sorted(seen)  # a node is made after those inside it
-
-    def function(self, name: str, roots: Sequence[int], *, hoisting: bool = False) -> Piece:
-        """C of a function whose results r are the roots; hoisting: of the one that fills the hoisted array."""
-        known = {} if hoisting else self.hoisted
-        order = [n for n in self._reached(roots, known=known) if n not in known and self._inside(n)]
-        pieces = [order[k : k + PIECE] for k in range(0, len(order), PIECE)] or [[]]
-        if len(pieces) == 1:
-            body = self._lines(order, {}, {}, known)
-            body += self._results(roots, dict.fromkeys(order), {}, known)
-            return Piece(name, _whole(name, self._unpacked(body), body), 0, len(order))
-        return self._in_pieces(name, roots, pieces, known)
-
-    def _in_pieces(self, name: str, roots: Sequence[int], pieces: list[list[int]], known: Mapping[int, int]) -> Piece:
-        home = {number: k for k, piece in enumerate(pieces) for number in piece}
-        shared: dict[int, int] = {}
-        for k, piece in enumerate(pieces):
-            for number in piece:
-                for i in self._inside(number):
-                    if home.get(i, k) != k:
-                        shared.setdefault(i, len(shared))
-        where: dict[int, list[int]] = {}
-        for place, root in enumerate(roots):
-            where.setdefault(home.get(root, 0), []).append(place)
-        code, calls = [], []
-        for k, piece in enumerate(pieces):
-            body = self._lines(piece, shared, home, known, k)
-            body += self._results(roots, dict.fromkeys(piece), shared, known, where.get(k, []))
-            code.append(_whole(f"{name}_{k}", self._unpacked(body), body))
-            calls.append(f"  {name}_{k}(a, r, w);")
-        code.append(_whole(name, [], calls))
-        return Piece(name, "".join(code), len(shared), sum(map(len, pieces)))
-
-    def _lines(self, order, shared, home, known, piece: int = 0) -> list[str]:
-        lines = []
-        for number in order:
-            operation, *inside = self.nodes[number]
-            words = [self._word(i, shared, home, known, piece) for i in inside]
-            lines.append(f"  const double v{number} = {FORMS[operation].format(*words)};")
-            if number in shared:
-                lines.append(f"  w[{shared[number]}] = v{number};")
-        return lines
-
-    def _word(self, number: int, shared=None, home=None, known=None, piece: int = 0) -> str:
-        key = self.nodes[number]
-        if known and number in known:
-            return f"{self.hoisted_array}[{known[number]}]"
-        if key[0] == "CONST":
-            return number_text(key[1])
-        if key[0] == "INPUT":
-            return f"{key[1]}[{key[2]}]"
-        if shared and number in shared and home and home[number] != piece:
-            return f"w[{shared[number]}]"
-        return f"v{number}"
-
-    def _results(self, roots, here, shared, known, places: Iterable[int] | None = None) -> list[str]:
-        home = dict.fromkeys(here, 0)
-        return [
-            f"  r[{place}] = {self._word(roots[place], None, home, known)};"
-            for place in (range(len(roots)) if places is None else places)
-        ]
-
-    def _unpacked(self, body: Sequence[str]) -> list[str]:
-        text = "".join(body)
-        names = [*self.arrays, self.hoisted_array]
-        return [f"  const double *const {n} = a[{k}];" for k, n in enumerate(names) if f" {n}[" in text or f"({n}[" in text or f"-{n}[" in text or f"!{n}[" in text]
-
-
-def _whole(name: str, head: Sequence[str], body: Sequence[str]) -> str:
-    lines = [
-        f"static void {name}(const double *const *a, double *restrict r, double *restrict w)",
-        "{",
-        *head,
-        *body,
-        "  (void)a; (void)r; (void)w;",
-        "}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def number_text(value: float) -> str:
-    """A C literal that reads back exactly."""
-    if value != value:
-        return "NAN"
-    if value in (float("inf"), float("-inf")):
-        return "INFINITY" if value > 0 else "(-INFINITY)"
-    text = repr(float(value))
-    text = text if any(c in text for c in ".e") else f"{text}."
-    return f"({text})" if value < 0 else text

@@ -83,6 +83,12 @@ static size_t gt_state_size(const gt_instance *it);
 static void gt_save(const gt_instance *it, void *block);
 static gt_status gt_restore(gt_instance *it, const void *block, size_t size);
 
+#if defined __GNUC__
+#define GT_SELDOM __attribute__((cold)) /* compiled for size */
+#else
+#define GT_SELDOM
+#endif
+
 /* ---- model.c, generated: tables and functions; see the end of instance.h */
 
 #endif

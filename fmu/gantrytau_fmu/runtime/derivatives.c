@@ -1,13 +1,13 @@
 /* Exact directional derivatives; the implicit unknowns follow by the implicit function theorem. */
 
-/* g: rates of the states, then residuals of the blocks, in the direction of dt, dx, du, dz, dp. */
+/* g: rates of the states, residuals of the blocks, and outputs, in the direction of dt, dx, du, dz, dp. */
 static void gt_slopes(gt_instance *it, int parameters) {
-    double more[GT_ROOM(GT_STATES + GT_ALGEBRAICS)];
+    double more[GT_ROOM(GT_SLOPES)];
     int i;
-    gt_rates_forward(it->a, it->g, it->w);
+    gt_forward(it->a, it->g, it->w);
     if (!parameters) return;
-    gt_rates_by_parameters(it->a, more, it->w);
-    for (i = 0; i < GT_STATES + GT_ALGEBRAICS; i++) it->g[i] += more[i];
+    gt_by_parameters(it->a, more, it->w);
+    for (i = 0; i < GT_SLOPES; i++) it->g[i] += more[i];
 }
 
 /* Factors of all blocks at the present point. */
@@ -19,7 +19,7 @@ static gt_status gt_factors(gt_instance *it) {
     return GT_OK;
 }
 
-/* dz that keeps all residuals at zero, then g and, if wanted, dy; blocks must be factored. */
+/* dz that keeps all residuals at zero, then g; blocks must be factored. */
 static void gt_along(gt_instance *it, int parameters) {
     double step[GT_LARGEST_BLOCK_ROOM];
     int number;
@@ -74,43 +74,28 @@ static double *gt_seed(gt_instance *it, unsigned reference) {
     }
 }
 
-/* Rates in g, outputs in dy if wanted, for the direction in dt, dx, du, dp. */
-static void gt_differentiate(gt_instance *it, int outputs, int parameters) {
-    double more[GT_ROOM(GT_OUTPUTS)];
-    int i;
-    gt_along(it, parameters);
-    if (!outputs) return;
-    gt_outputs_forward(it->a, it->dy, it->w);
-    if (!parameters) return;
-    gt_outputs_by_parameters(it->a, more, it->w);
-    for (i = 0; i < GT_OUTPUTS; i++) it->dy[i] += more[i];
-}
-
 static double gt_slope(const gt_instance *it, unsigned reference) {
     const gt_variable *variable = gt_variables + reference;
     switch ((gt_kind)variable->kind) {
     case GT_DERIVATIVE: return it->g[variable->index];
-    case GT_OUTPUT: return it->dy[variable->index];
+    case GT_OUTPUT: return it->g[GT_STATES + GT_ALGEBRAICS + variable->index];
     case GT_STATE: return it->dx[variable->index];
     default: return 0;
     }
 }
 
-static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, size_t n, int *outputs) {
+static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, size_t n) {
     size_t i;
-    *outputs = 0;
-    for (i = 0; i < n; i++) {
+    for (i = 0; i < n; i++)
         if (gt_is_unknown(it, unknown[i]) != GT_OK) return GT_ERROR;
-        *outputs |= gt_variables[unknown[i]].kind == GT_OUTPUT;
-    }
     return GT_OK;
 }
 
 static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
                                 const double *d_known, double *d_unknown) {
-    int outputs, parameters = 0;
+    int parameters = 0;
     size_t i;
-    if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
+    if (gt_check_unknowns(it, unknown, n) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
     gt_clear_direction(it);
     for (i = 0; i < m; i++) {
         double *seed = gt_seed(it, known[i]);
@@ -121,7 +106,7 @@ static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t
         *seed += d_known[i];
         parameters |= gt_variables[known[i]].kind == GT_PARAMETER;
     }
-    gt_differentiate(it, outputs, parameters);
+    gt_along(it, parameters);
     for (i = 0; i < n; i++) d_unknown[i] = gt_slope(it, unknown[i]);
     return GT_OK;
 }
@@ -129,9 +114,8 @@ static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t
 /* The transposed product, one column after another: as exact, and no code of its own. */
 static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
                             const double *d_unknown, double *d_known) {
-    int outputs;
     size_t i, j;
-    if (gt_check_unknowns(it, unknown, n, &outputs) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
+    if (gt_check_unknowns(it, unknown, n) != GT_OK || gt_ready(it) != GT_OK) return GT_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(d_unknown[i]))
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the seed %g for %s, expected a finite number", GT_NAME, d_unknown[i],
@@ -142,7 +126,7 @@ static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, 
         seed = gt_seed(it, known[j]);
         if (!seed) return GT_ERROR;
         *seed = 1;
-        gt_differentiate(it, outputs, gt_variables[known[j]].kind == GT_PARAMETER);
+        gt_along(it, gt_variables[known[j]].kind == GT_PARAMETER);
         for (i = 0; i < n; i++) sum += d_unknown[i] * gt_slope(it, unknown[i]);
         d_known[j] = sum;
     }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define GT_ROOM(n) ((n) + 1) /* ISO C knows no arrays of length zero */
+#define GT_SLOPES (GT_STATES + GT_ALGEBRAICS + GT_OUTPUTS)
 #define GT_LARGEST_BLOCK_ROOM GT_ROOM(GT_LARGEST_BLOCK)
 
 /* What a saved state holds: plain numbers, so that saving is a copy. */
@@ -42,7 +43,7 @@ struct gt_instance {
     int pivots[GT_ROOM(GT_ALGEBRAICS)];
     double scales[GT_ROOM(GT_ALGEBRAICS)];
     double dt, dx[GT_ROOM(GT_STATES)], du[GT_ROOM(GT_KNOWN)], dz[GT_ROOM(GT_ALGEBRAICS)], dp[GT_ROOM(GT_PARAMETERS)];
-    double g[GT_ROOM(GT_STATES + GT_ALGEBRAICS)], dy[GT_ROOM(GT_OUTPUTS)];
+    double g[GT_ROOM(GT_SLOPES)];
     double k[7][GT_ROOM(GT_STATES)], trial[GT_ROOM(GT_STATES)], next[GT_ROOM(GT_STATES)];
     double jacobian[GT_ROOM(GT_STATES * GT_STATES)], rate_of_time[GT_ROOM(GT_STATES)];
     int order[GT_ROOM(GT_STATES)];
