@@ -155,7 +155,7 @@ def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where:
         leaves = [symbols.find(leaf) for leaf in ca.symvar(holds)]
         if holds.is_constant() and not float(holds):
             raise ModelError(
-                f"{place}: found {larger} and {smaller}, expected {words} in stick_slip; correct them"
+                f"{place}: found {float(larger)} and {float(smaller)}, expected {words} in stick_slip; correct them"
             )
         if leaves and all(leaf is not None and leaf.kind == "parameter" for leaf in leaves):
             events.requirements.append(Requirement(holds, f"expected {words} in stick_slip", path, model))
