@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import fmpy
 import numpy as np
 import pytest
@@ -117,13 +118,30 @@ def test_dependencies_are_listed_in_ascending_order_of_what_is_known(fmi):
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_initial_unknowns_are_found_where_none_are_listed(fmi):
     told = oscillator(initial_unknowns=())
-    assert structure(told, fmi, "initialUnknowns") == {"der(v)": (None, None), "share": (None, None)}
+    known = None if fmi == "2.0" else ["time", "m", "spring.c", "f", "s", "v"]  # none listed means all
+    assert structure(told, fmi, "initialUnknowns") == {"der(v)": (known, None), "share": (known, None)}
     # what depends on a state that is itself found depends on all that is known
+    known = None if fmi == "2.0" else ["time", "steps", "controller.held"]
     assert structure(relay(), fmi, "initialUnknowns") == {
-        "friction.mode": (None, None),
-        "v": (None, None),
-        "der(v)": (None, None),
+        "friction.mode": (known, None),
+        "v": (known, None),
+        "der(v)": (known, None),
     }
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("name", ["oscillator", "relay"])
+def test_casadi_reads_the_same_structure(name, fmi, tmp_path):
+    told = INTERFACES[name]()
+    (tmp_path / "modelDescription.xml").write_bytes(model_description(told, fmi))
+    found = ca.DaeBuilder("read", str(tmp_path))
+    names = [v.name for v in told.variables]
+    rates = [names[u.reference] for u in told.derivatives]
+    states = [names[told.variables[u.reference].derivative or 0] for u in told.derivatives]
+    assert (found.x(), found.der(found.x())) == (states, rates)
+    assert found.u() == [v.name for v in told.variables if v.causality == "input"]
+    assert found.y() == [names[u.reference] for u in told.outputs]
+    assert [found.unit(state) for state in states] == [v.unit for v in told.variables if v.name in states]
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)
