@@ -79,21 +79,21 @@ def cosimulate(
             )
         )
         structure = _structure(components, connections, folder)
-        begin = _first(begin, structure.begin, 0.0)
-        stop, step = _first(stop, structure.stop), _first(step, structure.step)
-        _check(begin, stop, step, order, tolerance, agreement, iterations)
+        begin = structure.begin or 0.0 if begin is None else begin
+        chosen_stop, chosen_step = _either(stop, structure.stop), _either(step, structure.step)
+        _check(begin, chosen_stop, chosen_step, order, tolerance, agreement, iterations)
+        grid = make_grid(float(begin), float(chosen_stop), float(chosen_step))
         parts = _read(structure.components, folder, isolate)
         wires = [*structure.connections, *connections] if structure.connections else connections
         values = {**structure.start, **(start or {})}
-        system = build_system(parts, wires, values, inputs or {}, (begin, stop))
+        system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
         plan = _Plan(
             system, order, sequence, steps or {}, outputs, tolerance, isolate, timeout, agreement, iterations
         )
-        grid = make_grid(begin, stop, step)
         result = _run(plan, grid, progress)
         if error_estimate:
             finer = _Plan(**{**vars(plan), "steps": {name: own / 2 for name, own in plan.steps.items()}})
-            half = _run(finer, make_grid(begin, stop, step / 2), progress)
+            half = _run(finer, make_grid(grid.begin, grid.stop, grid.step / 2), progress)
             result = _with_errors(result, half)
     return result
 
@@ -276,8 +276,8 @@ def _with_errors(result: Result, half: Result) -> Result:
     return Result(result.time, {**values, **errors}, units=units, descriptions=words, title=result.title)
 
 
-def _first(*values: Any) -> Any:
-    return next((value for value in values if value is not None), None)
+def _either(value: float | None, default: float | None) -> Any:
+    return default if value is None else value
 
 
 def _check(

@@ -52,7 +52,7 @@ class Slave:
         self.state: Any = None
         self.running = False
         self.groups: dict[tuple[str, ...], list[_Group]] = {}
-        self.fmu = _loaded(component)
+        self.fmu: Any = _loaded(component)
         self._instantiate()
 
     def begin(
@@ -190,7 +190,7 @@ class Slave:
         except KeyboardInterrupt:
             raise
         except Exception as error:
-            status = getattr(error, "status", None)
+            status = getattr(error, "status", -1)
             words = f"status '{STATUS[status]}'" if status in range(len(STATUS)) else str(error)
             raise self._failure(f"{what}: {words}") from error
 
@@ -285,7 +285,7 @@ _HOOKS: list[Any] = []
 
 
 def _callbacks(key: int) -> Any:
-    from fmpy import calloc, free, fmi2
+    from fmpy import calloc, fmi2, free
 
     if not _HOOKS:
         _HOOKS.append(fmi2.fmi2CallbackLoggerTYPE(_heard_2))

@@ -9,7 +9,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NoReturn
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
@@ -145,7 +145,7 @@ class _Reader:
         except ValueError:
             raise ModelError(f"{self.file}: {where}: found '{text}', expected a number") from None
 
-    def refuse(self, words: str) -> None:
+    def refuse(self, words: str) -> NoReturn:
         raise ModelError(
             f"{self.file}: {words}, which is not supported; expected FMUs, systems, connections and values of "
             "parameters, give the rest as arguments of cosimulate"

@@ -159,7 +159,8 @@ def _connector(scalar: Scalar) -> str:
 def _value(scalar: Scalar, value: float | str) -> str:
     text = {"integer": lambda: str(round(float(value))), "boolean": lambda: "true" if value else "false"}
     words = text.get(scalar.kind, lambda: str(value) if isinstance(value, str) else repr(float(value)))()
-    return f"<ssv:Parameter name={quoteattr(scalar.name)}><ssv:{TYPES[scalar.kind]} value={quoteattr(words)}/></ssv:Parameter>"
+    inner = f"<ssv:{TYPES[scalar.kind]} value={quoteattr(words)}/>"
+    return f"<ssv:Parameter name={quoteattr(scalar.name)}>{inner}</ssv:Parameter>"
 
 
 def _connection(link: Link) -> str:
