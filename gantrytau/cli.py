@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gantrytau.commands import check, equations, library, optimize, simulate
+from gantrytau.commands import check, equations, fmu, library, optimize, simulate
 from gantrytau.commands.reporting import Commands
 
 app = typer.Typer(
@@ -103,6 +103,7 @@ app.command(
     epilog="Example: gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s"
 )(equations.equations)
 app.command(epilog="Example: gantrytau library --json")(library.library)
+app.add_typer(fmu.app, name="fmu")
 
 
 def _solve_rows(screen: Any) -> dict[str, Any]:

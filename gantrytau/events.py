@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.statements import Equation, Requirement
@@ -119,8 +120,9 @@ def read_events(stated: Sequence[tuple[str, str, int, Sampling | Sticking]], sym
 def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where: tuple[str, str, str]):
     path, model, place = where
     names = [s.name for s in _declared(statement.variable, symbols, place, "sampled", ("real", "output"))]
-    expressions = _sized(statement.expression, len(names), place, "the expression")
-    period = _of_parameters(statement.period, 1, symbols, place, "period")[0]
+    shape = statement.variable.shape
+    expressions = _sized(statement.expression, shape, place, "the expression")
+    period = _of_parameters(statement.period, (1, 1), symbols, place, "period")[0]
     if period.is_constant() and not 0 < float(period) < float("inf"):
         raise ModelError(f"{place}: found period={period}, expected a finite number above zero, in s")
     if not period.is_constant():
@@ -128,7 +130,7 @@ def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where:
             Requirement(period > 0, "expected a sampling period above zero, in s", path, model)
         )
     if statement.start is not None:
-        starts = _of_parameters(statement.start, len(names), symbols, place, "start")
+        starts = _of_parameters(statement.start, shape, symbols, place, "start")
         events.starts.update(zip(names, starts, strict=True))
     for name, expression in zip(names, expressions, strict=True):
         _take(events, name, place)
@@ -140,7 +142,8 @@ def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where:
     force = _single(_declared(statement.force, symbols, place, "the force", ("real", "output")), place)
     speed = _single(_declared(statement.speed, symbols, place, "the speed", ("real", "output")), place)
     parts = {
-        key: _sized(getattr(statement, key), 1, place, key)[0] for key in ("coulomb", "smooth", "breakaway")
+        key: _sized(getattr(statement, key), (1, 1), place, key)[0]
+        for key in ("coulomb", "smooth", "breakaway")
     }
     _take(events, force, place)
     limits = (
@@ -152,7 +155,7 @@ def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where:
         leaves = [symbols.find(leaf) for leaf in ca.symvar(holds)]
         if holds.is_constant() and not float(holds):
             raise ModelError(
-                f"{place}: found {larger} and {smaller}, expected {words} in stick_slip; correct them"
+                f"{place}: found {float(larger)} and {float(smaller)}, expected {words} in stick_slip; correct them"
             )
         if leaves and all(leaf is not None and leaf.kind == "parameter" for leaf in leaves):
             events.requirements.append(Requirement(holds, f"expected {words} in stick_slip", path, model))
@@ -190,30 +193,35 @@ def _single(found: Sequence[Symbol], place: str) -> str:
     return found[0].name
 
 
-def _sized(value: Any, size: int, place: str, role: str) -> list[ca.SX]:
-    """An expression as scalars, as many as wanted."""
+def _sized(value: Any, shape: tuple[int, int], place: str, role: str) -> list[ca.SX]:
+    """An expression as scalars, column after column, of a wanted shape; a row may stand for a column."""
     try:
-        listed = isinstance(value, (list, tuple))
-        found = scalars(ca.vertcat(*(ca.SX(x) for x in value)) if listed else ca.SX(value))
-    except (NotImplementedError, RuntimeError, TypeError) as error:
+        if isinstance(value, (list, tuple)):
+            symbolic = any(isinstance(item, ca.SX) for item in value)
+            value = ca.vertcat(*value) if symbolic else ca.DM(np.asarray(value, dtype=float))
+        found = ca.SX(value)
+    except (NotImplementedError, RuntimeError, TypeError, ValueError) as error:
         raise ModelError(
             f"{place}: found {role} {value!r}, expected a number or an expression of symbols"
         ) from error
-    if len(found) != size:
-        raise ModelError(f"{place}: {role} has {len(found)} elements, expected {size}, as the variable has")
-    return found
+    vectors = 1 in found.shape and 1 in shape
+    if found.numel() != shape[0] * shape[1] or (found.shape != shape and not vectors):
+        raise ModelError(f"{place}: {role} has shape {found.shape}, expected {shape}; correct it")
+    return scalars(found)
 
 
-def _of_parameters(value: Any, size: int, symbols: Symbols, place: str, role: str) -> list[ca.SX]:
+def _of_parameters(
+    value: Any, shape: tuple[int, int], symbols: Symbols, place: str, role: str
+) -> list[ca.SX]:
     """Numbers or expressions of parameters; one number may stand for all."""
-    whole = _sized(value, 1 if isinstance(value, (int, float)) else size, place, role)
+    whole = _sized(value, (1, 1) if isinstance(value, (int, float)) else shape, place, role)
     for leaf in ca.symvar(ca.vertcat(*whole)):
         symbol = symbols.find(leaf)
         if symbol is None or symbol.kind != "parameter":
             raise ModelError(
                 f"{place}: found {leaf.name()} in {role}, expected a number or an expression of parameters"
             )
-    return whole * (size // len(whole))
+    return whole * (shape[0] * shape[1] // len(whole))
 
 
 def expressed(events: Events, symbols: Symbols) -> list[Equation]:

@@ -4,6 +4,7 @@ FMI 3.0.2, sections 2.4, 3.3 and 4.3.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 from gantrytau_fmu.description_checks import initial_of, limit
 from gantrytau_fmu.description_structure import Row, Structure
@@ -92,6 +93,11 @@ def model_structure(interface: Interface, lists: Structure) -> str:
 
 
 def _unknown(name: str, row: Row) -> str:
-    places = None if row.dependencies is None else " ".join(map(str, row.dependencies))
+    places = None if row.dependencies is None else _listed(row.dependencies)
     kinds = None if row.kinds is None else " ".join(row.kinds)
     return element(name, {"valueReference": row.reference, "dependencies": places, "dependenciesKind": kinds})
+
+
+@lru_cache(maxsize=16)  # the same long list stands at every unknown that may depend on all
+def _listed(places: tuple[int, ...]) -> str:
+    return " ".join(map(str, places))

@@ -57,20 +57,22 @@ def structure(interface: Interface, fmi: str) -> Structure:
         return tuple(_row(interface, unknown, told) for unknown in unknowns)
 
     return Structure(
-        rows(interface.outputs), rows(interface.derivatives), initial_rows(interface, states), states
+        rows(interface.outputs), rows(interface.derivatives), initial_rows(interface, fmi, states), states
     )
 
 
-def initial_rows(interface: Interface, states: tuple[int, ...]) -> tuple[Row, ...]:
+def initial_rows(interface: Interface, fmi: str, states: tuple[int, ...]) -> tuple[Row, ...]:
     """Outputs, states and derivatives that are calculated at the start, in the order of their references.
 
     Their dependencies are those of `interface.initial_unknowns`, where it lists them by what is known then: inputs,
-    time, and what starts exactly.
+    time, and what starts exactly. Otherwise they may depend on all of these, which FMI 3 writes out: CasADi 3.8
+    does not read its entries without a list.
     """
     variables = interface.variables
     wanted = {v.reference for v in variables if v.causality == "output"}.union(states)
     wanted.update(unknown.reference for unknown in interface.derivatives)
     knowns = {v.reference for v in variables if v.causality == "independent" or initial_of(v) == "exact"}
+    everything = tuple(sorted(knowns)) if fmi == "3.0" else None
     listed = {unknown.reference: unknown for unknown in interface.initial_unknowns}
     found = []
     for place in sorted(wanted):
@@ -78,7 +80,7 @@ def initial_rows(interface: Interface, states: tuple[int, ...]) -> tuple[Row, ..
             continue
         unknown = listed.get(place)
         if unknown is None or not knowns.issuperset(unknown.dependencies):
-            found.append(Row(place))
+            found.append(Row(place, everything))
         else:
             found.append(_row(interface, unknown, knowns, kinds=("constant",)))
     return tuple(found)

@@ -83,7 +83,7 @@ def read_fmu(path: str | os.PathLike[str]) -> FmuDescription:
             f"{files.path}: found a {DESCRIPTION} that breaks the schema of FMI {files.fmi}, expected a valid one; "
             f"ask its author for another export{listed}{more}"
         )
-    return _described(files, model_of(files))
+    return describe(files, model_of(files))
 
 
 def read_files(path: str | os.PathLike[str]) -> FmuFiles:
@@ -166,7 +166,7 @@ def _consistent(path: Path) -> Iterator[None]:
     )
 
 
-def _described(files: FmuFiles, model: Any) -> FmuDescription:
+def describe(files: FmuFiles, model: Any) -> FmuDescription:
     """FMPy's description as a record; model: its ModelDescription."""
     with _consistent(files.path):
         interfaces = tuple(_interfaces(model))

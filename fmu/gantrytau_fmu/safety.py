@@ -127,7 +127,7 @@ def open_archive(
     """
     path = Path(path)
     if not path.is_file():
-        raise ModelError(_no_file(path))
+        raise ModelError(no_file(path))
     with _opened(path) as archive:
         infos = archive.infolist()
         _check_directory(path, infos)
@@ -325,7 +325,8 @@ def _check_content(path: Path, names: tuple[str, ...], needs: str) -> None:
     raise ModelError(f"{path}: found {len(names)} files and no {needs}, expected one at the top; {remedy}")
 
 
-def _no_file(path: Path) -> str:
+def no_file(path: Path) -> str:
+    """That there is no file of this name, with the nearest one as a question."""
     if path.exists():
         what = "folder" if path.is_dir() else "special file"
         return f"{path}: found a {what} of this name, expected a file; check the path"

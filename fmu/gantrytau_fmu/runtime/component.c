@@ -14,7 +14,8 @@ static void gt_apply_logging(const gt_component *c) {
 
 /* Errors and warnings are told even while logging is off, for without them nobody learns why a call was refused;
  * only a call that switches off their category by its name silences them. Switching on selects, of events and
- * calls, those that are named, or both if none is. */
+ * calls, those that are named, or both if none is; an instance made with logging on tells events only, for some
+ * clients always make it so, and a line per call drowns the rest. */
 static gt_status gt_call_logging(gt_component *c, const char *function, int on, size_t count,
                                  const char *const *categories) {
     static const char *const names[] = GT_CATEGORY_NAMES;
@@ -76,7 +77,7 @@ static gt_component *gt_call_instantiate(gt_component *draft, gt_sink sink, cons
     if (!c) return gt_refuse_instance(draft, sink, function, "no memory");
     *c = *draft;
     c->told[GT_LOG_WARNING] = c->told[GT_LOG_ERROR] = 1;
-    c->told[GT_LOG_EVENTS] = c->told[GT_LOG_CALLS] = (unsigned char)(logging != 0);
+    c->told[GT_LOG_EVENTS] = (unsigned char)(logging != 0);
     c->name = malloc(strlen(name) + 1);
     if (c->name) strcpy(c->name, name);
     c->it = c->name ? gt_new(c->name, sink, c, cosimulation, logging) : NULL;

@@ -1,0 +1,154 @@
+"""`gantrytau fmu export`: a model as an FMU."""
+
+import time
+import warnings
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gantrytau.commands.choice import source_of
+from gantrytau.commands.models import Chosen, build
+from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, writable
+from gantrytau.errors import did_you_mean
+
+INTERFACES = {
+    "both": ("model-exchange", "co-simulation"),
+    "me": ("model-exchange",),
+    "cs": ("co-simulation",),
+}
+VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
+SOLVERS = ("dopri5", "rodas4")
+
+
+def export(
+    model: ModelName,
+    to: Annotated[
+        Path | None, typer.Option(help="The file to write.", show_default="the model's name.fmu")
+    ] = None,
+    fmi: Annotated[str, typer.Option("--fmi", metavar="2.0|3.0", help="Version of the standard.")] = "3.0",
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES",
+            help="'native' for this machine, 'all', or names as x86_64-windows, separated by commas; others than "
+            "this machine need the extra 'cross'.",
+            show_default="native",
+        ),
+    ] = None,
+    solver: Annotated[
+        str, typer.Option(metavar="dopri5|rodas4", help="Of Co-Simulation; rodas4 for stiff models.")
+    ] = "dopri5",
+    interface: Annotated[
+        str, typer.Option(metavar="me|cs|both", help="Model Exchange, Co-Simulation, or both.")
+    ] = "both",
+    given: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES",
+            help="The inputs of the FMU, separated by commas, instead of the model's.",
+            show_default=False,
+        ),
+    ] = None,
+    find: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAMES", help="Its outputs, separated by commas.", show_default="all variables"),
+    ] = None,
+    states: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES", help="Preferred states, separated by commas.", show_default="chosen by gantrytau"
+        ),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Relative, of Co-Simulation.")] = 1e-6,
+    no_sources: Annotated[
+        bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")
+    ] = False,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Write a model as an FMU, for Simulink, Dymola, OpenModelica, or a machine without Python.
+
+    Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
+    inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
+    """
+    with reporting(json, source_of(model)):
+        policy: dict[str, Any] = {
+            "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
+            "interfaces": INTERFACES.get(interface) or _unknown("--interface", interface, INTERFACES),
+            "solver": solver if solver in SOLVERS else _unknown("--solver", solver, SOLVERS),
+            "tolerance": tolerance,
+            "platforms": listed(platforms) or ("native",),
+            "given": listed(given),
+            "find": listed(find),
+            "states": listed(states) or None,
+            "sources": not no_sources,
+        }
+        chosen = build(model, prototype, set_ or ())
+        file = to or Path(f"{chosen.name}.fmu")
+        begin = time.perf_counter()
+        told = _exported(chosen, file, policy)
+        _show(chosen, file, time.perf_counter() - begin, told, json)
+
+
+def _unknown(option: str, found: str, expected: Any) -> Any:
+    raise CommandError(f"{option} {found}: expected {' or '.join(expected)}{_proposed(found, expected)}")
+
+
+def _proposed(found: str, expected: Any) -> str:
+    """The nearest word as a question; nothing if none is near, as the message lists all."""
+    words = did_you_mean(found, expected)
+    return words if "did you mean" in words else ""
+
+
+def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
+    """Write the FMU; what its writer warns of."""
+    from gantrytau_fmu import export_fmu
+
+    with warnings.catch_warnings(record=True) as caught, writable(file):
+        warnings.simplefilter("always")
+        platforms = ", ".join(policy["platforms"])
+        with busy(f"exporting {chosen.name} for {platforms}"):
+            export_fmu(chosen.model, file, **policy)
+    return list(dict.fromkeys(str(warning.message) for warning in caught))
+
+
+def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: bool) -> None:
+    """The file, what is in it, and how long it took."""
+    from gantrytau_fmu.reading import read_fmu
+
+    fmu = read_fmu(file)
+    if json:
+        found = {
+            "model": chosen.name,
+            "prototype": chosen.prototype,
+            "file": str(file),
+            "size": fmu.size,
+            "fmi": fmu.fmi,
+            "platforms": fmu.platforms,
+            "inputs": fmu.inputs,
+            "outputs": fmu.outputs,
+            "parameters": fmu.parameters,
+            "states": fmu.states,
+            "variables": len(fmu.variables),
+            "seconds": seconds,
+            "warnings": told,
+        }
+        typer.echo(as_json(found))
+        return
+    for words in told:
+        note(f"Note: {words}")
+    kinds = (
+        (fmu.inputs, "inputs"),
+        (fmu.outputs, "outputs"),
+        (fmu.parameters, "parameters"),
+        (fmu.states, "states"),
+    )
+    typer.echo(
+        f"{chosen.name}, FMI {fmu.fmi}: {', '.join(f'{len(names)} {word}' for names, word in kinds)}, "
+        f"{len(fmu.variables)} variables in all"
+    )
+    typer.echo(f"Platforms: {', '.join(fmu.platforms) or 'none, sources only'}")
+    typer.echo(f"Written: {file} ({fmu.size / 1000:,.0f} kB) in {seconds:.2f} s")
