@@ -14,6 +14,7 @@ from gantrytau_fmu.operations import OPERATIONS, number_text
 
 PIECE = 1500  # operations per C function
 LINE = 160  # characters of an expression that is still written where it is used
+REPEATING = {name for name, form in OPERATIONS.items() if form.count("{0}") > 1}
 HOISTED = "c"
 
 
@@ -39,6 +40,7 @@ def c_function(
     cut = [order[k : k + PIECE] for k in range(0, len(order), PIECE)] or [[]]
     home = {number: k for k, part in enumerate(cut) for number in part}
     uses = Counter(i for n in order for i in graph.inside(n)) + Counter(roots)
+    uses += Counter(i for n in order if graph.nodes[n][0] in REPEATING for i in graph.inside(n))
     shared: dict[int, int] = {}
     for number in order:
         for i in graph.inside(number):

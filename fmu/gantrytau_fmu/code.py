@@ -161,7 +161,11 @@ def _tables(
     held = [formulas.clocks.index(k) for k in range(formulas.periods.numel())]
     lines = [
         "static const gt_variable gt_variables[] = {",
-        *(f"  {{GT_{v.kind}, {int(v.fixed)}, {v.index}, {_quoted(v.name)}}}," for v in variables),
+        *(f"  {{GT_{v.kind}, {int(v.fixed)}, {v.index}}}," for v in variables),
+        "};",
+        # no pointers: each would have to be relocated when the library is loaded
+        f"static const char gt_variable_names[][{max(len(v.name) for v in variables) + 1}] = {{",
+        *(f"  {_quoted(v.name)}," for v in variables),
         "};",
         _numbers("gt_constants", constants),
         _numbers("gt_start_x", starts),

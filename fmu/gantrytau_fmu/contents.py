@@ -26,6 +26,7 @@ class Contents:
     nominals: tuple[float, ...]
     outputs: tuple[Unknown, ...]
     derivatives: tuple[Unknown, ...]
+    initial_unknowns: tuple[Unknown, ...]
     indicators: tuple[int, ...]
     terminals: dict[str, dict[str, int]]
     description: str
@@ -119,19 +120,14 @@ def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
     _states(builder, outputs)
     _outputs(builder, outputs)
     indicators = _frictions(builder)
-    depends = Dependencies(formulas, wanted)
-    found = builder.places_of
-    shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
+    structure = _structure(builder, Dependencies(formulas, wanted), outputs)
     return Contents(
         formulas=formulas,
         variables=tuple(builder.variables),
         entries=tuple(builder.entries),
         constants=tuple(builder.constants),
         nominals=tuple(_nominal(builder, n) for n in formulas.states),
-        outputs=tuple(_unknown(builder, depends, n) for n in shown),
-        derivatives=tuple(
-            _entry(builder, found[f"der({n})"], depends.rates[k]) for k, n in enumerate(formulas.states)
-        ),
+        **structure,
         indicators=indicators,
         terminals={},
         description=f"{dae.name}, a model of gantrytau",
@@ -264,57 +260,84 @@ def _frictions(builder: _Builder) -> tuple[int, ...]:
 
 
 class Dependencies:
-    """On which states and inputs rates and outputs depend, through the implicit blocks and the sampled variables.
+    """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
 
-    rates, outputs, samples: boolean rows over (states, inputs).
+    rates, outputs, samples: boolean rows over (states, inputs, parameters).
     """
 
     def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
         arrays = formulas.arrays
-        self._n, self._m = arrays["x"].numel(), len(formulas.inputs)
-        held = arrays["u"].numel() - self._m
-        z = np.zeros((arrays["z"].numel(), self._n + self._m + held), dtype=bool)
+        held, inputs = len(formulas.held), len(formulas.inputs)
+        sizes = [arrays["x"].numel(), inputs + held, arrays["p"].numel()]
+        z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
         place = 0
         for block in formulas.blocks:
-            rows = self._rows(formulas, block.residual, z)
-            z[place : place + len(block.names)] = rows.any(axis=0)
+            z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
             place += len(block.names)
+        own = slice(sizes[0] + inputs, sizes[0] + inputs + held)
         samples = self._rows(formulas, formulas.samples, z)
-        own = samples[:, self._n + self._m :]
-        for _ in range(held):
-            own |= own @ own
-        known = np.eye(self._n + self._m + held, dtype=bool)
-        known[self._n + self._m :] = samples | own @ samples
-        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, : self._n + self._m]
-        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, : self._n + self._m]
-        self.samples = known[self._n + self._m :, : self._n + self._m]
+        for _ in range(held):  # what is held may depend on what is held
+            samples |= samples[:, own] @ samples
+        known = np.eye(sum(sizes), dtype=bool)
+        known[own] = samples
+        shown = np.delete(np.arange(sum(sizes)), own)
+        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, shown]
+        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, shown]
+        self.samples = samples[:, shown]
 
     @staticmethod
     def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
-        """Direct dependence of a vector on (x, u), with that through z added."""
+        """Dependence of a vector on (x, u, p), directly and through z."""
         arrays = formulas.arrays
-        names = ["x", "u", "z"]
         function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
-        places = [list(arrays).index(n) for n in names]
+        places = [list(arrays).index(n) for n in "xupz"]
         patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
-        x, u, through = [p.reshape(expression.numel(), arrays[n].numel()) for n, p in zip(names, patterns, strict=True)]
-        return np.hstack([x, u]) | (through @ z if z.size else np.zeros((expression.numel(), 1), dtype=bool))
+        x, u, p, through = [
+            found.reshape(expression.numel(), arrays[n].numel()) for n, found in zip("xupz", patterns, strict=True)
+        ]
+        return np.hstack([x, u, p]) | through @ z
 
 
-def _unknown(builder: _Builder, depends: Dependencies, name: str) -> Unknown:
-    formulas, reference = builder.formulas, builder.places_of[name]
-    entry = builder.entries[reference]
-    if entry.kind == "STATE":
-        states = [n == name for n in formulas.states]
-        return _entry(builder, reference, np.array([*states, *[False] * len(formulas.inputs)]))
+def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
+    """What an output depends on."""
+    formulas, entry = builder.formulas, builder.entries[builder.places_of[name]]
+    if entry.kind == "OUTPUT":
+        return depends.outputs[entry.index]
     if entry.kind == "HELD":
-        return _entry(builder, reference, depends.samples[entry.index - len(formulas.inputs)])
-    if entry.kind == "CONSTANT":
-        return Unknown(reference, (), ())
-    return _entry(builder, reference, depends.outputs[entry.index])
+        return depends.samples[entry.index - len(formulas.inputs)]
+    row = np.zeros(depends.outputs.shape[1], dtype=bool)
+    if entry.kind == "STATE":
+        row[entry.index] = True
+    return row
 
 
-def _entry(builder: _Builder, reference: int, row: np.ndarray) -> Unknown:
-    names = (*builder.formulas.states, *builder.formulas.inputs)
-    found = sorted(builder.places_of[names[k]] for k in np.flatnonzero(row))
-    return Unknown(reference, tuple(found), ("dependent",) * len(found))
+def _structure(builder: _Builder, depends: Dependencies, outputs: Sequence[str]) -> dict[str, tuple[Unknown, ...]]:
+    """Outputs, derivatives and initial unknowns, each with what it depends on."""
+    formulas, found = builder.formulas, builder.places_of
+    count = len(formulas.states) + len(formulas.inputs)
+    names = (*formulas.states, *formulas.inputs, *formulas.parameters)
+    references = np.array([found[n] for n in names], dtype=int)
+    solved = {formulas.states[k] for k in formulas.initial_states}
+    first = np.array([n not in solved for n in names], dtype=bool)
+    shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
+    rows = {found[n]: _row(builder, depends, n) for n in shown}
+    rates = {found[f"der({n})"]: depends.rates[k] for k, n in enumerate(formulas.states)}
+
+    def unknown(reference: int, chosen: np.ndarray) -> Unknown:
+        known = tuple(sorted(references[np.flatnonzero(chosen)].tolist()))
+        return Unknown(reference, known, ("dependent",) * len(known))
+
+    def limited(row: np.ndarray) -> np.ndarray:
+        return row & (np.arange(row.size) < count)
+
+    # what initial equations determine depends on all that they may hold
+    at_start = {
+        r: (row | first) if (row & ~first).any() else row & first for r, row in {**rows, **rates}.items()
+    }
+    at_start |= {found[n]: first for n in solved}
+    calculated = [r for r in at_start if builder.variables[r].initial == "calculated"]
+    return dict(
+        outputs=tuple(unknown(r, limited(row)) for r, row in rows.items()),
+        derivatives=tuple(unknown(r, limited(row)) for r, row in rates.items()),
+        initial_unknowns=tuple(unknown(r, at_start[r] & first) for r in sorted(calculated)),
+    )

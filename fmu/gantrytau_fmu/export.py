@@ -11,7 +11,7 @@ from typing import Literal
 
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau_fmu.archive import binary_path, write_fmu
+from gantrytau_fmu.archive import binary_members, write_fmu
 from gantrytau_fmu.code import ModelCode, model_code
 from gantrytau_fmu.compiling import NoCompiler, compile_libraries
 from gantrytau_fmu.contents import Contents, contents_of
@@ -19,7 +19,7 @@ from gantrytau_fmu.description import build_description, model_description
 from gantrytau_fmu.documentation import documentation, licenses
 from gantrytau_fmu.interface import Experiment, Interface, Interfaces
 from gantrytau_fmu.platforms import Platform, chosen
-from gantrytau_fmu.terminals import icon, terminals_and_icons
+from gantrytau_fmu.terminals import icon, icon_svg, terminals_and_icons
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
@@ -78,6 +78,7 @@ def export_fmu(
         variables=contents.variables,
         outputs=contents.outputs,
         derivatives=contents.derivatives,
+        initial_unknowns=contents.initial_unknowns,
         indicators=contents.indicators,
         interfaces=wanted_interfaces,
         experiment=experiment or Experiment(tolerance=tolerance),
@@ -198,16 +199,15 @@ def _members(
     """The files in the archive by their names there."""
     names = sorted(texts) if sources else []
     members = {"modelDescription.xml": model_description(interface, fmi, names)}
-    members |= {binary_path(p, fmi, interface.identifier): data for p, data in binaries.items()}
+    members |= binary_members(binaries, fmi, interface.identifier)
     members |= {f"sources/{n}": texts[n].encode() for n in names}
-    members |= {f"documentation/{n}": data for n, data in licenses(interface).items()}
+    members |= licenses(interface)
     members["documentation/index.html"] = documentation(interface, fmi)
     if fmi == "2.0":
         return {**members, "model.png": icon()}
     if names:
         members["sources/buildDescription.xml"] = build_description(interface, fmi, names)
-    terminals = terminals_and_icons(interface)
-    if terminals:
-        members |= {"terminalsAndIcons/terminalsAndIcons.xml": terminals, "terminalsAndIcons/icon.png": icon()}
-    return members
+    folder = "terminalsAndIcons/"
+    members |= {f"{folder}terminalsAndIcons.xml": terminals_and_icons(interface), f"{folder}icon.png": icon()}
+    return {**members, f"{folder}icon.svg": icon_svg()}
 

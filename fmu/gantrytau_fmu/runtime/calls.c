@@ -123,7 +123,7 @@ static int gt_values(const gt_component *c, const char *function, const unsigned
 static int gt_is_real(const gt_component *c, const char *function, unsigned reference) {
     if (gt_variables[reference].kind != GT_MODE) return 1;
     gt_say(c->it, GT_ERROR, GT_LOG_ERROR, "%s: %s is an integer, expected a variable that is a real number", function,
-           gt_variables[reference].name);
+           gt_name(reference));
     return 0;
 }
 
@@ -160,7 +160,7 @@ static gt_status gt_call_get_integer(gt_component *c, const char *function, cons
         gt_status status;
         if (gt_variables[references[i]].kind != GT_MODE)
             return GT_REFUSE(c, "%s: %s is a real number, expected an integer variable", function,
-                             gt_variables[references[i]].name);
+                             gt_name(references[i]));
         status = gt_get_integer(c->it, references[i], values + i);
         if (status > worst) worst = status;
     }
@@ -172,7 +172,7 @@ static gt_status gt_call_none(gt_component *c, const char *function, const char 
                               size_t count) {
     if (!count) return GT_OK;
     if (!gt_known(c, function, references, count)) return GT_ERROR;
-    return GT_REFUSE(c, "%s: %s is no %s; this FMU has none", function, gt_variables[references[0]].name, what);
+    return GT_REFUSE(c, "%s: %s is no %s; this FMU has none", function, gt_name(references[0]), what);
 }
 
 static gt_status gt_call_derivative(gt_component *c, const char *function, int adjoint, const unsigned *unknowns,
@@ -186,7 +186,7 @@ static gt_status gt_call_derivative(gt_component *c, const char *function, int a
         !gt_has(c, function, "the array of sensitivities", product, products))
         return GT_ERROR;
     for (i = 0; i < seeds; i++)
-        if (!gt_finite(c, function, gt_variables[adjoint ? unknowns[i] : knowns[i]].name, seed[i])) return GT_ERROR;
+        if (!gt_finite(c, function, gt_name(adjoint ? unknowns[i] : knowns[i]), seed[i])) return GT_ERROR;
     return adjoint ? gt_adjoint(c->it, unknowns, n, knowns, m, seed, product)
                    : gt_directional(c->it, unknowns, n, knowns, m, seed, product);
 }
@@ -245,7 +245,7 @@ static int gt_vector(const gt_component *c, const char *function, const char *wh
 static const char *gt_state_name(size_t index) {
     size_t i;
     for (i = 0; i < GT_VARIABLES; i++)
-        if (gt_variables[i].kind == GT_STATE && (size_t)gt_variables[i].index == index) return gt_variables[i].name;
+        if (gt_variables[i].kind == GT_STATE && (size_t)gt_variables[i].index == index) return gt_name((unsigned)i);
     return "a state";
 }
 

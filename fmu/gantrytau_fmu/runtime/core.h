@@ -25,8 +25,7 @@ typedef struct {
     unsigned char kind;
     unsigned char fixed;  /* parameters: may not be changed after initialisation; states: found by initial equations */
     int index;
-    const char *name;
-} gt_variable;
+} gt_variable; /* its name is in gt_variable_names */
 
 typedef enum { /* bits, so that a call can name all modes in which it is allowed */
     GT_INSTANTIATED = 1, GT_INITIALIZATION = 2, GT_EVENT = 4, GT_CONTINUOUS = 8, GT_STEP = 16, GT_TERMINATED = 32,

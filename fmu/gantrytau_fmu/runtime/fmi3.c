@@ -209,7 +209,7 @@ GT_EXPORT fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, 
     (void)count;
     if (!gt_known(c, __func__, &reference, 1)) return fmi3Error;
     return (fmi3Status)GT_REFUSE(c, "%s: not supported; the dependencies of %s are in the model description", __func__,
-                                 gt_variables[reference].name);
+                                 gt_name(reference));
 }
 
 GT_EXPORT fmi3Status fmi3GetVariableDependencies(
@@ -223,7 +223,7 @@ GT_EXPORT fmi3Status fmi3GetVariableDependencies(
     (void)count;
     if (!gt_known(c, __func__, &dependent, 1)) return fmi3Error;
     return (fmi3Status)GT_REFUSE(c, "%s: not supported; the dependencies of %s are in the model description", __func__,
-                                 gt_variables[dependent].name);
+                                 gt_name(dependent));
 }
 
 /* ---- Saved states */

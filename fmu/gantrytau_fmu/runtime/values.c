@@ -1,7 +1,7 @@
 /* Values by reference. */
 
 static const char *gt_name(unsigned reference) {
-    return gt_variables[reference].name;
+    return gt_variable_names[reference];
 }
 
 static gt_status gt_known_reference(gt_instance *it, unsigned reference) {
@@ -58,17 +58,17 @@ static gt_status gt_get(gt_instance *it, unsigned reference, double *value) {
             *value = it->y[variable->index];
             if (!isfinite(*value))
                 status = gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is not a finite number at time = %.9g s; the model has no solution "
-                                "there (a pose out of reach or singular): keep away from it", GT_NAME, variable->name, it->now.time);
+                                "there (a pose out of reach or singular): keep away from it", GT_NAME, gt_name(reference), it->now.time);
         }
         break;
     case GT_INDICATOR: {
-        double indicators[GT_ROOM(GT_MODES)];
+        double indicators[GT_ROOM(GT_MODES)] = {0};
         status = gt_get_indicators(it, indicators);
         if (status == GT_OK) *value = indicators[variable->index];
         break;
     }
     case GT_MODE:
-        status = gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is an integer, expected a floating-point variable", GT_NAME, variable->name);
+        status = gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is an integer, expected a floating-point variable", GT_NAME, gt_name(reference));
     }
     return status;
 }
