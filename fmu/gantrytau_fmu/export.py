@@ -28,7 +28,7 @@ RUNTIME = (
 )
 INCLUDED = ("functions.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
-MODERATE, LARGE = 30_000, 150_000  # operations from which on the compiler is asked for less
+LARGE = 100_000  # operations from which on the compiler is asked for less; its second level gains nothing
 
 
 def export_fmu(
@@ -181,7 +181,7 @@ def source_files(model: str, solver: str) -> dict[str, str]:
 def _compiled(
     texts: dict[str, str], targets: Sequence[Platform], identifier: str, operations: int
 ) -> dict[Platform, bytes]:
-    level = "-O2" if operations < MODERATE else "-O1" if operations < LARGE else "-O0"
+    level = "-O1" if operations < LARGE else "-O0"
     try:
         return compile_libraries(texts, platforms=targets, identifier=identifier, optimisation=level)
     except NoCompiler as error:

@@ -217,10 +217,10 @@ def _initial(
     dae: Dae, system: System, rows: ca.SX, arrays: Mapping[str, ca.SX], blocks: Sequence[ImplicitBlock]
 ) -> tuple[ca.SX, tuple[int, ...]]:
     """The initial equations that determine states, and which: those that may move and move them best."""
-    from scipy.linalg import qr
-
     if not rows.numel():
         return rows, ()
+    from scipy.linalg import qr
+
     residual = column([b.residual for b in blocks])
     at = list(numbers_of(dae, arrays).values())
 
