@@ -154,7 +154,7 @@ def _description(file: str | Path, folder: Path) -> Any:
 
 def _scalars(variable: Any) -> list[Scalar]:
     """The scalars of a variable: itself, or the elements of an array, row by row, counted from 0."""
-    kind = "integer" if INTEGERS.fullmatch(variable.type) else KINDS.get(variable.type, variable.type)
+    kind = "integer" if INTEGERS.fullmatch(variable.type) else KINDS.get(variable.type, str(variable.type))
     shape = tuple(int(size) for size in variable.shape or ()) if variable.dimensions else ()
     places = list(product(*(range(size) for size in shape)))
     starts = (variable.start or "").split() if shape else [variable.start]

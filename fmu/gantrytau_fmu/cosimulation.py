@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -85,7 +85,7 @@ def cosimulate(
         grid = make_grid(float(begin), float(chosen_stop), float(chosen_step))
         parts = _read(structure.components, folder, isolate)
         wires = [*structure.connections, *connections] if structure.connections else connections
-        values = {**structure.start, **(start or {})}
+        values = {**_matching(parts, structure.start), **(start or {})}
         system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
         plan = _Plan(
             system, order, sequence, steps or {}, outputs, tolerance, isolate, timeout, agreement, iterations
@@ -203,6 +203,16 @@ def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> di
         place = unpack(file, folder / f"fmu{count}")
         found[name] = read_component(name, file, place)
     _check_alone(found, isolate)
+    return found
+
+
+def _matching(components: Mapping[str, Component], start: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of an SSP that belong to a variable; the standard has the others ignored."""
+    found = {}
+    for name, value in start.items():
+        with suppress(ModelError):
+            locate(components, name)
+            found[name] = value
     return found
 
 
