@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from gantrytau.commands.choice import source_of
+from gantrytau.commands.fmu.info import counted
 from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, writable
@@ -161,14 +162,12 @@ def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: boo
     for words in told:
         note(f"Note: {words}")
     kinds = (
-        (fmu.inputs, "inputs"),
-        (fmu.outputs, "outputs"),
-        (fmu.parameters, "parameters"),
-        (fmu.states, "states"),
+        ("input", fmu.inputs),
+        ("output", fmu.outputs),
+        ("parameter", fmu.parameters),
+        ("state", fmu.states),
     )
-    typer.echo(
-        f"{chosen.name}, FMI {fmu.fmi}: {', '.join(f'{len(names)} {word}' for names, word in kinds)}, "
-        f"{len(fmu.variables)} variables in all"
-    )
+    counts = ", ".join(counted(len(names), word) for word, names in kinds)
+    typer.echo(f"{chosen.name}, FMI {fmu.fmi}: {counts}, {counted(len(fmu.variables), 'variable')} in all")
     typer.echo(f"Platforms: {', '.join(fmu.platforms) or 'none, sources only'}")
     typer.echo(f"Written: {file} ({fmu.size / 1000:,.0f} kB) in {seconds:.2f} s")
