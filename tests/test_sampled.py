@@ -9,17 +9,20 @@ from scipy.linalg import expm
 from gantrytau import (
     Input,
     Model,
+    ModelError,
     Parameter,
     Real,
+    SolveError,
     Start,
     check,
     cos,
     der,
     sampled,
     simulate,
+    sin,
     translate,
 )
-from gantrytau_models import GantryTau, prototypes
+from gantrytau_models import FourBar, GantryTau, prototypes
 from tests.sampled_models import Held, Slide
 
 TOLERANCE = 1e-9
@@ -304,3 +307,52 @@ def test_what_is_given_replaces_the_inputs_only():
     found = simulate(dae, stop=0.2, inputs={"first.x": lambda t: 1 - cos(2 * t)})
     assert np.allclose(found["first.f"], 8 * np.cos(2 * found.time), atol=1e-9)
     assert found["held"][0] == -2.0
+
+
+class Watched(Model):
+    """A parallelogram that falls flat, its crank sampled."""
+
+    bar = FourBar(1.0, 0.3, 1.0, 0.3)
+    seen = Real(unit="rad", description="sampled angle")
+
+    def equations(self):
+        yield sampled(self.seen, self.bar.crank.phi, period=0.05)
+
+
+def test_a_singular_pose_is_met_when_it_is_without_instants():
+    with pytest.raises(SolveError, match="meets a singular pose") as watched:
+        simulate(Watched(), stop=1.0)
+    with pytest.raises(SolveError, match="meets a singular pose") as plain:
+        simulate(FourBar(1.0, 0.3, 1.0, 0.3), stop=1.0)
+    assert watched.value.time == pytest.approx(plain.value.time, abs=1e-6)
+    result = watched.value.result
+    # the fall to the pose grows errors a hundredfold
+    crank = simulate(FourBar(1.0, 0.3, 1.0, 0.3), stop=0.25, points=6, tolerance=1e-11)["crank.phi"]
+    assert result.final("seen") == pytest.approx(crank[-1], abs=NEAR)
+
+
+class Rates(Model):
+    """Derivatives that nothing but the sampling asks for."""
+
+    course = Input(unit="1", description="a function of time")
+    rate = Real(unit="1/s", description="sampled rate of it")
+    x = Real(unit="1", description="falls off", start=1.0, fixed=True)
+    square = Real(unit="1", description="its square")
+    fall = Real(unit="1/s", description="sampled rate of the square")
+    a = Parameter(1.0, unit="1/s", description="rate")
+
+    def equations(self):
+        yield der(self.x) == -self.a * self.x
+        yield self.square == self.x**2
+        yield sampled(self.rate, der(self.course), period=0.1)
+        yield sampled(self.fall, der(self.square), period=0.1)
+
+
+def test_derivatives_that_only_the_sampling_asks_for_are_found():
+    found = simulate(Rates(), stop=1.0, points=11, inputs={"course": lambda t: sin(3 * t)})
+    assert np.allclose(found["rate"], 3 * np.cos(3 * found.time), rtol=1e-12)
+    assert np.abs(found["fall"] + 2 * np.exp(-2 * found.time)).max() < NEAR
+    with pytest.raises(
+        ModelError, match="input course is differentiated 1 times by the model, which samples do"
+    ):
+        simulate(Rates(), stop=1.0, inputs={"course": ([0.0, 1.0], [0.0, 1.0])})

@@ -88,7 +88,7 @@ def _residual(master: Master, u: np.ndarray) -> np.ndarray:
     for name in master.parts:
         count = len(master.known[name])
         if count:
-            _put(master, name, u[place : place + count])
+            _put(master, name, u[place : place + count].tolist())
         place += count
     return _targets(master) - u
 
@@ -103,10 +103,10 @@ def _jacobian(master: Master, u: np.ndarray, residual: np.ndarray) -> np.ndarray
         for column in range(first, first + count):
             moved = u.copy()
             moved[column] += PERTURBATION * max(1.0, abs(u[column]))
-            _put(master, name, moved[first : first + count])
+            _put(master, name, moved[first : first + count].tolist())
             jacobian[:, column] = (_targets(master) - moved - residual) / (moved[column] - u[column])
         if count:
-            _put(master, name, u[first : first + count])
+            _put(master, name, u[first : first + count].tolist())
         first += count
     return jacobian
 

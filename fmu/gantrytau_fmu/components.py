@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.result import split_element
@@ -97,18 +97,25 @@ def numeric(scalar: Scalar) -> bool:
     return scalar.kind in ("real", "integer", "boolean")
 
 
-def read_component(name: str, file: str | Path, folder: Path) -> Component:
-    """The FMU unpacked in `folder` as a component; ModelError for one that cannot take part in a co-simulation.
+def read_component(
+    name: str,
+    file: str | Path,
+    folder: Path,
+    kind: Literal["co-simulation", "model-exchange"] = "co-simulation",
+) -> Component:
+    """The FMU unpacked in `folder` as a component; ModelError for one that does not have the wanted interface.
 
     name: in the system; file: as the user named it, for messages.
     """
     description = _description(file, folder)
-    if description.coSimulation is None:
+    interface = description.coSimulation if kind == "co-simulation" else description.modelExchange
+    if interface is None:
+        other = "without --me" if kind == "model-exchange" else "with --me, which integrates Model Exchange"
         raise ModelError(
-            f"{name}: {file} has no Co-Simulation interface, expected one; export it with Co-Simulation, "
-            "or integrate it alone with `gantrytau fmu run --me`"
+            f"{name}: {file} has no interface for {kind}, expected one; export it with that, "
+            f"or run it alone with `gantrytau fmu run` {other}"
         )
-    version, interface = description.fmiMajorVersion, description.coSimulation
+    version = description.fmiMajorVersion
     scalars = {
         scalar.name: scalar for variable in description.modelVariables for scalar in _scalars(variable)
     }
@@ -125,7 +132,7 @@ def read_component(name: str, file: str | Path, folder: Path) -> Component:
         feedthrough=_feedthrough(description, scalars),
         units={unit.name: _base(unit.baseUnit) for unit in description.unitDefinitions if unit.baseUnit},
         can_save=bool(interface.canGetAndSetFMUstate),
-        variable_step=bool(interface.canHandleVariableCommunicationStepSize),
+        variable_step=bool(getattr(interface, "canHandleVariableCommunicationStepSize", True)),
         only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
         categories=tuple(category.name for category in description.logCategories),
         stop=_number(experiment and experiment.stopTime),
@@ -154,7 +161,7 @@ def _description(file: str | Path, folder: Path) -> Any:
 
 def _scalars(variable: Any) -> list[Scalar]:
     """The scalars of a variable: itself, or the elements of an array, row by row, counted from 0."""
-    kind = "integer" if INTEGERS.fullmatch(variable.type) else KINDS.get(variable.type, variable.type)
+    kind = "integer" if INTEGERS.fullmatch(variable.type) else KINDS.get(variable.type, str(variable.type))
     shape = tuple(int(size) for size in variable.shape or ()) if variable.dimensions else ()
     places = list(product(*(range(size) for size in shape)))
     starts = (variable.start or "").split() if shape else [variable.start]

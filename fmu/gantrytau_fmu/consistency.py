@@ -108,6 +108,12 @@ def _units(fmu: FmuDescription, model: Any) -> Iterator[Finding]:
                     f"{variable.name} in {variable.unit} is the rate of {state.name}, "
                     f"expected {state.unit} per s",
                 )
+    for variable in model.modelVariables:
+        own = variable.unit or (variable.declaredType.unit if variable.declaredType else None)
+        if variable.displayUnit is not None and own is None:
+            yield Finding(
+                "error", f"{variable.name}: it has the display unit '{variable.displayUnit}' and no unit"
+            )
     for unit, name in missing.items():
         yield Finding("error", f"{name}: its unit '{unit}' is not among the UnitDefinitions")
 
@@ -128,8 +134,30 @@ def _structure(fmu: FmuDescription, files: FmuFiles, model: Any) -> Iterator[Fin
         yield Finding("error", f"{name}: the ModelStructure lists it as output, but its causality is another")
     for name in sorted({name for name in fmu.outputs if fmu.outputs.count(name) > 1}):
         yield Finding("error", f"{name}: the ModelStructure lists this output more than once")
+    yield from _initial_unknowns(model)
     if fmu.fmi == "2.0":
         yield from _indices(files, len(model.modelVariables))
+
+
+def _initial_unknowns(model: Any) -> Iterator[Finding]:
+    """Whether the model structure lists what is to be found at the start; aliases are not listed apart."""
+    rates = [unknown.variable for unknown in model.derivatives]
+    states = [rate.derivative for rate in rates if rate.derivative is not None]
+    found = [variable for variable in model.modelVariables if variable.causality == "output"]
+    unknown = {
+        id(variable) for variable in (*rates, *states, *found) if variable.initial in ("approx", "calculated")
+    }
+    listed = {id(entry.variable) for entry in model.initialUnknowns}
+    for variable in model.modelVariables:
+        if variable.alias is not None or variable.clocks:
+            continue
+        needed = id(variable) in unknown or variable.causality == "calculatedParameter"
+        if needed and id(variable) not in listed:
+            yield Finding("error", f"{variable.name}: the ModelStructure does not list it as initial unknown")
+        if not needed and id(variable) in listed:
+            yield Finding(
+                "error", f"{variable.name}: the ModelStructure lists it as initial unknown, but it is none"
+            )
 
 
 def _indices(files: FmuFiles, count: int) -> Iterator[Finding]:

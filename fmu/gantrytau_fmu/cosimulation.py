@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -42,7 +42,7 @@ def cosimulate(
     steps: Mapping[str, float] | None = None,
     sequence: Sequence[str] | None = None,
     error_estimate: bool = False,
-    isolate: Sequence[str] = (),
+    isolate: Sequence[str] | bool = (),
     timeout: float = 60.0,
     agreement: float = 1e-8,
     iterations: int = 50,
@@ -65,7 +65,8 @@ def cosimulate(
     steps: component -> its own step, a multiple or a fraction of `step`; its inputs are held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
         error of the result to first order in the step.
-    isolate: components that run in processes of their own, where a crash or `timeout` (s, for one call) is an error.
+    isolate: components (True: all) that run in processes of their own, where a crash is an error, as is a call that
+        takes longer than `timeout`, s.
     progress: called with the time reached; by default a bar on the terminal when it takes long.
 
     An input shows the output that drives it at that point. Raises ModelError for a system that does not fit,
@@ -83,12 +84,13 @@ def cosimulate(
         chosen_stop, chosen_step = _either(stop, structure.stop), _either(step, structure.step)
         _check(begin, chosen_stop, chosen_step, order, tolerance, agreement, iterations)
         grid = make_grid(float(begin), float(chosen_stop), float(chosen_step))
-        parts = _read(structure.components, folder, isolate)
+        alone = isolate if isinstance(isolate, Sequence) else tuple(structure.components) if isolate else ()
+        parts = _read(structure.components, folder, alone)
         wires = [*structure.connections, *connections] if structure.connections else connections
-        values = {**structure.start, **(start or {})}
+        values = {**_matching(parts, structure.start), **(start or {})}
         system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
         plan = _Plan(
-            system, order, sequence, steps or {}, outputs, tolerance, isolate, timeout, agreement, iterations
+            system, order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations
         )
         result = _run(plan, grid, progress)
         if error_estimate:
@@ -203,6 +205,16 @@ def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> di
         place = unpack(file, folder / f"fmu{count}")
         found[name] = read_component(name, file, place)
     _check_alone(found, isolate)
+    return found
+
+
+def _matching(components: Mapping[str, Component], start: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of an SSP that belong to a variable; the standard has the others ignored."""
+    found = {}
+    for name, value in start.items():
+        with suppress(ModelError):
+            locate(components, name)
+            found[name] = value
     return found
 
 

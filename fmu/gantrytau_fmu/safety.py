@@ -322,7 +322,7 @@ def _check_content(path: Path, names: tuple[str, ...], needs: str) -> None:
         )
     else:
         remedy = "check that it is the right file"
-    raise ModelError(f"{path}: found {len(names)} files and no {needs}, expected one at the top; {remedy}")
+    raise ModelError(f"{path}: found no {needs} in it, expected one at the top; {remedy}")
 
 
 def no_file(path: Path) -> str:

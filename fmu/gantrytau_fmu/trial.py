@@ -97,7 +97,7 @@ def _loaded(folder: Path, model: Any, kind: str, identifier: str, journal: Journ
     found = ctypes.CDLL(str(library))
     needed = [name for name in dir(made) if name.startswith(prefix)]
     if missing := [name for name in needed if not hasattr(found, name)]:
-        journal.found("error", f"the binary does not export {', '.join(missing)}")
+        raise Failure(f"it does not export {', '.join(missing)}")
     fmu = made(
         guid=model.guid,
         unzipDirectory=str(folder),

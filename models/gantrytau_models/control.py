@@ -5,6 +5,7 @@ takes references every 4 ms; its gains are not printed. What stands here is the 
 with gains of our own from masses and bandwidths. At each instant a controller sees what held just before it.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -31,7 +32,8 @@ class Seen(Model):
 class Controller(Model):
     """Base of controllers of three carts: subclasses say what force is `wanted` for what was `seen`.
 
-    prototype: a record such as `prototypes.L1`, for gains that suit its masses. Inputs are sampled every
+    prototype: a record such as `prototypes.L1`, for gains that suit its masses; start: where the tool is at the
+    start, (3,) in m, for the start values of positions, ahead of the carts unless given. Inputs are sampled every
     `period`; the force stays as it is in between, and between -limit and limit. Raises ModelError for what is
     no such record.
     """
@@ -49,16 +51,17 @@ class Controller(Model):
     wanted = Real(3, unit="N", description="forces that the controller asks for, before the limit")
     seen = Seen()
 
-    def __init__(self, prototype: Prototype, **modifications: Any):
+    def __init__(self, prototype: Prototype, *, start: Sequence[float] | None = None, **modifications: Any):
         if not isinstance(prototype, Prototype):
             raise ModelError(
                 f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1"
             )
-        super().__init__(self._defaults(prototype), **modifications)
+        tool = tool_ahead_of_carts(prototype) if start is None else start
+        super().__init__(self._defaults(prototype, tool), **modifications)
 
-    def _defaults(self, prototype: Prototype) -> dict:
-        start = dict(start=carts_behind(prototype, tool_ahead_of_carts(prototype)))
-        return dict(q=start, q_ref=start, seen=dict(q=start, q_ref=start))
+    def _defaults(self, prototype: Prototype, tool: Sequence[float]) -> dict[str, Any]:
+        q = dict(start=carts_behind(prototype, tool))
+        return dict(q=q, q_ref=q, seen=dict(q=q, q_ref=q))
 
     def equations(self):
         yield sampled(self.seen.q, self.q, period=self.period)
@@ -88,9 +91,9 @@ class IntegralController(Controller):
     integral = Real(3, unit="N", start=0.0, description="integral part of the forces")
     proportional = Real(3, unit="N", description="what is integrated, divided by integral_time")
 
-    def _defaults(self, prototype: Prototype) -> dict:
+    def _defaults(self, prototype: Prototype, tool: Sequence[float]) -> dict[str, Any]:
         # a cart, and the plate as if it went along with each of them
-        return super()._defaults(prototype) | dict(
+        return super()._defaults(prototype, tool) | dict(
             mass=[mass + prototype.plate_mass for mass in prototype.cart_masses]
         )
 
@@ -161,8 +164,10 @@ class ComputedTorqueController(Controller):
     seen = SeenWithAccelerations()
     dynamics = InverseDynamics(prototypes.GT_A)
 
-    def _defaults(self, prototype: Prototype) -> dict:
-        return super()._defaults(prototype) | dict(dynamics=InverseDynamics(prototype).modifications)
+    def _defaults(self, prototype: Prototype, tool: Sequence[float]) -> dict[str, Any]:
+        defaults = super()._defaults(prototype, tool)
+        dynamics = dict(InverseDynamics(prototype).modifications) | dict(q=defaults["q"])
+        return defaults | dict(dynamics=dynamics)
 
     def equations(self):
         yield from super().equations()

@@ -5,6 +5,7 @@ may be differentiated as often as its order says. The robot is led along the fil
 positions and speeds follow from the same equations as its motion under given forces.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 from gantrytau import Array, Input, Model, Output, Parameter, der
@@ -18,11 +19,11 @@ from gantrytau_models.prototypes import Prototype
 class Feedforward(Model):
     """Forces `f` and filtered references `r`, `q`, `v`, `a` for a reference `r_ref` of the tool.
 
-    prototype, friction: as of `GantryTau`; `robot=dict(plate_mass=12.0)` modifies the robot
-    inside, `robot=SixLinkGantryTau(...)` puts another with three carts in its place. The filters are critical and of
-    order three unless modified, so that forces have no kinks; alike, so that a straight line stays one: a
-    reference that moves steadily comes out later by 1.53 / bandwidth. They start at rest at the first value of
-    `r_ref`, which has to be within reach.
+    prototype, friction: as of `GantryTau`; start: the start value of `r_ref`, (3,) in m, ahead of the carts
+    unless given; `robot=dict(plate_mass=12.0)` modifies the robot inside, `robot=SixLinkGantryTau(...)` puts
+    another with three carts in its place. The filters are critical and of order three unless modified, so that
+    forces have no kinks; alike, so that a straight line stays one: a reference that moves steadily comes out
+    later by 1.53 / bandwidth. They start at rest at the first value of `r_ref`, which has to be within reach.
     """
 
     bandwidth = Parameter(60.0, unit="rad/s", min=0.0, description="of the filters, at -3 dB")
@@ -36,13 +37,16 @@ class Feedforward(Model):
     robot = GantryTau(prototypes.GT_A)
 
     def __init__(
-        self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications: Any
+        self,
+        prototype: Prototype,
+        *,
+        friction: type[Friction] | None = TanhFriction,
+        start: Sequence[float] | None = None,
+        **modifications: Any,
     ):
-        defaults = dict(
-            r_ref=dict(start=tool_ahead_of_carts(prototype)),
-            robot=GantryTau(prototype, friction=friction).modifications,
-        )
-        super().__init__(defaults, **modifications)
+        tool = dict(start=tool_ahead_of_carts(prototype) if start is None else list(start))
+        robot = GantryTau(prototype, friction=friction, tool=dict(r=tool))
+        super().__init__(dict(r_ref=tool, robot=robot.modifications), **modifications)
 
     def equations(self):
         for k, (low_pass, cart) in enumerate(zip(self.filters, self.robot.carts, strict=True)):

@@ -6,6 +6,8 @@ Out of reach the results stay finite, and so do their derivatives: they are thos
 respect to which the square root is zero, and `status` says so.
 """
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 
@@ -124,7 +126,7 @@ def root(square: ca.SX) -> ca.SX:
     return sqrt(ca.fmax(square, ROUNDING))
 
 
-def carts_behind(prototype: Prototype, tool: list[float]) -> list[float]:
+def carts_behind(prototype: Prototype, tool: Sequence[float]) -> list[float]:
     """Positions of the carts behind the tool, the nearest ones where a link is too short; m."""
     found = []
     for arm in prototype.arms:

@@ -1,8 +1,9 @@
 """A robot that tracks a reference of its tool: feedforward and controller, and the loop closed with the robot."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, connect
+from gantrytau import Fixed, Input, Model, ModelError, Output, Parameter, connect
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models import prototypes
 from gantrytau_models.control import CascadedController, Controller
@@ -17,7 +18,8 @@ class TrackingController(Model):
     """From a reference `r_ref` of the tool and measured `q`, `v` to forces `f`: feedforward and a controller.
 
     control: a class such as `PidController`, or one with gains of yours, as `PidController(prototypes.L1,
-    bandwidth=25.0)`; friction: that of the robot inside the feedforward. Further keywords modify members. What
+    bandwidth=25.0)`; friction: that of the robot inside the feedforward; start: where the tool is at the start, (3,)
+    in m. Further keywords modify members. What
     is tracked is the reference behind its filters, `feedforward.r`. Raises ModelError for what is no controller.
     """
 
@@ -36,20 +38,21 @@ class TrackingController(Model):
         *,
         control: type[Controller] | Controller = CascadedController,
         friction: type[Friction] | None = TanhFriction,
+        start: Sequence[float] | None = None,
         **modifications: Any,
     ):
+        tool = tool_ahead_of_carts(prototype) if start is None else list(start)
         if isinstance(control, type) and issubclass(control, Controller):
-            control = control(prototype)
+            control = control(prototype, start=tool)
         if not isinstance(control, Controller):
             raise ModelError(
                 f"{type(self).__name__}: found control={control!r}, expected a class such as CascadedController, or "
                 "one with gains, as CascadedController(prototypes.L1, k_p=15.0)"
             )
-        tool = tool_ahead_of_carts(prototype)
         defaults = dict(
             r_ref=dict(start=tool),
             q=dict(start=carts_behind(prototype, tool)),
-            feedforward=Feedforward(prototype, friction=friction).modifications,
+            feedforward=Feedforward(prototype, friction=friction, start=tool).modifications,
         )
         super().__init__(defaults, control=control, **modifications)
 
@@ -65,12 +68,10 @@ class TrackingController(Model):
 class ControlledRobot(Model):
     """The robot and its controller as one model; `error` is what the tool lags behind its filtered reference.
 
-    Arguments as of `TrackingController`, of which `controller` is one; `robot=dict(plate_mass=12.0)` makes the robot
-    differ from what the controller knows. At the start the tool stands at rest at its reference, unless
-    `at_reference=False`.
+    Arguments as of `TrackingController`; `controller=dict(feedforward_share=0.0)` has further ones for it alone, and
+    `robot=dict(plate_mass=12.0)` makes the robot differ from what it knows. The tool begins at rest at `start`.
     """
 
-    at_reference = True
     r_ref = Input(3, unit="m", description="reference of the tool position, resolved in the world")
     r = Output(3, unit="m", description="position of the tool")
     error = Output(3, unit="m", description="filtered reference less position of the tool")
@@ -83,12 +84,19 @@ class ControlledRobot(Model):
         *,
         control: type[Controller] | Controller = CascadedController,
         friction: type[Friction] | None = TanhFriction,
+        start: Sequence[float] | None = None,
+        controller: Mapping[str, Any] | None = None,
         **modifications: Any,
     ):
+        tool = tool_ahead_of_carts(prototype) if start is None else list(start)
+        at_rest = dict(r=Fixed(tool), v=Fixed(0.0))
+        arguments: dict[str, Any] = dict(control=control, friction=friction, start=tool) | dict(
+            controller or {}
+        )
         defaults = dict(
-            r_ref=dict(start=tool_ahead_of_carts(prototype)),
-            robot=MeasuredGantryTau(prototype, friction=friction).modifications,
-            controller=TrackingController(prototype, control=control, friction=friction).modifications,
+            r_ref=dict(start=tool),
+            robot=MeasuredGantryTau(prototype, friction=friction, tool=at_rest).modifications,
+            controller=TrackingController(prototype, **arguments).modifications,
         )
         super().__init__(defaults, **modifications)
 
@@ -100,8 +108,3 @@ class ControlledRobot(Model):
             yield cart.f == self.controller.f[k]
         yield self.r == self.robot.tool.r
         yield self.error == self.controller.feedforward.r - self.r
-
-    def initial_equations(self):
-        if self.at_reference:
-            yield self.robot.tool.r == self.r_ref
-            yield self.robot.tool.v == 0

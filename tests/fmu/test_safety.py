@@ -208,7 +208,7 @@ def test_members_that_share_their_bytes_are_refused(pack, tmp_path):
 def test_an_archive_without_model_description_is_refused(pack, tmp_path):
     path = pack({"robot/modelDescription.xml": XML}, description=False)
     message = refusal(path, tmp_path)
-    assert "found 1 files and no modelDescription.xml, expected one at the top" in message
+    assert "found no modelDescription.xml in it, expected one at the top" in message
     assert "pack the content of the folder 'robot', not the folder" in message
     path = pack({"a": b""}, description=False)
     assert "check that it is the right file" in refusal(path, tmp_path)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands.fmu.info import FmuFile, present
+from gantrytau.commands.fmu.info import FmuFile, counted, present
 from gantrytau.commands.options import Json
 from gantrytau.commands.reporting import FAULT, as_json, busy, reporting
 
@@ -43,13 +43,9 @@ def check(
             for finding in findings:
                 typer.echo(str(finding))
             others = len(findings) - len(errors)
-            verdict = f"{_counted(len(errors), 'error')}" + (
-                f", {_counted(others, 'remark')}" if others else ""
+            verdict = f"{counted(len(errors), 'error')}" + (
+                f", {counted(others, 'remark')}" if others else ""
             )
             typer.echo(f"{file}: {verdict}")
         if errors:
             raise typer.Exit(FAULT)
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count or 'no'} {word}{'' if count == 1 else 's'}"

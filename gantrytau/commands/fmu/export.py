@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from gantrytau.commands.choice import source_of
+from gantrytau.commands.fmu.info import counted
 from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, writable
@@ -88,6 +89,7 @@ def export(
         }
         chosen = build(model, prototype, set_ or ())
         file = to or Path(f"{chosen.name}.fmu")
+        _rehearse(file)
         begin = time.perf_counter()
         told = _exported(chosen, file, policy)
         _show(chosen, file, time.perf_counter() - begin, told, json)
@@ -103,11 +105,30 @@ def _proposed(found: str, expected: Any) -> str:
     return words if "did you mean" in words else ""
 
 
+def _rehearse(file: Path) -> None:
+    """Find out before the work whether the file can be written; CommandError if not."""
+    from gantrytau.result_files import replacing
+
+    if file.suffix.lower() != ".fmu":
+        raise CommandError(f"--to {file}: found the suffix '{file.suffix}', expected .fmu")
+    if not file.parent.is_dir():
+        raise CommandError(
+            f"--to {file}: the folder '{file.parent}' does not exist; create it, or name another one"
+        )
+    trial = file.with_name(f".{file.stem}.trial.fmu")
+    with writable(file):
+        try:
+            with replacing(trial) as partial:
+                partial.touch()
+        finally:
+            trial.unlink(missing_ok=True)
+
+
 def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
     """Write the FMU; what its writer warns of."""
     from gantrytau_fmu import export_fmu
 
-    with warnings.catch_warnings(record=True) as caught, writable(file):
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         platforms = ", ".join(policy["platforms"])
         with busy(f"exporting {chosen.name} for {platforms}"):
@@ -141,14 +162,12 @@ def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: boo
     for words in told:
         note(f"Note: {words}")
     kinds = (
-        (fmu.inputs, "inputs"),
-        (fmu.outputs, "outputs"),
-        (fmu.parameters, "parameters"),
-        (fmu.states, "states"),
+        ("input", fmu.inputs),
+        ("output", fmu.outputs),
+        ("parameter", fmu.parameters),
+        ("state", fmu.states),
     )
-    typer.echo(
-        f"{chosen.name}, FMI {fmu.fmi}: {', '.join(f'{len(names)} {word}' for names, word in kinds)}, "
-        f"{len(fmu.variables)} variables in all"
-    )
+    counts = ", ".join(counted(len(names), word) for word, names in kinds)
+    typer.echo(f"{chosen.name}, FMI {fmu.fmi}: {counts}, {counted(len(fmu.variables), 'variable')} in all")
     typer.echo(f"Platforms: {', '.join(fmu.platforms) or 'none, sources only'}")
     typer.echo(f"Written: {file} ({fmu.size / 1000:,.0f} kB) in {seconds:.2f} s")

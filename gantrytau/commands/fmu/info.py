@@ -30,3 +30,8 @@ def present(file: Path) -> None:
 
     if not file.is_file():
         raise CommandError(no_file(file))
+
+
+def counted(count: int, word: str) -> str:
+    """`no errors`, `1 error`, `2 errors`."""
+    return f"{count or 'no'} {word}{'' if count == 1 else 's'}"

@@ -1,0 +1,158 @@
+"""`gantrytau fmu run`: an FMU, or a system of them, over time."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from gantrytau.commands import pictures, saving
+from gantrytau.commands.fmu.info import present
+from gantrytau.commands.options import Json, Plotted, Saved, To, listed
+from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, fail, reporting
+from gantrytau.commands.values import number, signal, split
+from gantrytau.errors import SolveError
+
+if TYPE_CHECKING:
+    from gantrytau.result import Result
+
+SHOWN = 24  # variables in the table; files and JSON have all
+
+
+def run(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="An FMU, or a system of FMUs (.ssp).", show_default=False),
+    ],
+    stop: Annotated[
+        float | None, typer.Option(help="Time at which to stop, in s.", show_default="that of the file")
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            help="Communication step, in s; of the outputs with --me.", show_default="that of the file"
+        ),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Set a parameter or a start value, in a system robot.m=2.5. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
+            "as f=forces.csv:f. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    order: Annotated[
+        str, typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.")
+    ] = "gauss-seidel",
+    tolerance: Annotated[
+        float | None, typer.Option(help="Handed to the FMUs, or to CVode.", show_default=False)
+    ] = None,
+    me: Annotated[bool, typer.Option("--me", help="Integrate Model Exchange with CVode.")] = False,
+    isolate: Annotated[
+        bool, typer.Option("--isolate", help="Run each FMU in a process of its own: a crash is an error.")
+    ] = False,
+    output: Saved = None,
+    plot: Plotted = None,
+    to: To = None,
+    json: Json = False,
+) -> None:
+    """Run an FMU of any tool, or a system of FMUs, and print where its variables begin and end.
+
+    Its binaries are code: trust them. Ctrl-C stops early; what was computed until then is saved to --output.
+    """
+    with reporting(json):
+        present(file)
+        drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
+        start = dict(_setting(text) for text in set_ or ())
+        saving.rehearse(output)
+        place = pictures.place(drawn, to)
+        policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
+        try:
+            result = _result(file, policy, order=order, me=me, isolate=isolate)
+        except SolveError as error:
+            _stop(error, output, json)
+        files = saving.save(result, output)
+        if place:
+            files += pictures.draw(result, drawn, place)
+        summary = {
+            "file": str(file),
+            "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+            "final": {name: result.final(name) for name in result.names},
+            "files": files,
+        }
+        if json:
+            typer.echo(as_json(summary))
+        else:
+            _show(summary, result)
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, value = split("--set", text)
+    return name, number("--set", name, value)
+
+
+def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
+    if file.suffix.lower() != ".ssp":
+        from gantrytau_fmu.single import run_fmu
+
+        return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
+    from gantrytau_fmu.cosimulation import cosimulate
+
+    if me:
+        raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")
+    chosen: Any = order
+    return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)
+
+
+def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
+    """Save what was found until it stopped, say so, and leave."""
+    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    message = str(error).partition(";")[0] if pressed else str(error)
+    files: list[str] = []
+    if output is not None and error.result is not None:
+        files = saving.save(error.result, output)
+        message += f"\nWhat was computed until then is in {output}"
+    elif pressed:
+        message += "; with --output its result would have been saved"
+    code = INTERRUPTED if pressed else FAULT
+    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
+
+
+def _show(summary: Mapping[str, Any], result: "Result") -> None:
+    """The first variables at both ends as a table; texts of the file are no markup."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    time = summary["time"]
+    typer.echo(
+        f"{summary['file']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
+        f"{len(result.names)} variables"
+    )
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("variable", no_wrap=True)
+    for heading in ("start", "end", "least", "greatest"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("unit")
+    for name in result.names[:SHOWN]:
+        values = result[name]
+        numbers = (values[0], values[-1], values.min(), values.max())
+        table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))
+    if result.names:
+        Console().print(table)
+    if len(result.names) > SHOWN:
+        typer.echo(f"and {len(result.names) - SHOWN} more; --output saves all")
+    for file in summary["files"]:
+        typer.echo(f"Written: {file}")
