@@ -46,7 +46,9 @@ def check_xml(text: bytes, where: str) -> None:
         nonlocal depth
         depth -= 1
 
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate(
+        namespace_separator="}"
+    )  # as xml.etree has it, so that it accepts what passes here
     parser.XmlDeclHandler, parser.StartDoctypeDeclHandler = declared, typed
     parser.StartElementHandler, parser.EndElementHandler = begun, ended
     try:

@@ -55,7 +55,7 @@ def asked(monkeypatch):
 def test_the_group_shows_its_commands(run):
     found = run("fmu", "--help")
     assert found.exit_code == 0
-    for word in ("export", "check", "info"):
+    for word in ("export", "check", "info", "run"):
         assert word in found.stdout
         assert f"Example: gantrytau fmu {word}" in run("fmu", word, "--help").stdout
 

@@ -334,6 +334,7 @@ def test_a_member_that_is_not_there_or_too_long_is_refused(pack):
         ),
         (b'<?xml version="1.0" encoding="UTF-7"?><a/>', "found the encoding UTF-7, expected UTF-8"),
         (b"<a>", "found no proper XML (no element found"),
+        (b"<b:a/>", "found no proper XML (unbound prefix"),
         (b"<a>&b;</a>", "found no proper XML (undefined entity"),
         (b"<a>\xff</a>", "found no proper XML (not well-formed"),
         (b"", "found no proper XML (no element found"),

@@ -1,13 +1,11 @@
 """`gantrytau fmu`: FMUs written, checked, described and run, one module for each command."""
 
-from importlib import import_module
-from importlib.util import find_spec
-
 import typer
 
 from gantrytau.commands.fmu.check import check
 from gantrytau.commands.fmu.export import export
 from gantrytau.commands.fmu.info import info
+from gantrytau.commands.fmu.run import run
 
 app = typer.Typer(
     help="FMUs (FMI 2.0 and 3.0): write models as FMUs, check, describe and run those of any tool.",
@@ -17,7 +15,4 @@ app = typer.Typer(
 app.command(epilog="Example: gantrytau fmu export 'GantryTau(D1)' --to robot.fmu --platforms all")(export)
 app.command(epilog="Example: gantrytau fmu check robot.fmu --run")(check)
 app.command(epilog="Example: gantrytau fmu info robot.fmu --json")(info)
-if find_spec(f"{__name__}.run"):
-    app.command(epilog="Example: gantrytau fmu run robot.fmu --stop 2 --plot tool.r --to motion.png")(
-        import_module(f"{__name__}.run").run
-    )
+app.command(epilog="Example: gantrytau fmu run robot.fmu --stop 2 --plot tool.r --to motion.png")(run)
