@@ -129,7 +129,7 @@ def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
         nominals=tuple(_nominal(builder, n) for n in formulas.states),
         **structure,
         indicators=indicators,
-        terminals={},
+        terminals=_terminals(builder),
         description=f"{dae.name}, a model of gantrytau",
         wanted=tuple(wanted),
         graph=graph,
@@ -257,6 +257,17 @@ def _frictions(builder: _Builder) -> tuple[int, ...]:
         more = dict(causality="local", variability="continuous", initial="calculated")
         indicators.append(builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more))
     return tuple(indicators)
+
+
+def _terminals(builder: _Builder) -> dict[str, dict[str, int]]:
+    """Components that have inputs, each with its own inputs and outputs by their names there."""
+    found: dict[str, dict[str, int]] = {}
+    owners = {n.rpartition(".")[0] for n in builder.formulas.inputs if not n.startswith("der(")}
+    for variable in builder.variables:
+        owner, _, member = variable.name.rpartition(".")
+        if owner in owners and owner and variable.causality in ("input", "output"):
+            found.setdefault(owner, {})[member] = variable.reference
+    return found
 
 
 class Dependencies:

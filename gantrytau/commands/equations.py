@@ -66,7 +66,7 @@ def equations(
             if c:
                 text = _c_code(chosen, known, wanted, jacobian, forward, reverse)
             else:
-                text = _written(translate(chosen.model, given=known, find=wanted), format)
+                text = _written(translate(chosen.model, given=known, find=wanted, events=True), format)
         if output is not None:
             write_text(text, output)
         report = {"model": chosen.name, "prototype": chosen.prototype, "format": "c" if c else format}
@@ -95,7 +95,7 @@ def _c_code(
     from gantrytau import translate
     from gantrytau.c_code import c_source
 
-    function = translate(chosen.model).function(list(given), list(find))
+    function = translate(chosen.model, events=True).function(list(given), list(find))
     origin = f" of prototype {chosen.prototype}" if chosen.prototype else ""
     return c_source(
         function,

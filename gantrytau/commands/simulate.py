@@ -77,7 +77,8 @@ def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
     from gantrytau import translate
 
     with busy(f"translating {chosen.name}"):
-        dae = translate(chosen.model, find=[name for name in drawn if name.startswith("der(")])
+        find = [name for name in drawn if name.startswith("der(")]
+        dae = translate(chosen.model, find=find, events=True)
     for name in drawn:
         dae.expand(name)
     return dae
