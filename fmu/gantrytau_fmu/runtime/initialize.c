@@ -35,7 +35,7 @@ static gt_status gt_initial_equations(gt_instance *it) {
     int pivots[GT_ROOM(GT_INITIAL)], iteration, i, j;
     double size = INFINITY;
     gt_start_values(it);
-    if (GT_INITIAL == 0 || it->now.initialized || (!it->now.stale && !it->parameters_stale)) return GT_OK;
+    if (GT_INITIAL == 0 || it->now.initialized || !it->now.stale) return GT_OK;
     for (iteration = 0; iteration < GT_INITIAL_ITERATIONS; iteration++) {
         if (gt_initial_residual(it, residual) != GT_OK) break;
         if (size <= 1e-12) return gt_refresh(it);

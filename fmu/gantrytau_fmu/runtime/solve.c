@@ -162,7 +162,8 @@ static gt_status gt_solve(gt_instance *it, int quiet) {
 /* Make everything belong to the present states, inputs and parameters. */
 static gt_status gt_refresh(gt_instance *it) {
     gt_status status;
-    if (!it->now.stale && !it->parameters_stale) return GT_OK;
+    gt_parameters(it);
+    if (!it->now.stale) return GT_OK; /* a restored z is kept as it is, to the last bit */
     gt_point_at(it, &it->now.time, it->now.x);
     status = gt_solve(it, 0);
     if (status != GT_OK) return status;
