@@ -50,6 +50,7 @@ class _Builder:
     entries: list[Entry] = field(default_factory=list)
     constants: list[float] = field(default_factory=list)
     places_of: dict[str, int] = field(default_factory=dict)
+    rates: list[int] = field(default_factory=list)  # references of the derivatives of the states
 
     def __post_init__(self) -> None:
         flat = self.dae.flat
@@ -72,9 +73,10 @@ class _Builder:
                 more = {**self.limits(declaration, place), **more}
         more.setdefault("unit", unit)
         more.setdefault("description", words)
-        found = fmi_name(name)
-        while found in self.taken:
-            found += "_"
+        found, width = fmi_name(name), int(order > 1)
+        while found in self.taken:  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
+            width += 1
+            found = f"der({base},{order:0{width}})" if order else found + "_"
         self.taken.add(found)
         self.variables.append(Variable(name=found, reference=reference, **more))
         self.entries.append(Entry(kind, index, fixed, found))
@@ -138,7 +140,7 @@ def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
 
 def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
     """What needs an output function: outputs that are no states, and parameters that follow from others."""
-    direct = {*dae.states, *(s.name for s in dae.flat.sampled)}
+    direct = {*dae.states, *(f"der({n})" for n in dae.states), *(s.name for s in dae.flat.sampled)}
     dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
     varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
     return [*dependent, *varying]
@@ -215,14 +217,18 @@ def _states(builder: _Builder, outputs: Sequence[str]) -> None:
             )
         )
     for place, name in enumerate(formulas.states):
-        builder.add(
-            f"der({name})",
-            "DERIVATIVE",
-            place,
-            causality="local",
-            variability="continuous",
-            initial="calculated",
-            derivative=references[place],
+        rate = f"der({name})"
+        own = rate not in builder.places_of  # else a state of that name is shown
+        builder.rates.append(
+            builder.add(
+                rate,
+                "DERIVATIVE",
+                place,
+                causality="output" if own and rate in shown else "local",
+                variability="continuous",
+                initial="calculated",
+                derivative=references[place],
+            )
         )
 
 
@@ -233,7 +239,7 @@ def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
         more = dict(causality=causality, variability="discrete", initial="calculated")
         builder.add(name, "HELD", len(formulas.inputs) + place, **more)
     for name in outputs:
-        if name in builder.places_of and not name.startswith("der("):
+        if name in builder.places_of:
             continue
         expression = dae.expression(name)
         if expression.is_constant():
@@ -314,6 +320,8 @@ def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
     formulas, entry = builder.formulas, builder.entries[builder.places_of[name]]
     if entry.kind == "OUTPUT":
         return depends.outputs[entry.index]
+    if entry.kind == "DERIVATIVE":
+        return depends.rates[entry.index]
     if entry.kind == "HELD":
         return depends.samples[entry.index - len(formulas.inputs)]
     row = np.zeros(depends.outputs.shape[1], dtype=bool)
@@ -332,7 +340,7 @@ def _structure(builder: _Builder, depends: Dependencies, outputs: Sequence[str])
     first = np.array([n not in solved for n in names], dtype=bool)
     shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
     rows = {found[n]: _row(builder, depends, n) for n in shown}
-    rates = {found[f"der({n})"]: depends.rates[k] for k, n in enumerate(formulas.states)}
+    rates = dict(zip(builder.rates, depends.rates, strict=True))
 
     def unknown(reference: int, chosen: np.ndarray) -> Unknown:
         known = tuple(sorted(references[np.flatnonzero(chosen)].tolist()))
