@@ -1,22 +1,25 @@
 /* Small dense linear systems: LU factors with row pivoting of rows scaled by their largest element. */
 
+#define GT_LARGER(a, b) ((a) > (b) ? (a) : (b))
+#define GT_LARGEST_SYSTEM GT_ROOM(GT_LARGER(GT_LARGER(GT_LARGEST_BLOCK, GT_STATES), GT_INITIAL))
 #define GT_SMALLEST_PIVOT 1e-13 /* of a scaled row: below, the rows depend on each other */
 
 /* Factor a (n, n), stored column after column, in place. Returns the sign of its determinant, 0 if it is
  * singular or not finite. scales: 1 / largest element of each row. */
 static int gt_factor(int n, double *a, int *pivots, double *scales) {
-    int sign = 1, i, j, k;
-    for (i = 0; i < n; i++) {
-        double largest = 0;
-        for (j = 0; j < n; j++) largest = fmax(largest, fabs(a[i + j * n]));
-        if (!(largest > 0) || !isfinite(largest)) return 0;
-        scales[i] = 1 / largest;
-    }
+    int filled[GT_LARGEST_SYSTEM], sign = 1, count, i, j, k;
+    for (i = 0; i < n; i++) scales[i] = 0;
     for (j = 0; j < n; j++)
         for (i = 0; i < n; i++) {
-            a[i + j * n] *= scales[i];
-            if (!isfinite(a[i + j * n])) return 0;
+            const double size = fabs(a[i + j * n]);
+            if (size > scales[i] || size != size) scales[i] = size; /* NaN stays */
         }
+    for (i = 0; i < n; i++) {
+        if (!(scales[i] > 0) || !isfinite(scales[i])) return 0;
+        scales[i] = 1 / scales[i];
+    }
+    for (j = 0; j < n; j++)
+        for (i = 0; i < n; i++) a[i + j * n] *= scales[i];
     for (k = 0; k < n; k++) {
         int best = k;
         for (i = k + 1; i < n; i++)
@@ -32,11 +35,16 @@ static int gt_factor(int n, double *a, int *pivots, double *scales) {
             }
         }
         if (a[k + k * n] < 0) sign = -sign;
-        for (i = k + 1; i < n; i++) a[i + k * n] /= a[k + k * n];
+        /* most elements of larger blocks are zero */
+        for (count = 0, i = k + 1; i < n; i++)
+            if (a[i + k * n] != 0) {
+                a[i + k * n] /= a[k + k * n];
+                filled[count++] = i;
+            }
         for (j = k + 1; j < n; j++) {
             const double factor = a[k + j * n];
             if (factor != 0)
-                for (i = k + 1; i < n; i++) a[i + j * n] -= a[i + k * n] * factor;
+                for (i = 0; i < count; i++) a[filled[i] + j * n] -= a[filled[i] + k * n] * factor;
         }
     }
     return sign;
@@ -52,7 +60,8 @@ static void gt_solve_factored(int n, const double *a, const int *pivots, const d
         b[k] = kept;
     }
     for (k = 0; k < n; k++)
-        for (i = k + 1; i < n; i++) b[i] -= a[i + k * n] * b[k];
+        if (b[k] != 0)
+            for (i = k + 1; i < n; i++) b[i] -= a[i + k * n] * b[k];
     for (k = n - 1; k >= 0; k--) {
         b[k] /= a[k + k * n];
         for (i = 0; i < k; i++) b[i] -= a[i + k * n] * b[k];
