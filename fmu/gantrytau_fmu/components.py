@@ -84,8 +84,12 @@ class Component:
         )
 
     def sampled(self, name: str) -> bool:
-        """Whether a variable changes only at events."""
-        return self.scalars[name].variability == "discrete" and self.scalars[name].kind == "real"
+        """Whether a variable is real, changes only at events, and is found by the component itself."""
+        scalar = self.scalars[name]
+        return (scalar.variability, scalar.kind) == ("discrete", "real") and scalar.causality in (
+            "output",
+            "local",
+        )
 
     def _choice(self) -> list[str]:
         elements = [split_element(name) for name in self.scalars]

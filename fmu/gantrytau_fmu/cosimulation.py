@@ -55,14 +55,14 @@ def cosimulate(
     connections: pairs (output, input), scalars or whole vectors; units are converted, dimensions have to match.
     stop, step, begin: s; if the step does not divide the span, the last one is shorter.
     start: name -> value of parameters, inputs and states before initialisation.
-    order: "gauss-seidel": one after the other, those first whose outputs follow their inputs directly or are sampled
-        (see ordering.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps
-        are repeated from saved states until every input used is the output at the end of the step, within
-        `agreement` (relative), in at most `iterations`.
+    order: "gauss-seidel": one after the other, sampled components first, those with direct feedthrough last (see
+        ordering.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps are
+        repeated from saved states until every input used is the output at the end of the step, within `agreement`
+        (relative), in at most `iterations`.
     inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))
-        joined by straight lines; held over each step at its value when the step begins.
+        joined by straight lines; held over each step of the component at its value in the middle.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).
-    steps: component -> its own step, a multiple or a fraction of `step`; its inputs are held in between.
+    steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
         error of the result to first order in the step.
     isolate: components (True: all) that run in processes of their own, where a crash is an error, as is a call that

@@ -65,14 +65,13 @@ class Isolated:
         self,
         time: float,
         size: float,
-        parts: int,
         known: tuple[str, ...],
         values: Sequence[float],
         wanted: tuple[str, ...],
     ) -> list[float]:
         """See `Slave.step`."""
         self.time = time
-        return self._ask("step", time, size, parts, known, list(values), wanted)
+        return self._ask("step", time, size, known, list(values), wanted)
 
     def save(self) -> None:
         """See `Slave.save`."""

@@ -34,7 +34,6 @@ class Part(Protocol):
         self,
         time: float,
         size: float,
-        parts: int,
         known: tuple[str, ...],
         values: Sequence[float],
         wanted: tuple[str, ...],
@@ -175,12 +174,17 @@ class Master:
         return feeds + [_Feed(scalar, drive=drive) for (owner, scalar), drive in drives if owner == name]
 
     def _step(self, name: str, first: int, last: int) -> list[float]:
-        """Step a component over the points from first to last with the inputs of now."""
-        time = self.grid.time(first)
-        values, size = self.inputs(name, time), self.grid.size(first, last)
-        return self.parts[name].step(
-            time, size, self.paces[name].parts, self.known[name], values, self.wanted[name]
-        )
+        """Step a component over the points from first to last; what others give stays, functions of time go on.
+
+        A function of time is held over a step, or a part of one, at its value in the middle: the mean to second order.
+        """
+        begin, parts, found = self.grid.time(first), self.paces[name].parts, []
+        size = self.grid.size(first, last) / parts
+        for part in range(parts):
+            time = begin + part * size
+            values = self.inputs(name, time + size / 2)
+            found = self.parts[name].step(time, size, self.known[name], values, self.wanted[name])
+        return found
 
     def _interval(self, name: str, k: int) -> tuple[int, int] | None:
         """First and last point of the step that a component takes at k, None if it takes none."""

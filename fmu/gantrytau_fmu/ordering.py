@@ -1,10 +1,13 @@
 """In which order the components of a system take their steps.
 
-Within a step a component sees old values of those that come after it, and new ones of those before. A controller
-samples at the beginning of the step what the plant was then, and holds its answer over the step; so the components
-whose outputs follow their inputs directly, or are sampled, come first, then those with outputs from states alone.
-Measured with robot and controller at 4 and 1 ms: 0.10 and 0.026 mm of error; Jacobi has 1.5 and 0.38 mm.
-Within both groups a component comes after those that drive it; a loop is cut where the fewest drives are missing.
+Within a step a component sees old values of those that come after it, and new ones of those before. So:
+1. Sampled components first. A controller samples at the beginning of the step what the plant was then, and holds its
+   answer over the step: with the step of the master dividing its period there is no error of coupling at all.
+2. Then those whose outputs come from states alone, as of a plant.
+3. Last those whose outputs follow their inputs at once, as of a gain: what they give belongs to one point in time.
+Measured with the three-link robot, tool moved by 0.17 m within half a second, against one simulation of both: sampled
+controller 2e-7 mm at 1 ms (0.18 mm if it comes last), continuous PD controller 0.05 mm (0.30 mm if it comes first).
+In each group a component comes after those that drive it; a loop is cut where the fewest drives are missing.
 """
 
 from collections.abc import Collection, Sequence
@@ -17,20 +20,22 @@ def sequence_of(system: System, given: Sequence[str] | None = None) -> tuple[str
     """Names of components in the order of their steps; given: that order from outside, checked."""
     if given is not None:
         return _checked(tuple(given), system.components)
-    direct = [name for name in system.components if _direct(system, name)]
-    others = [name for name in system.components if name not in direct]
-    return (*_downstream(direct, system.links), *_downstream(others, system.links))
+    ranks = {name: _rank(system, name) for name in system.components}
+    groups = [[name for name, rank in ranks.items() if rank == wanted] for wanted in range(3)]
+    return tuple(name for group in groups for name in _downstream(group, system.links))
 
 
-def _direct(system: System, name: str) -> bool:
-    """Whether an output that drives others follows a connected input at once, or is sampled from it."""
+def _rank(system: System, name: str) -> int:
+    """0 for a sampled component, 1 for one with outputs from states alone, 2 for one with direct feedthrough.
+
+    Sampled is what has real variables that change at events only; an output of it may still be called continuous.
+    """
     component = system.components[name]
     known = {link.target[1] for link in system.links if link.target[0] == name}
     wanted = {link.source[1] for link in system.links if link.source[0] == name}
-    return bool(known) and any(
-        component.sampled(output) or known & component.feedthrough.get(output, frozenset())
-        for output in wanted
-    )
+    if known and any(component.sampled(scalar) for scalar in component.scalars):
+        return 0
+    return 2 if any(known & component.feedthrough.get(output, frozenset()) for output in wanted) else 1
 
 
 def _downstream(names: Sequence[str], links: Sequence[Link]) -> list[str]:

@@ -11,6 +11,7 @@ from gantrytau_models.inverse_dynamics import InverseDynamics
 from gantrytau_models.kinematics import ForwardKinematics, InverseKinematics
 from gantrytau_models.pendulum import Pendulum
 from gantrytau_models.plant import MeasuredGantryTau, MotorDrivenGantryTau
+from gantrytau_models.references import CircularReference
 from gantrytau_models.six_link import SixLinkGantryTau
 from gantrytau_models.stewart import StewartPlatform
 from gantrytau_models.tracking import ControlledRobot, TrackingController
@@ -18,6 +19,7 @@ from gantrytau_models.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, W
 
 __all__ = [
     "CascadedController",
+    "CircularReference",
     "ComputedTorqueController",
     "ControlledRobot",
     "DeltaRobot",

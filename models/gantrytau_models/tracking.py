@@ -20,7 +20,8 @@ class TrackingController(Model):
     control: a class such as `PidController`, or one with gains of yours, as `PidController(prototypes.L1,
     bandwidth=25.0)`; friction: that of the robot inside the feedforward; start: where the tool is at the start, (3,)
     in m. Further keywords modify members. What
-    is tracked is the reference behind its filters, `feedforward.r`. Raises ModelError for what is no controller.
+    is tracked is the reference behind its filters, `feedforward.r`. A reference of its own is the equation of a
+    subclass that declares `r_ref` anew, as Real. Raises ModelError for what is no controller.
     """
 
     r_ref = Input(3, unit="m", description="reference of the tool position, resolved in the world")

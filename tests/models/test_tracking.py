@@ -4,9 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import simulate
+from gantrytau import Real, simulate
 from gantrytau_models import (
     CascadedController,
+    CircularReference,
     ComputedTorqueController,
     ControlledRobot,
     Feedforward,
@@ -100,3 +101,34 @@ def test_the_same_robot_inside_and_outside():
     loop = simulate(model, stop=0.5, inputs=REFERENCE)
     alone = simulate(Feedforward(prototypes.GT_A, start=CENTRE), stop=0.5, inputs=REFERENCE)
     np.testing.assert_allclose(loop["controller.feedforward.f"], alone["f"], rtol=1e-5, atol=1e-3)
+
+
+class Circling(ControlledRobot):
+    """The controlled robot with the circle as its own reference."""
+
+    r_ref = Real(3, unit="m", description="reference of the tool position")
+    circle = CircularReference(start=CENTRE, radius=RADIUS, period=ROUND)
+
+    def equations(self):
+        yield from super().equations()
+        yield self.r_ref == self.circle.r
+
+
+def test_a_reference_inside_is_the_reference_from_outside():
+    inside = simulate(Circling(prototypes.GT_A, start=CENTRE), stop=0.5)
+    outside = simulate(ControlledRobot(prototypes.GT_A, start=CENTRE), stop=0.5, inputs=REFERENCE)
+    np.testing.assert_allclose(inside["r_ref"], outside["r_ref"], rtol=1e-13)
+    np.testing.assert_allclose(inside["r"], outside["r"], atol=1e-8)  # m; tolerances of two runs
+
+
+def test_the_circular_reference_is_a_circle_in_its_plane():
+    ahead, aside, start = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0]), np.array([1.0, 2.0, 3.0])
+    circle = CircularReference(start=start, ahead=ahead, aside=aside, radius=0.25, period=0.5, rise=0.1)
+    r = simulate(circle, stop=2.0)["r"]
+    from_centre = r - (start + 0.25 * aside)
+    np.testing.assert_allclose(np.linalg.norm(from_centre, axis=1), 0.25, rtol=1e-12)
+    np.testing.assert_allclose(from_centre @ np.cross(ahead, aside), 0.0, atol=1e-13)
+    np.testing.assert_allclose(r[0], start, atol=1e-15)
+    speed = np.linalg.norm(np.diff(r, axis=0), axis=1) / (2.0 / 500)
+    assert speed[0] < 0.05 * speed[-1]
+    assert speed[-1] == pytest.approx(2 * np.pi * 0.25 / 0.5, rel=1e-3)  # chords, 1/24 of the angle squared
