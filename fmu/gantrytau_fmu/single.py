@@ -85,6 +85,11 @@ def _integrated(component: Component, system: System, grid: Grid, tolerance: flo
         raise ModelError(f"{component.file}: arrays of FMI 3 are not supported with Model Exchange")
     times = np.array([grid.time(k) for k in range(grid.count + 1)])
     drives = {name: drive for (_, name), drive in system.drives.items()}
+    for name in component.of("input"):  # FMPy warns of inputs that are left to their start values
+        scalar = component.scalars[name]
+        if scalar.kind == "real" and name not in drives:
+            value = float(system.start[NAME].get(name, scalar.start or 0.0))
+            drives[name] = lambda t, value=value: value
     table = np.zeros(times.size, dtype=[("time", float), *((name, float) for name in drives)])
     table["time"] = times
     for name, drive in drives.items():
