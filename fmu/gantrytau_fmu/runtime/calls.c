@@ -141,14 +141,12 @@ static gt_status gt_call_get(gt_component *c, const char *function, const unsign
 
 static gt_status gt_call_set(gt_component *c, const char *function, const unsigned *references, size_t count,
                              const double *values, size_t value_count) {
-    gt_status worst = GT_OK;
     size_t i;
     if (!gt_values(c, function, references, count, values, value_count)) return GT_ERROR;
-    for (i = 0; i < count && worst < GT_DISCARD; i++) {
-        gt_status status = gt_is_real(c, function, references[i]) ? gt_set(c->it, references[i], values[i]) : GT_ERROR;
-        if (status > worst) worst = status;
-    }
-    return worst;
+    for (i = 0; i < count; i++) /* all or none */
+        if (!gt_is_real(c, function, references[i]) || !gt_place(c->it, references[i], values[i])) return GT_ERROR;
+    for (i = 0; i < count; i++) gt_set(c->it, references[i], values[i]);
+    return GT_OK;
 }
 
 static gt_status gt_call_get_integer(gt_component *c, const char *function, const unsigned *references, size_t count,

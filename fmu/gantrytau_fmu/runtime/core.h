@@ -46,8 +46,10 @@ static gt_status gt_say(gt_instance *it, gt_status status, gt_category category,
 
 /* ---- values.c: by value reference; references are places in gt_variables, of which there are GT_VARIABLES.
  * gt_get evaluates what the value depends on. gt_set refuses what may not be set in the present mode, NaN and
- * infinite values, with a log line that names the variable. gt_mode_* are the integer variables (GT_MODE). */
+ * infinite values, with a log line that names the variable; gt_place is where it would set, NULL where it would refuse.
+ * gt_mode_* are the integer variables (GT_MODE). */
 static gt_status gt_get(gt_instance *it, unsigned reference, double *value);
+static double *gt_place(gt_instance *it, unsigned reference, double value);
 static gt_status gt_set(gt_instance *it, unsigned reference, double value);
 static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value);
 

@@ -82,36 +82,43 @@ static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value)
     return GT_OK;
 }
 
-static gt_status gt_refuse(gt_instance *it, unsigned reference, const char *why) {
-    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s cannot be set: %s", GT_NAME, gt_name(reference), why);
+static void gt_refuse(gt_instance *it, unsigned reference, const char *why) {
+    gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s cannot be set: %s", GT_NAME, gt_name(reference), why);
+}
+
+/* Where a value goes that may be set now; NULL with a log line if it may not. */
+static double *gt_place(gt_instance *it, unsigned reference, double value) {
+    const int early = it->mode == GT_INSTANTIATED || it->mode == GT_INITIALIZATION;
+    const gt_variable *variable;
+    const char *why = "it is calculated";
+    if (gt_known_reference(it, reference) != GT_OK) return NULL;
+    variable = gt_variables + reference;
+    switch ((gt_kind)variable->kind) {
+    case GT_PARAMETER: why = variable->fixed && !early ? "it is a fixed parameter; set it before initialisation ends" : NULL; break;
+    case GT_INPUT: why = NULL; break;
+    case GT_STATE:
+        why = !early && it->cosimulation
+                  ? "it is a state, which can be set before initialisation ends; to go back, restore a saved state"
+                  : early && variable->fixed ? "it follows from initial equations; set what they depend on" : NULL;
+        break;
+    case GT_CONSTANT: why = "it shapes the equations and is constant; keep it as a parameter by naming it in given= of export_fmu"; break;
+    case GT_TIME: why = "it is the independent variable"; break;
+    default: break;
+    }
+    if (!isfinite(value)) why = "found NaN or an infinite value, expected a finite number";
+    if (why) {
+        gt_refuse(it, reference, why);
+        return NULL;
+    }
+    return (variable->kind == GT_PARAMETER ? it->now.p : variable->kind == GT_INPUT ? it->now.u : it->now.x) + variable->index;
 }
 
 static gt_status gt_set(gt_instance *it, unsigned reference, double value) {
-    const int early = it->mode == GT_INSTANTIATED || it->mode == GT_INITIALIZATION;
+    double *place = gt_place(it, reference, value);
     const gt_variable *variable;
-    gt_status status = gt_known_reference(it, reference);
-    double *place;
-    if (status != GT_OK) return status;
+    if (!place) return GT_ERROR;
     variable = gt_variables + reference;
-    if (!isfinite(value)) return gt_refuse(it, reference, "found NaN or an infinite value, expected a finite number");
-    switch ((gt_kind)variable->kind) {
-    case GT_PARAMETER:
-        if (variable->fixed && !early) return gt_refuse(it, reference, "it is a fixed parameter; set it before initialisation ends");
-        place = it->now.p + variable->index;
-        break;
-    case GT_INPUT: place = it->now.u + variable->index; break;
-    case GT_STATE:
-        if (!early && it->cosimulation)
-            return gt_refuse(it, reference, "it is a state, which can be set before initialisation ends; to go back, restore a saved state");
-        if (early && variable->fixed) return gt_refuse(it, reference, "it follows from initial equations; set what they depend on");
-        if (early) it->now.given[variable->index] = 1;
-        place = it->now.x + variable->index;
-        break;
-    case GT_CONSTANT: return gt_refuse(it, reference, "it shapes the equations and is constant; keep it as a parameter by naming it in "
-                                       "given= of export_fmu");
-    case GT_TIME: return gt_refuse(it, reference, "it is the independent variable");
-    default: return gt_refuse(it, reference, "it is calculated");
-    }
+    if (variable->kind == GT_STATE && (it->mode == GT_INSTANTIATED || it->mode == GT_INITIALIZATION)) it->now.given[variable->index] = 1;
     if (*place == value) return GT_OK;
     *place = value;
     if (variable->kind == GT_PARAMETER) {
