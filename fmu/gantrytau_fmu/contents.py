@@ -245,7 +245,10 @@ def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
         if expression.is_constant():
             _constant(builder, name, float(expression), "output")
             continue
-        more = dict(causality="output", variability="continuous", initial="calculated")
+        leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
+        held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
+        variability = "discrete" if held else "continuous"
+        more = dict(causality="output", variability=variability, initial="calculated")
         builder.add(name, "OUTPUT", builder.places[name], attributes="limits", **more)
         builder.places_of[name] = len(builder.variables) - 1
 
