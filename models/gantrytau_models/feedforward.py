@@ -26,7 +26,7 @@ class Feedforward(Model):
     later by 1.53 / bandwidth. They start at rest at the first value of `r_ref`, which has to be within reach.
     """
 
-    bandwidth = Parameter(60.0, unit="rad/s", min=0.0, description="of the filters, at -3 dB")
+    bandwidth = Parameter(40.0, unit="rad/s", min=0.0, description="of the filters, at -3 dB")
     r_ref = Input(3, unit="m", description="reference of the tool position, resolved in the world")
     r = Output(3, unit="m", description="filtered reference of the tool position")
     q = Output(3, unit="m", description="positions of the carts that belong to r")
