@@ -193,22 +193,17 @@ static gt_status gt_call_derivative(gt_component *c, const char *function, int a
 
 static gt_status gt_call_setup(gt_component *c, const char *function, int tolerance_defined, double tolerance,
                                double start, int stop_defined, double stop) {
-    gt_status status;
     if ((tolerance_defined && !gt_finite(c, function, "the tolerance", tolerance)) ||
         !gt_finite(c, function, "the start time", start) ||
         (stop_defined && !gt_finite(c, function, "the stop time", stop)))
         return GT_ERROR;
-    if (tolerance_defined && tolerance <= 0)
-        return GT_REFUSE(c, "%s: the tolerance is %g, expected more than 0", function, tolerance);
+    if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
+        return GT_REFUSE(c, "%s: the tolerance is %g, expected more than 0 and less than 1", function, tolerance);
     if (stop_defined && stop < start)
         return GT_REFUSE(c, "%s: the stop time is %g s, expected no less than the start time, %g s", function, stop,
                          start);
-    status = gt_setup(c->it, tolerance_defined, tolerance, start, stop_defined, stop);
-    if (status >= GT_DISCARD) return status;
-    c->ready = 1;
-    c->stop_defined = stop_defined;
-    c->stop = stop;
-    return status;
+    gt_setup(c->it, tolerance_defined, tolerance, start, stop_defined, stop);
+    return GT_OK;
 }
 
 static gt_status gt_call_exit_initialization(gt_component *c) {
@@ -221,12 +216,12 @@ static gt_status gt_call_update(gt_component *c, gt_event_info *info) {
     gt_status status;
     memset(info, 0, sizeof *info);
     status = gt_fail(c, gt_update(c->it, info));
-    c->unsettled = status < GT_DISCARD && info->again;
+    c->it->now.unsettled = status < GT_DISCARD && info->again;
     return status;
 }
 
 static gt_status gt_call_continue(gt_component *c, const char *function) {
-    if (c->unsettled)
+    if (c->it->now.unsettled)
         return GT_REFUSE(c, "%s: the event iteration has not ended, expected further calls of fmi%s first", function,
                          c->version == 2 ? "2NewDiscreteStates" : "3UpdateDiscreteStates");
     c->it->mode = GT_CONTINUOUS;
@@ -263,15 +258,15 @@ static gt_status gt_call_step(gt_component *c, const char *function, double poin
     if (!gt_finite(c, function, "the communication point", point) ||
         !gt_finite(c, function, "the step size", size))
         return GT_ERROR;
-    if (size <= 0 || point + size <= point)
+    if (size <= 0 || point + size <= point || !isfinite(point + size))
         return GT_REFUSE(c, "%s: the step size is %g s at %g s, expected one that advances the time", function, size,
                          point);
     if (fabs(point - c->it->time) > slack)
         return GT_REFUSE(c, "%s: the communication point is %.12g s, expected %.12g s, where the last step ended",
                          function, point, c->it->time);
-    if (c->stop_defined && point + size > c->stop + slack + 1e-5 * size)
+    if (c->it->now.stop_defined && point + size > c->it->now.stop + slack + 1e-5 * size)
         return GT_REFUSE(c, "%s: the step ends at %.12g s, expected no later than the stop time, %.12g s", function,
-                         point + size, c->stop);
+                         point + size, c->it->now.stop);
     c->stepped = gt_fail(c, gt_step(c->it, point, size, reached));
     return c->stepped;
 }

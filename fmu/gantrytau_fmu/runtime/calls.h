@@ -35,10 +35,6 @@ typedef struct {
     fmi2CallbackLogger logger;              /* version 2, or NULL */
     fmi3LogMessageCallback log_message;     /* version 3, or NULL */
     unsigned char told[GT_LOG_CATEGORIES];  /* which categories are wanted */
-    int ready;                              /* the experiment is set up */
-    int unsettled;                          /* the last event iteration asked for another one */
-    int stop_defined;
-    double stop;
     gt_status stepped;                      /* how the last step went */
 } gt_component;
 

@@ -95,7 +95,6 @@ static void gt_call_reset(gt_component *c) {
     gt_reset(c->it);
     c->it->fmi = c->version;
     c->it->mode = GT_INSTANTIATED;
-    c->ready = c->unsettled = c->stop_defined = 0;
     c->stepped = GT_OK;
     gt_apply_logging(c);
 }
@@ -120,9 +119,8 @@ static gt_status gt_call_forget(gt_component *c, const char *function, void **st
 static gt_status gt_call_restore(gt_component *c, const char *function, const void *state) {
     gt_status status;
     if (!gt_has(c, function, "the state", state, 1)) return GT_ERROR;
-    status = gt_restore(c->it, state, gt_state_size(c->it));
+    status = gt_restore(c->it, function, state, gt_state_size(c->it));
     gt_apply_logging(c);
-    if (status < GT_DISCARD) c->unsettled = 0;
     return status;
 }
 

@@ -54,7 +54,7 @@ static gt_status gt_set(gt_instance *it, unsigned reference, double value);
 static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value);
 
 /* ---- initialize.c */
-static gt_status gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
+static void gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 static gt_status gt_initialize(gt_instance *it); /* exit initialization mode: initial equations, first events */
 
 /* ---- Model Exchange. x, rates (GT_STATES), indicators (GT_INDICATORS). */
@@ -79,10 +79,10 @@ static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, 
                             const double *d_unknown, double *d_known);
 
 /* ---- state.c: a saved state is one block of memory that starts with a null pointer; it carries a checksum.
- * gt_restore refuses another model's and a damaged one. Sizes in bytes; the block is the same, serialised or not. */
+ * gt_restore refuses another model's, a damaged one, and one of the other kind of instance; `function` is for the log. Sizes in bytes; the block is the same, serialised or not. */
 static size_t gt_state_size(const gt_instance *it);
 static void gt_save(const gt_instance *it, void *block);
-static gt_status gt_restore(gt_instance *it, const void *block, size_t size);
+static gt_status gt_restore(gt_instance *it, const char *function, const void *block, size_t size);
 
 #if defined __GNUC__
 #define GT_SELDOM __attribute__((cold)) /* compiled for size */

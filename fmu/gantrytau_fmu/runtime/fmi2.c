@@ -55,7 +55,7 @@ GT_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean to
 
 GT_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
     GT_ENTER_2(GT_BOTH, GT_INSTANTIATED);
-    if (!c->ready)
+    if (!c->it->now.ready)
         return (fmi2Status)GT_REFUSE(c, "%s: called before fmi2SetupExperiment, expected after it", __func__);
     c->it->mode = GT_INITIALIZATION;
     return fmi2OK;

@@ -2,18 +2,14 @@
 
 #define GT_INITIAL_ITERATIONS 30
 
-static gt_status gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
-    if (!isfinite(start) || (stop_defined && !(isfinite(stop) && stop > start)))
-        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found start = %g s and stop = %g s, expected finite numbers, start before stop",
-                      GT_NAME, start, stop);
-    if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
-        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found the tolerance %g, expected a number between 0 and 1", GT_NAME, tolerance);
+/* The arguments have been checked. */
+static void gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     it->now.start = it->now.time = it->time = start;
     it->now.stop = stop;
     it->now.stop_defined = stop_defined;
     if (tolerance_defined) it->now.tolerance = fmax(tolerance, 1e-12);
+    it->now.ready = 1;
     it->now.stale = it->outputs_stale = 1;
-    return GT_OK;
 }
 
 /* Residuals of the initial equations at the present states; GT_DISCARD where there are none. */

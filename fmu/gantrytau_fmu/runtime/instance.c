@@ -25,7 +25,9 @@ typedef struct {
     double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
     double sides[GT_ROOM(GT_BLOCKS)]; /* signs of the determinants of the blocks there */
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
-    int stop_defined, mode, initialized, stale;
+    int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
+    int ready;     /* the experiment is set up */
+    int unsettled; /* the last event iteration asked for another one */
 } gt_state;
 
 struct gt_instance {
@@ -36,7 +38,7 @@ struct gt_instance {
     void *who;
     gt_sink sink;
     int logging[GT_LOG_CATEGORIES];
-    int parameters_stale, outputs_stale, starts_stale, factors_stale;
+    int parameters_stale, outputs_stale, factors_stale;
     const double *a[GT_ARRAYS + 1];
     double c[GT_ROOM(GT_HOISTED)], w[GT_ROOM(GT_WORK)], y[GT_ROOM(GT_OUTPUTS)];
     double matrices[GT_ROOM(GT_MATRICES)]; /* factored Jacobians of the blocks, one after another */
@@ -88,7 +90,6 @@ static void gt_reset(gt_instance *it) {
     it->mode = GT_INSTANTIATED;
     it->time = 0;
     it->parameters_stale = it->outputs_stale = it->factors_stale = 1;
-    it->starts_stale = 0;
     it->dt = 0;
     it->a[2] = it->now.u;
     it->a[3] = it->now.z;

@@ -28,24 +28,30 @@ static void gt_save(const gt_instance *it, void *block) {
     saved->size = sizeof *saved;
     memcpy(&saved->state, &it->now, sizeof it->now);
     saved->state.mode = it->mode;
+    saved->state.cosimulation = it->cosimulation;
     saved->check = gt_hash(&saved->state, sizeof saved->state);
 }
 
-static gt_status gt_restore(gt_instance *it, const void *block, size_t size) {
+static gt_status gt_restore(gt_instance *it, const char *function, const void *block, size_t size) {
     gt_saved saved;
     if (size != sizeof saved)
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found a saved state of %lu bytes, expected %lu; it belongs to another model or is "
-                      "incomplete", GT_NAME, (unsigned long)size, (unsigned long)sizeof saved);
+                      "incomplete", function, (unsigned long)size, (unsigned long)sizeof saved);
     memcpy(&saved, block, sizeof saved);
     if (saved.nothing || saved.size != sizeof saved || saved.model != gt_hash(GT_TOKEN, sizeof GT_TOKEN))
-        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the saved state belongs to another model or is damaged; nothing was changed", GT_NAME);
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the saved state belongs to another model or is damaged; nothing was changed", function);
     if (saved.check != gt_hash(&saved.state, sizeof saved.state))
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the checksum of the saved state does not fit, it is damaged; nothing was changed",
-                      GT_NAME);
+                      function);
+    if (saved.state.cosimulation != it->cosimulation)
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the saved state is that of an instance for %s, expected one for %s; nothing was "
+                      "changed", function, it->cosimulation ? "Model Exchange" : "Co-Simulation",
+                      it->cosimulation ? "Co-Simulation" : "Model Exchange");
     memcpy(&it->now, &saved.state, sizeof it->now);
     it->mode = (gt_mode)it->now.mode;
     it->time = it->now.time;
-    it->parameters_stale = it->outputs_stale = it->factors_stale = 1;
-    it->starts_stale = 0;
+    it->outputs_stale = 1;
+    it->parameters_stale = 1;
+    gt_parameters(it); /* not left for later: a refresh would solve again, and end a rounding error away */
     return GT_OK;
 }

@@ -13,8 +13,8 @@ static gt_status gt_known_reference(gt_instance *it, unsigned reference) {
 static void gt_start_values(gt_instance *it) {
     double x[GT_ROOM(GT_STATES)];
     int i;
-    if (!it->starts_stale) return;
-    it->starts_stale = 0;
+    if (!it->now.starts_stale) return;
+    it->now.starts_stale = 0;
     gt_parameters(it);
     gt_starts(it->a, x, it->w);
     for (i = 0; i < GT_STATES; i++)
@@ -123,7 +123,7 @@ static gt_status gt_set(gt_instance *it, unsigned reference, double value) {
     *place = value;
     if (variable->kind == GT_PARAMETER) {
         it->parameters_stale = 1;
-        if (variable->fixed) it->starts_stale = 1;
+        if (variable->fixed) it->now.starts_stale = 1;
     }
     it->now.stale = it->outputs_stale = 1;
     return GT_OK;
