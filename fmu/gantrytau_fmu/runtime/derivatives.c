@@ -91,6 +91,12 @@ static gt_status gt_check_unknowns(gt_instance *it, const unsigned *unknown, siz
     return GT_OK;
 }
 
+static gt_status gt_has_slope(gt_instance *it, const char *of, unsigned reference, double slope) {
+    if (isfinite(slope)) return GT_OK;
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the derivative %s %s is not a finite number at time = %.9g s; the model has none there (a "
+                  "pose out of reach or singular), or the seed is too large", GT_NAME, of, gt_name(reference), it->now.time);
+}
+
 static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
                                 const double *d_known, double *d_unknown) {
     int parameters = 0;
@@ -107,7 +113,10 @@ static gt_status gt_directional(gt_instance *it, const unsigned *unknown, size_t
         parameters |= gt_variables[known[i]].kind == GT_PARAMETER;
     }
     gt_along(it, parameters);
-    for (i = 0; i < n; i++) d_unknown[i] = gt_slope(it, unknown[i]);
+    for (i = 0; i < n; i++) {
+        d_unknown[i] = gt_slope(it, unknown[i]);
+        if (gt_has_slope(it, "of", unknown[i], d_unknown[i]) != GT_OK) return GT_ERROR;
+    }
     return GT_OK;
 }
 
@@ -129,6 +138,7 @@ static gt_status gt_adjoint(gt_instance *it, const unsigned *unknown, size_t n, 
         gt_along(it, gt_variables[known[j]].kind == GT_PARAMETER);
         for (i = 0; i < n; i++) sum += d_unknown[i] * gt_slope(it, unknown[i]);
         d_known[j] = sum;
+        if (gt_has_slope(it, "by", known[j], sum) != GT_OK) return GT_ERROR;
     }
     return GT_OK;
 }
