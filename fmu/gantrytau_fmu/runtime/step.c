@@ -1,6 +1,6 @@
 /* Co-Simulation: from one communication point to the next, with control of the error and events on the way. */
 
-#define GT_MOST_STEPS 100000
+#define GT_MOST_STEPS 20000
 #define GT_MOST_EVENTS 1000
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
@@ -46,7 +46,7 @@ static int gt_crossed(gt_instance *it) {
 static gt_status gt_locate(gt_instance *it, double t, double h, const double *x) {
     double before = 0, behind = h, error[GT_ROOM(GT_STATES)];
     gt_status status = GT_OK;
-    while (status == GT_OK && behind - before > GT_LOCATED + 4e-16 * fabs(t)) {
+    while (status == GT_OK && behind - before > GT_LOCATED + 4e-16 * (fabs(t) + behind)) {
         const double middle = before + 0.5 * (behind - before);
         if (gt_try_step(it, t, middle, x, it->next, error) != GT_OK) return GT_DISCARD;
         status = gt_move(it, t + middle, it->next);
@@ -98,7 +98,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
         if (!(norm <= 1)) {
             h = size * (norm < INFINITY ? fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER)) : 0.25);
             rejected = 1;
-            if (h < shortest) return gt_too_short(it, h);
+            if (!(h > shortest)) return gt_too_short(it, h);
             continue;
         }
         status = gt_move(it, last ? end : t + size, it->next);
