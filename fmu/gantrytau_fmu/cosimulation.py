@@ -57,8 +57,8 @@ def cosimulate(
     start: name -> value of parameters, inputs and states before initialisation.
     order: "gauss-seidel": one after the other, sampled components first, those with direct feedthrough last (see
         ordering.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps are
-        repeated from saved states until every input used is the output at the end of the step, within `agreement`
-        (relative), in at most `iterations`.
+        repeated from saved states until every input is the mean of the output that drives it at both ends of the step,
+        within `agreement` (relative), in at most `iterations`; of second order, where no component samples.
     inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))
         joined by straight lines; held over each step of the component at its value in the middle.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).

@@ -2,7 +2,8 @@
 
 Communication points are begin + k step. u_i are the inputs of component i that others drive, y_i its outputs.
 Gauss-Seidel: one after the other; u_i comes from those before at k+1 and from those behind at k.
-Jacobi: all from k. Iteration: u_i = y(k+1) of all, found by repeating the step from saved states.
+Jacobi: all from k. Iteration: u_i is the mean of y(k) and y(k+1), found by repeating the step from saved states, which
+is of second order; sampled components step once, before the others, as a sample is taken when a step begins.
 A component with a step of m points takes it in Jacobi when its interval begins, its outputs being seen when it ends.
 In Gauss-Seidel one that stands before all faster ones steps when its interval begins (a sampled controller holds its
 answer until it ends), the others when the faster ones have come to its end.
@@ -15,6 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError
+from gantrytau_fmu.ordering import is_sampled
 from gantrytau_fmu.system import Drive, System
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
@@ -118,18 +120,14 @@ class Master:
         self.wanted = {name: tuple(dict.fromkeys([*wanted[name], *sources[name]])) for name in parts}
         self.feeds = {name: self._feeds(name) for name in parts}
         self.known = {name: tuple(feed.name for feed in self.feeds[name]) for name in parts}
+        self.sampled = [name for name in self.sequence if is_sampled(system, name)]
         self.values: dict[str, list[float]] = {}
         self.pending: dict[int, list[tuple[str, list[float]]]] = {}
         self.largest: dict[str, np.ndarray] = {}
 
     def inputs(self, name: str, time: float) -> list[float]:
         """What drives the inputs `known` of a component now."""
-        return [
-            feed.drive(time)
-            if feed.drive
-            else self.values[feed.owner][feed.place] * feed.factor + feed.offset
-            for feed in self.feeds[name]
-        ]
+        return self._driven(name) + self._external(name, time)
 
     def read(self) -> None:
         """Read all components."""
@@ -216,34 +214,61 @@ class Master:
             self.check(name, self.grid.time(k + 1))
 
     def _iterate(self, k: int, agreement: float, iterations: int) -> None:
-        """Repeat the step until the inputs that were used are those that the outputs at its end give."""
-        time, worst = self.grid.time(k), ""
-        for part in self.parts.values():
-            part.save()
+        """Repeat the step until the outputs at its end are those that the inputs used were made of."""
+        worst = ""
+        for name in self.sampled:  # a sample is taken as the step begins, from what there is then
+            self.values[name] = self._step(name, k, k + 1)
+            self.check(name, self.grid.time(k + 1))
+        repeated = [name for name in self.sequence if name not in self.sampled]
+        before = {name: self._driven(name) for name in repeated}
+        for name in repeated:
+            self.parts[name].save()
         for sweep in range(iterations):
             used = {}
-            for name in self.sequence:
+            for name in repeated:
                 if sweep:
                     self.parts[name].restore()
-                used[name] = self.inputs(name, time)
-                self.values[name] = self._step(name, k, k + 1)
-                self.check(name, self.grid.time(k + 1))
-            worst = self._disagreement(used, time, agreement)
+                used[name] = self._driven(name)
+                self._implicit_step(name, k, before[name])
+            worst = self._disagreement(used, agreement)
             if not worst:
                 return
         raise SolveError(
-            f"co-simulation: after {iterations} iterations at t = {time:.6g} s the inputs do not agree with the outputs: "
-            f"{worst}; take a shorter step, or allow more iterations",
-            time=time,
+            f"co-simulation: after {iterations} iterations at t = {self.grid.time(k):.6g} s the inputs do not agree with the "
+            f"outputs: {worst}; take a shorter step, or allow more iterations",
+            time=self.grid.time(k),
         )
 
-    def _disagreement(self, used: Mapping[str, list[float]], time: float, agreement: float) -> str:
+    def _implicit_step(self, name: str, k: int, before: Sequence[float]) -> None:
+        """A step with the mean of the inputs at both its ends, and the outputs for those at its end."""
+        part, begin, size = self.parts[name], self.grid.time(k), self.grid.size(k, k + 1)
+        after = self._driven(name)
+        mean = [(a + b) / 2 for a, b in zip(before, after, strict=True)]
+        pieces = self.paces[name].parts
+        for piece in range(pieces):
+            time = begin + piece * size / pieces
+            values = mean + self._external(name, time + size / pieces / 2)
+            part.step(time, size / pieces, self.known[name], values, self.wanted[name])
+        part.set(self.known[name], after + self._external(name, self.grid.time(k + 1)))
+        self.values[name] = part.get(self.wanted[name])
+        self.check(name, self.grid.time(k + 1))
+
+    def _driven(self, name: str) -> list[float]:
+        """The inputs of a component that outputs of others drive; they come first in `known`."""
+        feeds = [feed for feed in self.feeds[name] if not feed.drive]
+        return [self.values[feed.owner][feed.place] * feed.factor + feed.offset for feed in feeds]
+
+    def _external(self, name: str, time: float) -> list[float]:
+        """The inputs of a component that functions of time drive."""
+        return [feed.drive(time) for feed in self.feeds[name] if feed.drive]
+
+    def _disagreement(self, used: Mapping[str, list[float]], agreement: float) -> str:
         """The input that agrees least, with both values, or nothing if all agree."""
         found: list[tuple[float, str]] = []
         for name, before in used.items():
             if not before:
                 continue
-            old, new = np.array(before), np.array(self.inputs(name, time))
+            old, new = np.array(before), np.array(self._driven(name))
             scale = np.maximum(self.largest.get(name, SMALL), np.maximum(abs(old), abs(new)))
             self.largest[name] = scale
             place = int(np.argmax(abs(new - old) / scale))

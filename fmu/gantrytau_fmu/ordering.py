@@ -25,16 +25,20 @@ def sequence_of(system: System, given: Sequence[str] | None = None) -> tuple[str
     return tuple(name for group in groups for name in _downstream(group, system.links))
 
 
-def _rank(system: System, name: str) -> int:
-    """0 for a sampled component, 1 for one with outputs from states alone, 2 for one with direct feedthrough.
+def is_sampled(system: System, name: str) -> bool:
+    """Whether a component is driven and has real variables that change at events only."""
+    component = system.components[name]
+    driven = any(link.target[0] == name for link in system.links)
+    return driven and any(component.sampled(scalar) for scalar in component.scalars)
 
-    Sampled is what has real variables that change at events only; an output of it may still be called continuous.
-    """
+
+def _rank(system: System, name: str) -> int:
+    """0 for a sampled component, 1 for one with outputs from states alone, 2 for one with direct feedthrough."""
+    if is_sampled(system, name):
+        return 0
     component = system.components[name]
     known = {link.target[1] for link in system.links if link.target[0] == name}
     wanted = {link.source[1] for link in system.links if link.source[0] == name}
-    if known and any(component.sampled(scalar) for scalar in component.scalars):
-        return 0
     return 2 if any(known & component.feedthrough.get(output, frozenset()) for output in wanted) else 1
 
 
