@@ -1,7 +1,7 @@
 """From an inert model to one whose members are symbols: modifications applied, paths given, symbols made."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -17,10 +17,14 @@ ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "prefer", "value", "uni
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """A modification and the instance in which its formulas are to be read."""
+    """A modification and the instance in which its formulas are to be read.
+
+    more: modifications of a component that replaces another, from further out.
+    """
 
     value: Any
     scope: Any
+    more: Mapping[Any, Any] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -122,7 +126,7 @@ class _Builder:
                     f"{place}: found {wanted!r} as modification, expected a component that replaces "
                     f"{type(member).__name__}, or dict(...) to modify it"
                 )
-            member, modification = wanted, {}
+            member, modification = wanted, modification.more
         if isinstance(member, Outer):
             self.outers.append((instance, name, member, [*around, instance]))
         elif isinstance(member, Array):
@@ -137,7 +141,7 @@ class _Builder:
                 one = modification.get(index, {})
                 here, own = scope, one
                 if isinstance(one, Leaf):
-                    element, here, own = one.value, one.scope, {}
+                    element, here, own = one.value, one.scope, one.more
                 built.append(
                     self.build(element, f"{place}[{index}]", _merge(common, own), here, [*around, instance])
                 )
@@ -261,6 +265,11 @@ def _wrap_value(value: Any, scope: Any) -> Any:
     return Leaf(value, scope)
 
 
+def _replaces(modification: Any) -> bool:
+    """Whether a modification is a component in place of another."""
+    return isinstance(modification, Leaf) and isinstance(modification.value, Declared)
+
+
 def _merge(below: Mapping[Any, Any], above: Mapping[Any, Any]) -> dict[Any, Any]:
     merged = dict(below)
     numbered = [key for key in below if isinstance(key, int)]
@@ -271,6 +280,8 @@ def _merge(below: Mapping[Any, Any], above: Mapping[Any, Any]) -> dict[Any, Any]
                     merged[index] = _merge(merged[index], {key: value})
         elif isinstance(merged.get(key), dict) and isinstance(value, dict):
             merged[key] = _merge(merged[key], value)
+        elif _replaces(merged.get(key)) and isinstance(value, dict):
+            merged[key] = replace(merged[key], more=_merge(merged[key].more, value))
         else:
             merged[key] = value
     return merged

@@ -3,9 +3,10 @@
 An instance remembers its modifications and nothing else; `gantrytau.instantiation` makes symbols of it.
 """
 
+import copy
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeGuard
+from typing import Any, Self, TypeGuard
 
 from gantrytau.declarations import Array, Bounds, Quantity, Start
 from gantrytau.errors import ModelError, did_you_mean
@@ -61,6 +62,14 @@ class Declared(_Part):
     def modifications(self) -> Mapping[str, Any]:
         """What was modified, by name."""
         return self._modifications
+
+    def modified(self, modifications: Mapping[str, Any]) -> Self:
+        """The same with further modifications; ModelError for a name that is not declared."""
+        for name in modifications:
+            check_member(type(self), name, type(self).__name__)
+        found = copy.copy(self)
+        found._modifications = merge(dict(self._modifications), modifications)
+        return found
 
     @classmethod
     @functools.cache
@@ -141,6 +150,8 @@ def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
         old, value = _attributes(merged.get(name)), _attributes(value)
         if isinstance(old, Mapping) and isinstance(value, Mapping):
             value = merge(dict(old), value)
+        elif isinstance(old, Declared) and isinstance(value, Mapping):
+            value = old.modified(value)
         elif _elementwise(old) and _elementwise(value) and len(old) == len(value):
             value = [
                 merge(dict(a), b) if isinstance(a, Mapping) and isinstance(b, Mapping) else b

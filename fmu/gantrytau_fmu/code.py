@@ -90,7 +90,13 @@ def model_code(
         GT_TOLERANCE=number_text(tolerance),
         **sizes,
     )
-    lines = ["/* Generated from a model; changes are lost. */", "#include <math.h>", '#include "core.h"', '#include "functions.c"', ""]
+    lines = [
+        "/* Generated from a model; changes are lost. */",
+        "#include <math.h>",
+        '#include "core.h"',
+        '#include "functions.c"',
+        "",
+    ]
     lines += [f"#define {key} {value}" for key, value in defines.items()]
     lines += ["", *(piece.code for piece in pieces)]
     lines += _tables(formulas, variables, constants, nominals)
@@ -126,10 +132,16 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[CFunction]:
 
 
 def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:
-    return ca.jtimes(expression, point, way) if expression.numel() and point.numel() else ca.SX.zeros(*expression.shape)
+    return (
+        ca.jtimes(expression, point, way)
+        if expression.numel() and point.numel()
+        else ca.SX.zeros(*expression.shape)
+    )
 
 
-def _sizes(formulas: Formulas, outputs: int, variables: Sequence[Entry], pieces: Sequence[CFunction], hoisted: int) -> dict:
+def _sizes(
+    formulas: Formulas, outputs: int, variables: Sequence[Entry], pieces: Sequence[CFunction], hoisted: int
+) -> dict:
     counts = [len(b.names) for b in formulas.blocks]
     return dict(
         GT_VARIABLES=len(variables),

@@ -110,7 +110,15 @@ def flags(platform: Platform, identifier: str, *, zig: bool) -> list[str]:
         return [*result, "-s", *([] if zig else ["-static"])]
     if platform.system == "darwin":
         return [*result, "-fPIC", "-Wl,-x", "-Wl,-dead_strip", f"-Wl,-install_name,@rpath/{identifier}.dylib"]
-    return [*result, "-fPIC", "-s", "-Wl,-Bsymbolic", "-Wl,--gc-sections", "-Wl,--no-undefined", "-Wl,-z,norelro"]
+    return [
+        *result,
+        "-fPIC",
+        "-s",
+        "-Wl,-Bsymbolic",
+        "-Wl,--gc-sections",
+        "-Wl,--no-undefined",
+        "-Wl,-z,norelro",
+    ]
 
 
 def _compiler_of_this_machine() -> list[str] | None:

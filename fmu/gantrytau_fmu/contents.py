@@ -58,7 +58,9 @@ class _Builder:
         self.declared = {n: (v, k) for v in everything for k, n in enumerate(v.elements)}
         self.taken: set[str] = set()
 
-    def add(self, name: str, kind: str, index: int, *, fixed: bool = False, attributes: str = "", **more) -> int:
+    def add(
+        self, name: str, kind: str, index: int, *, fixed: bool = False, attributes: str = "", **more
+    ) -> int:
         """A variable of the model by its name there; attributes: those that its declaration gives."""
         base, order = split_derivative(name)
         declaration, place = self.declared.get(base, (None, 0))
@@ -68,13 +70,19 @@ class _Builder:
             unit, words = declaration.unit or "", declaration.description
             if order:
                 unit = _per_second(unit, order)
-                words = f"{'second ' if order == 2 else ''}time derivative of {base}" if order < 3 else f"time derivative {order} of {base}"
+                words = (
+                    f"{'second ' if order == 2 else ''}time derivative of {base}"
+                    if order < 3
+                    else f"time derivative {order} of {base}"
+                )
             elif attributes:
                 more = {**self.limits(declaration, place), **more}
         more.setdefault("unit", unit)
         more.setdefault("description", words)
         found, width = fmi_name(name), int(order > 1)
-        while found in self.taken:  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
+        while (
+            found in self.taken
+        ):  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
             width += 1
             found = f"der({base},{order:0{width}})" if order else found + "_"
         self.taken.add(found)
@@ -116,7 +124,9 @@ def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
     formulas = formulas_of(dae, _evaluated(dae, outputs))
     graph, places, wanted = output_places(formulas)
     builder = _Builder(dae, formulas, places, frozenset(outputs))
-    builder.add("time", "TIME", 0, causality="independent", variability="continuous", unit="s", description="time")
+    builder.add(
+        "time", "TIME", 0, causality="independent", variability="continuous", unit="s", description="time"
+    )
     _parameters(builder)
     _inputs(builder)
     _states(builder, outputs)
@@ -264,7 +274,9 @@ def _frictions(builder: _Builder) -> tuple[int, ...]:
         builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
         more = dict(causality="local", variability="continuous", initial="calculated")
-        indicators.append(builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more))
+        indicators.append(
+            builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        )
     return tuple(indicators)
 
 
@@ -313,7 +325,8 @@ class Dependencies:
         places = [list(arrays).index(n) for n in "xupz"]
         patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
         x, u, p, through = [
-            found.reshape(expression.numel(), arrays[n].numel()) for n, found in zip("xupz", patterns, strict=True)
+            found.reshape(expression.numel(), arrays[n].numel())
+            for n, found in zip("xupz", patterns, strict=True)
         ]
         return np.hstack([x, u, p]) | through @ z
 
@@ -333,7 +346,9 @@ def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
     return row
 
 
-def _structure(builder: _Builder, depends: Dependencies, outputs: Sequence[str]) -> dict[str, tuple[Unknown, ...]]:
+def _structure(
+    builder: _Builder, depends: Dependencies, outputs: Sequence[str]
+) -> dict[str, tuple[Unknown, ...]]:
     """Outputs, derivatives and initial unknowns, each with what it depends on."""
     formulas, found = builder.formulas, builder.places_of
     count = len(formulas.states) + len(formulas.inputs)

@@ -23,9 +23,7 @@ from gantrytau_fmu.terminals import icon, icon_svg, terminals_and_icons
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
-RUNTIME = (
-    "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
-)
+RUNTIME = "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
 INCLUDED = ("functions.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
 LARGE = 100_000  # operations from which on the compiler is asked for less; its second level gains nothing
@@ -112,9 +110,13 @@ def _check(fmi: str, solver: str, tolerance: float) -> None:
     if fmi not in ("2.0", "3.0"):
         raise ModelError(f"export_fmu: found fmi={fmi!r}, expected '3.0' or '2.0'")
     if solver not in SOLVERS:
-        raise ModelError(f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models")
+        raise ModelError(
+            f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models"
+        )
     if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 1e-12 <= tolerance < 1:
-        raise ModelError(f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1")
+        raise ModelError(
+            f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1"
+        )
 
 
 def _translated(
@@ -146,7 +148,9 @@ def _outputs(dae: Dae, find: Sequence[str]) -> tuple[str, ...]:
 
 def _token(contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
     """The same for the same model: a hash of its formulas and variables, in the form of a UUID."""
-    text = f"{contents.variables}{fmi}{solver}{tolerance}{contents.formulas.rates}{contents.formulas.residuals}"
+    text = (
+        f"{contents.variables}{fmi}{solver}{tolerance}{contents.formulas.rates}{contents.formulas.residuals}"
+    )
     digits = hashlib.sha256(text.encode()).hexdigest()
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 
@@ -185,7 +189,9 @@ def _compiled(
     try:
         return compile_libraries(texts, platforms=targets, identifier=identifier, optimisation=level)
     except NoCompiler as error:
-        warnings.warn(f"{error}. The FMU holds C sources only; tools that compile them can use it", stacklevel=3)
+        warnings.warn(
+            f"{error}. The FMU holds C sources only; tools that compile them can use it", stacklevel=3
+        )
         return {}
 
 
@@ -210,4 +216,3 @@ def _members(
     folder = "terminalsAndIcons/"
     members |= {f"{folder}terminalsAndIcons.xml": terminals_and_icons(interface), f"{folder}icon.png": icon()}
     return {**members, f"{folder}icon.svg": icon_svg()}
-

@@ -59,7 +59,9 @@ class Graph:
         if name in ("ASSIGN", "LIFT"):
             return inside[0]
         if name not in OPERATIONS:
-            raise ModelError(f"export_fmu: the model uses the operation {name}, expected those of gantrytau; reword it")
+            raise ModelError(
+                f"export_fmu: the model uses the operation {name}, expected those of gantrytau; reword it"
+            )
         if name in ("DIV", "INV"):
             one = self.node("CONST", 1.0)
             return self._product(one if name == "INV" else inside[0], self._reciprocal(inside[-1]))
@@ -164,7 +166,9 @@ class Graph:
         key = self.nodes[number]
         return () if key[0] in ("INPUT", "CONST") else key[1:]
 
-    def reached(self, roots: Iterable[int], stop: Sequence[bool] | None = None, known: Iterable[int] = ()) -> list[int]:
+    def reached(
+        self, roots: Iterable[int], stop: Sequence[bool] | None = None, known: Iterable[int] = ()
+    ) -> list[int]:
         """All nodes that the roots need, in an order of computation; nothing is looked for behind `known`."""
         seen, waiting, known = set(), list(roots), set(known)
         while waiting:

@@ -144,10 +144,17 @@ def _input_derivatives(dae: Dae, everything: ca.SX) -> dict[str, ca.SX]:
         base, order = split_derivative(leaf.name())
         if order and base in known:
             found[leaf.name()] = leaf
-    return dict(sorted(found.items(), key=lambda item: (split_derivative(item[0])[1], dae.known.index(split_derivative(item[0])[0]))))
+    return dict(
+        sorted(
+            found.items(),
+            key=lambda item: (split_derivative(item[0])[1], dae.known.index(split_derivative(item[0])[0])),
+        )
+    )
 
 
-def _blocks(system: System, frictions: Sequence, forces: list[ca.SX], rows: list[ca.SX]) -> tuple[ImplicitBlock, ...]:
+def _blocks(
+    system: System, frictions: Sequence, forces: list[ca.SX], rows: list[ca.SX]
+) -> tuple[ImplicitBlock, ...]:
     """The implicit blocks; those that depend on forces of frictions become one with the equations of these."""
     found: list[ImplicitBlock] = []
     place = 0

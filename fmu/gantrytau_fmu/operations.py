@@ -5,7 +5,9 @@ INFIX |= {"AND": "&&", "OR": "||"}
 CALLS = dict(EXP="exp", LOG="log", POW="pow", CONSTPOW="pow", SQRT="sqrt", SIN="sin", COS="cos", TAN="tan")
 CALLS |= dict(ASIN="asin", ACOS="acos", ATAN="atan", SINH="sinh", COSH="cosh", TANH="gt_tanh", ASINH="asinh")
 CALLS |= dict(ACOSH="acosh", ATANH="atanh", ATAN2="atan2", FLOOR="floor", CEIL="ceil", FMOD="fmod", ERF="erf")
-CALLS |= dict(FABS="fabs", COPYSIGN="copysign", FMIN="fmin", FMAX="fmax", HYPOT="hypot", LOG1P="log1p", EXPM1="expm1")
+CALLS |= dict(
+    FABS="fabs", COPYSIGN="copysign", FMIN="fmin", FMAX="fmax", HYPOT="hypot", LOG1P="log1p", EXPM1="expm1"
+)
 CALLS |= dict(REMAINDER="remainder")
 OTHERS = {
     "NEG": "-{0}",
@@ -18,7 +20,10 @@ OTHERS = {
 }
 OPERATIONS = {name: f"{{0}} {sign} {{1}}" for name, sign in INFIX.items()}
 OPERATIONS |= {name: f"{call}({{0}})" for name, call in CALLS.items()}
-OPERATIONS |= {n: f"{CALLS[n]}({{0}}, {{1}})" for n in "POW CONSTPOW ATAN2 FMOD COPYSIGN FMIN FMAX HYPOT REMAINDER".split()}
+OPERATIONS |= {
+    n: f"{CALLS[n]}({{0}}, {{1}})"
+    for n in "POW CONSTPOW ATAN2 FMOD COPYSIGN FMIN FMAX HYPOT REMAINDER".split()
+}
 OPERATIONS |= OTHERS
 
 

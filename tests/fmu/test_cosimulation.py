@@ -83,7 +83,9 @@ def error(files, step, **policy):
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize(("order", "power"), [("gauss-seidel", 1), ("jacobi", 1), ("iterate", 2)])
-def test_coupled_masses_converge_to_the_analytic_solution_with_the_order_of_the_coupling(build, fmi, order, power):
+def test_coupled_masses_converge_to_the_analytic_solution_with_the_order_of_the_coupling(
+    build, fmi, order, power
+):
     files = {"a": first(build, fmi), "b": second(build, fmi)}
     errors = [error(files, step, order=order) for step in (4e-3, 2e-3, 1e-3)]
     assert errors[-1] < 2e-3

@@ -396,3 +396,38 @@ def test_instances_share_nothing():
     assert values(first, "main.voltage") == [1.0]
     assert values(second, "main.voltage") == [3.0]
     assert values(first, "main.voltage") == [1.0]
+
+
+class Gain(Model):
+    k = Parameter(1.0, unit="1", description="gain")
+    limit = Parameter(9.0, unit="1", description="limit")
+
+
+class OtherGain(Gain):
+    k = Parameter(2.0, unit="1", description="gain")
+
+
+class Stage(Model):
+    gain = Gain()
+
+
+class Station(Model):
+    amplifier = Stage(gain=OtherGain(limit=5.0))
+    amplifiers = Array(Stage, 2, gain=OtherGain())
+
+
+class Doubled(Stage):
+    def __init__(self, **modifications):
+        super().__init__(dict(gain=OtherGain(limit=5.0)), **modifications)
+
+
+def test_a_modification_of_a_component_that_replaces_another_is_laid_over_it():
+    station = Station(amplifier=dict(gain=dict(k=3.0)), amplifiers=[dict(gain=dict(limit=7.0)), dict()])
+    table = translate(station).table.values
+    assert (table["amplifier.gain.k"], table["amplifier.gain.limit"]) == (3.0, 5.0)
+    assert [table[f"amplifiers[{k}].gain.limit"] for k in range(2)] == [7.0, 9.0]
+    assert [table[f"amplifiers[{k}].gain.k"] for k in range(2)] == [2.0, 2.0]
+    table = translate(Doubled(gain=dict(k=3.0))).table.values
+    assert (table["gain.k"], table["gain.limit"]) == (3.0, 5.0)
+    with pytest.raises(ModelError, match="OtherGain has no 'kk'; did you mean 'k'"):
+        Doubled(gain=dict(kk=3.0))
