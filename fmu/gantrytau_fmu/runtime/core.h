@@ -60,7 +60,7 @@ static gt_status gt_initialize(gt_instance *it); /* exit initialization mode: in
 /* ---- Model Exchange. x, rates (GT_STATES), indicators (GT_INDICATORS). */
 static gt_status gt_set_time(gt_instance *it, double time);
 static gt_status gt_set_states(gt_instance *it, const double *x);
-static void gt_get_states(const gt_instance *it, double *x);
+static gt_status gt_get_states(gt_instance *it, double *x);
 static gt_status gt_get_rates(gt_instance *it, double *rates);
 static gt_status gt_get_indicators(gt_instance *it, double *indicators);
 static void gt_get_nominals(const gt_instance *it, double *nominals);

@@ -41,7 +41,7 @@ static void gt_clear_direction(gt_instance *it) {
 }
 
 static gt_status gt_ready(gt_instance *it) {
-    gt_status status = it->mode == GT_INITIALIZATION ? gt_initial_equations(it) : GT_OK;
+    gt_status status = gt_present(it);
     if (status == GT_OK) status = gt_refresh(it);
     if (status == GT_OK && it->factors_stale) {
         status = gt_factors(it);

@@ -23,9 +23,15 @@ static double gt_indicator(const gt_instance *it, const double *laws, int i) {
 
 static gt_status gt_get_indicators(gt_instance *it, double *indicators) {
     double laws[GT_ROOM(2 * GT_MODES)];
-    const gt_status status = gt_laws(it, laws);
+    gt_status status = gt_present(it);
     int i;
-    for (i = 0; i < GT_MODES && status == GT_OK; i++) indicators[i] = gt_indicator(it, laws, i);
+    if (status == GT_OK) status = gt_laws(it, laws);
+    for (i = 0; i < GT_MODES && status == GT_OK; i++) {
+        indicators[i] = gt_indicator(it, laws, i);
+        if (!isfinite(indicators[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: speed or limit of %s is not a finite number at time = %.9g s", GT_NAME,
+                          gt_z_names[gt_friction_unknowns[i]], it->now.time);
+    }
     return status;
 }
 
@@ -175,8 +181,10 @@ static gt_status gt_set_states(gt_instance *it, const double *x) {
     return GT_OK;
 }
 
-static void gt_get_states(const gt_instance *it, double *x) {
+static gt_status gt_get_states(gt_instance *it, double *x) {
+    const gt_status status = gt_present(it);
     memcpy(x, it->now.x, GT_STATES * sizeof(double));
+    return status;
 }
 
 static void gt_get_nominals(const gt_instance *it, double *nominals) {

@@ -216,8 +216,7 @@ GT_EXPORT fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real in
 GT_EXPORT fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t count) {
     GT_ENTER_2(GT_EXCHANGE, GT_READABLE);
     if (!gt_vector(c, __func__, "states", x, count, GT_STATES)) return fmi2Error;
-    gt_get_states(c->it, x);
-    return fmi2OK;
+    return (fmi2Status)gt_get_states(c->it, x);
 }
 
 GT_EXPORT fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component component, fmi2Real nominals[], size_t count) {

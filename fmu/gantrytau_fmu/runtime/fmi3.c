@@ -334,8 +334,7 @@ GT_EXPORT fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 i
 GT_EXPORT fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 x[], size_t count) {
     GT_ENTER_3(GT_EXCHANGE, GT_READABLE);
     if (!gt_vector(c, __func__, "states", x, count, GT_STATES)) return fmi3Error;
-    gt_get_states(c->it, x);
-    return fmi3OK;
+    return (fmi3Status)gt_get_states(c->it, x);
 }
 
 GT_EXPORT fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t count) {

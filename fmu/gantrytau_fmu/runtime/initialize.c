@@ -29,9 +29,11 @@ static gt_status gt_initial_equations(gt_instance *it) {
     double residual[GT_ROOM(GT_INITIAL)], moved[GT_ROOM(GT_INITIAL)], matrix[GT_ROOM(GT_INITIAL * GT_INITIAL)];
     double scales[GT_ROOM(GT_INITIAL)];
     int pivots[GT_ROOM(GT_INITIAL)], iteration, i, j;
-    double size = INFINITY;
+    double guess[GT_ROOM(GT_STATES)], size = INFINITY;
+    gt_status status;
     gt_start_values(it);
     if (GT_INITIAL == 0 || it->now.initialized || !it->now.stale) return GT_OK;
+    memcpy(guess, it->now.x, sizeof guess);
     for (iteration = 0; iteration < GT_INITIAL_ITERATIONS; iteration++) {
         if (gt_initial_residual(it, residual) != GT_OK) break;
         if (size <= 1e-12) return gt_refresh(it);
@@ -39,11 +41,12 @@ static gt_status gt_initial_equations(gt_instance *it) {
             double *x = it->now.x + gt_initial_states[j];
             const double kept = *x, step = 1e-6 * (1 + fabs(kept));
             *x = kept + step;
-            if (gt_initial_residual(it, moved) != GT_OK) return GT_ERROR;
-            for (i = 0; i < GT_INITIAL; i++) matrix[i + j * GT_INITIAL] = (moved[i] - residual[i]) / step;
+            status = gt_initial_residual(it, moved);
             *x = kept;
+            if (status != GT_OK) break;
+            for (i = 0; i < GT_INITIAL; i++) matrix[i + j * GT_INITIAL] = (moved[i] - residual[i]) / step;
         }
-        if (!gt_factor(GT_INITIAL, matrix, pivots, scales)) break;
+        if (j < GT_INITIAL || !gt_factor(GT_INITIAL, matrix, pivots, scales)) break;
         gt_solve_factored(GT_INITIAL, matrix, pivots, scales, residual);
         for (size = 0, j = 0; j < GT_INITIAL; j++) {
             double *x = it->now.x + gt_initial_states[j];
@@ -51,6 +54,7 @@ static gt_status gt_initial_equations(gt_instance *it) {
             size = fmax(size, fabs(residual[j]) / (1 + fabs(*x)));
         }
     }
+    memcpy(it->now.x, guess, sizeof guess);
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the initial equations for %s%s could not be solved at time = %.9g s; check start values, "
                   "inputs and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
 }

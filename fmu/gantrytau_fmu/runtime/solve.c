@@ -80,6 +80,11 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
         if (direct && iteration == 0 && !block->linear && size > GT_FAR) return GT_DISCARD;
         if (block->linear || size <= GT_SMALL) {
             for (i = 0; i < block->count; i++) z[i] += step[i];
+            if (block->linear && block->count > 1) { /* one refinement: elimination alone costs three digits of many unknowns */
+                block->residual(it->a, residual, it->w);
+                gt_direction(it, block, residual, step);
+                for (i = 0; i < block->count; i++) z[i] += step[i];
+            }
             it->now.sides[number] = side;
             return GT_OK;
         }
@@ -166,7 +171,10 @@ static gt_status gt_refresh(gt_instance *it) {
     if (!it->now.stale) return GT_OK; /* a restored z is kept as it is, to the last bit */
     gt_point_at(it, &it->now.time, it->now.x);
     status = gt_solve(it, 0);
-    if (status != GT_OK) return status;
+    if (status != GT_OK) {
+        memcpy(it->now.z, it->now.solved_z, sizeof it->now.z); /* so that the next try does not begin astray */
+        return status;
+    }
     it->now.stale = 0;
     it->outputs_stale = it->factors_stale = 1;
     if (GT_BLOCKS == 0) return GT_OK;
@@ -187,9 +195,15 @@ static gt_status gt_all_finite(gt_instance *it, int n, const double *values, con
     return GT_OK;
 }
 
+/* Before initialisation ends, the states are those that start values and initial equations give. */
+static gt_status gt_present(gt_instance *it) {
+    return it->mode == GT_INITIALIZATION ? gt_initial_equations(it) : GT_OK;
+}
+
 /* Rates of the states at the present point. */
 static gt_status gt_get_rates(gt_instance *it, double *rates) {
-    gt_status status = gt_refresh(it);
+    gt_status status = gt_present(it);
+    if (status == GT_OK) status = gt_refresh(it);
     if (status != GT_OK) return status;
     gt_rates(it->a, rates, it->w);
     return gt_all_finite(it, GT_STATES, rates, gt_x_names, "the derivative of ");

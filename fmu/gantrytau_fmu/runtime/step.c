@@ -148,6 +148,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
             status = gt_integrate(it, next < end - GT_ON_TIME * size ? next : end, &count, &event);
         if (!event && it->now.time >= end) break;
     }
+    if (status != GT_OK && !it->now.stale) memcpy(it->now.z, it->now.solved_z, sizeof it->now.z); /* not those of a trial */
     it->time = it->now.time;
     *reached = it->now.time;
     if (status == GT_DISCARD) status = gt_too_short(it, it->now.size);

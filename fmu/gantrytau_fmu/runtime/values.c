@@ -41,18 +41,17 @@ static gt_status gt_get(gt_instance *it, unsigned reference, double *value) {
     case GT_PARAMETER: *value = it->now.p[variable->index]; break;
     case GT_INPUT: case GT_HELD: *value = it->now.u[variable->index]; break;
     case GT_STATE:
-        if (variable->fixed && it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
+        if (variable->fixed) status = gt_present(it);
         *value = it->now.x[variable->index];
         break;
     case GT_DERIVATIVE: {
         double rates[GT_ROOM(GT_STATES)];
-        if (it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
-        if (status == GT_OK) status = gt_get_rates(it, rates);
+        status = gt_get_rates(it, rates);
         if (status == GT_OK) *value = rates[variable->index];
         break;
     }
     case GT_OUTPUT:
-        if (it->mode == GT_INITIALIZATION) status = gt_initial_equations(it);
+        status = gt_present(it);
         if (status == GT_OK) status = gt_get_outputs(it);
         if (status == GT_OK) {
             *value = it->y[variable->index];
