@@ -63,6 +63,13 @@ class Declared(_Part):
         """What was modified, by name."""
         return self._modifications
 
+    @classmethod
+    def open(cls, **modifications: Any) -> Self:
+        """A component for a class body whose `__init__` gives it its values: its own `__init__` is left out."""
+        found = cls.__new__(cls)
+        Declared.__init__(found, **modifications)
+        return found
+
     def modified(self, modifications: Mapping[str, Any]) -> Self:
         """The same with further modifications; ModelError for a name that is not declared."""
         for name in modifications:

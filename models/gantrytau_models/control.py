@@ -11,7 +11,6 @@ from typing import Any
 import casadi as ca
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, if_else, sampled
-from gantrytau_models import prototypes
 from gantrytau_models.feedforward import Feedforward
 from gantrytau_models.gantry_tau import tool_ahead_of_carts
 from gantrytau_models.inverse_dynamics import InverseDynamics
@@ -162,7 +161,7 @@ class ComputedTorqueController(Controller):
     a_ref = Input(3, unit="m/s2", start=0.0, description="reference of the accelerations of the carts")
     a = Real(3, unit="m/s2", description="wanted accelerations of the carts")
     seen = SeenWithAccelerations()
-    dynamics = InverseDynamics(prototypes.GT_A)
+    dynamics = InverseDynamics.open()
 
     def _defaults(self, prototype: Prototype, tool: Sequence[float]) -> dict[str, Any]:
         defaults = super()._defaults(prototype, tool)

@@ -11,7 +11,6 @@ from typing import Any
 from gantrytau import Array, Input, Model, Output, Parameter, der
 from gantrytau.mechanics.filters import LowPass
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models import prototypes
 from gantrytau_models.gantry_tau import GantryTau, tool_ahead_of_carts
 from gantrytau_models.prototypes import Prototype
 
@@ -34,7 +33,7 @@ class Feedforward(Model):
     a = Output(3, unit="m/s2", description="accelerations of the carts")
     f = Output(3, unit="N", description="actuator forces of the carts, before friction")
     filters = Array(LowPass, 3, order=3, bandwidth=bandwidth, u=dict(unit="m"), y=dict(unit="m"))
-    robot = GantryTau(prototypes.GT_A)
+    robot = GantryTau.open()
 
     def __init__(
         self,

@@ -5,7 +5,6 @@ from typing import Any
 
 from gantrytau import Fixed, Input, Model, ModelError, Output, Parameter, connect
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models import prototypes
 from gantrytau_models.control import CascadedController, Controller
 from gantrytau_models.feedforward import Feedforward
 from gantrytau_models.gantry_tau import tool_ahead_of_carts
@@ -30,8 +29,8 @@ class TrackingController(Model):
     f = Output(3, unit="N", description="forces of the actuators, held between samples")
     tau = Output(3, unit="N.m", description="torques of the motors that give f")
     feedforward_share = Parameter(1.0, unit="1", description="part of the feedforward that is used, 0 to 1")
-    feedforward = Feedforward(prototypes.GT_A)
-    control = CascadedController(prototypes.GT_A)
+    feedforward = Feedforward.open()
+    control = CascadedController.open()
 
     def __init__(
         self,
@@ -76,8 +75,8 @@ class ControlledRobot(Model):
     r_ref = Input(3, unit="m", description="reference of the tool position, resolved in the world")
     r = Output(3, unit="m", description="position of the tool")
     error = Output(3, unit="m", description="filtered reference less position of the tool")
-    robot = MeasuredGantryTau(prototypes.GT_A)
-    controller = TrackingController(prototypes.GT_A)
+    robot = MeasuredGantryTau.open()
+    controller = TrackingController.open()
 
     def __init__(
         self,
