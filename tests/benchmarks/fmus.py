@@ -121,7 +121,7 @@ def _beside_python(folder: Path) -> Iterator[Row]:
 
 
 class Running:
-    """An FMI 2.0 slave in FMPy, in its initial state after each call of `start`."""
+    """An FMI 2.0 slave in FMPy, in its initial state after `initialize`."""
 
     def __init__(self, path: Path, inputs: list[str], outputs: list[str]):
         import fmpy
