@@ -75,32 +75,48 @@ def write_archive(
     Raises ModelError if the path cannot be written or has another suffix, or if it exists and `overwrite` is
     false.
     """
-    path = Path(path)
+    path = check_target(path, suffix, overwrite=overwrite)
     try:
-        _check_target(path, suffix, overwrite)
         with replacing(path) as partial:
             _write(partial, members, first)
-    except (OSError, ValueError) as error:  # ValueError: no file can have this name
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ModelError(
-            f"{path}: cannot be written ({reason}), expected a folder that may be written to and has room; "
-            "name another one, or change its permissions"
-        ) from error
+    except OSError as error:
+        raise _unwritable(path, error) from error
     return path
 
 
-def _check_target(path: Path, suffix: str, overwrite: bool) -> None:
-    """Refuse a path before anything is written."""
-    if path.is_dir():
-        raise ModelError(
-            f"{path}: found a folder, expected a file that ends in '{suffix}'; name a file in it"
-        )
-    if path.suffix.lower() != suffix:
-        raise ModelError(
-            f"{path}: found the suffix '{path.suffix}', expected '{suffix}'; call it {path.stem}{suffix}"
-        )
-    if path.exists() and not overwrite:
-        raise ModelError(f"{path}: found a file, expected none; choose another name, or overwrite=True")
+def check_target(path: str | os.PathLike[str], suffix: str = ".fmu", *, overwrite: bool = True) -> Path:
+    """The path of an archive, refused before any work is done for it; ModelError as in `write_archive`."""
+    path = Path(path)
+    try:
+        if path.is_dir():
+            raise ModelError(
+                f"{path}: found a folder, expected a file that ends in '{suffix}'; name a file in it"
+            )
+        if path.suffix.lower() != suffix:
+            raise ModelError(
+                f"{path}: found the suffix '{path.suffix}', expected '{suffix}'; call it {path.stem}{suffix}"
+            )
+        if path.exists() and not overwrite:
+            raise ModelError(f"{path}: found a file, expected none; choose another name, or overwrite=True")
+        with replacing(path) as partial:
+            partial.touch()
+            raise _Writable
+    except _Writable:  # and nothing is left of the trial
+        return path
+    except (OSError, ValueError) as error:  # ValueError: no file can have this name
+        raise _unwritable(path, error) from error
+
+
+class _Writable(Exception):
+    """A trial went well."""
+
+
+def _unwritable(path: Path, error: Exception) -> ModelError:
+    reason = getattr(error, "strerror", None) or str(error)
+    return ModelError(
+        f"{path}: cannot be written ({reason}), expected a folder that may be written to and has room; "
+        "name another one, or change its permissions"
+    )
 
 
 def _write(path: Path, members: Mapping[str, bytes], first: str) -> None:

@@ -2,12 +2,9 @@
 
 import sys
 
-from tests.benchmarks import answers, engine, growth, mechanisms, motion
+from tests.benchmarks import answers, engine, fmus, growth, mechanisms, motion
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
-    sys.exit(
-        print_table(
-            "Benchmarks", (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows(), answers.rows())
-        )
-    )
+    parts = (engine.rows(), mechanisms.rows(), motion.rows(), growth.rows(), answers.rows(), fmus.rows())
+    sys.exit(print_table("Benchmarks", parts))

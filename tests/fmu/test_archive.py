@@ -8,7 +8,14 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_fmu import archive
-from gantrytau_fmu.archive import binary_members, binary_path, universal, write_archive, write_fmu
+from gantrytau_fmu.archive import (
+    binary_members,
+    binary_path,
+    check_target,
+    universal,
+    write_archive,
+    write_fmu,
+)
 from gantrytau_fmu.platforms import PLATFORMS
 
 MEMBERS = {
@@ -144,6 +151,20 @@ def test_an_interruption_leaves_what_was_there(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         write_fmu(tmp_path / "robot.fmu", MEMBERS)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_path_can_be_checked_before_the_work(tmp_path):
+    path = tmp_path / "robot.fmu"
+    assert check_target(str(path)) == path
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("old")
+    assert check_target(path) == path
+    assert path.read_text() == "old"
+    assert check_target(tmp_path / "cell.ssp", ".ssp").suffix == ".ssp"
+    with pytest.raises(ModelError, match="expected none"):
+        check_target(path, overwrite=False)
+    with pytest.raises(ModelError, match="does not exist; create it"):
+        check_target(tmp_path / "nowhere" / "robot.fmu")
 
 
 def failing(error: BaseException):
