@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,9 +60,9 @@ class _Builder:
         self.taken: set[str] = set()
 
     def add(
-        self, name: str, kind: str, index: int, *, fixed: bool = False, attributes: str = "", **more
+        self, name: str, kind: str, index: int, *, fixed: bool = False, limited: bool = False, **more: Any
     ) -> int:
-        """A variable of the model by its name there; attributes: those that its declaration gives."""
+        """A variable of the model by its name there; limited: with the limits that its declaration gives."""
         base, order = split_derivative(name)
         declaration, place = self.declared.get(base, (None, 0))
         reference = len(self.variables)
@@ -75,7 +76,7 @@ class _Builder:
                     if order < 3
                     else f"time derivative {order} of {base}"
                 )
-            elif attributes:
+            elif limited:
                 more = {**self.limits(declaration, place), **more}
         more.setdefault("unit", unit)
         more.setdefault("description", words)
@@ -171,7 +172,7 @@ def _parameters(builder: _Builder) -> None:
             "PARAMETER",
             place,
             fixed=fixed,
-            attributes="limits",
+            limited=True,
             causality="parameter",
             variability="fixed" if fixed else "tunable",
             initial="exact",
@@ -182,12 +183,12 @@ def _parameters(builder: _Builder) -> None:
             _constant(builder, name, table.values[name], "local")
             continue
         tunable = any(s.name() not in early for s in ca.symvar(expression))
-        more = dict(variability="tunable" if tunable else "fixed", initial="calculated")
+        more: dict[str, Any] = dict(variability="tunable" if tunable else "fixed", initial="calculated")
         builder.add(name, "OUTPUT", builder.places[name], causality="local", **more)
 
 
 def _constant(builder: _Builder, name: str, value: float, causality: str) -> None:
-    more = dict(causality=causality, variability="constant", initial="exact", start=value)
+    more: dict[str, Any] = dict(causality=causality, variability="constant", initial="exact", start=value)
     builder.add(name, "CONSTANT", len(builder.constants), **more)
     builder.constants.append(value)
 
@@ -199,7 +200,7 @@ def _inputs(builder: _Builder) -> None:
             name,
             "INPUT",
             place,
-            attributes="limits",
+            limited=True,
             causality="input",
             variability="continuous",
             start=float(start[place]),
@@ -212,14 +213,14 @@ def _states(builder: _Builder, outputs: Sequence[str]) -> None:
     references = []
     for place, name in enumerate(formulas.states):
         solved = place in formulas.initial_states
-        more = {} if solved else dict(start=float(starts[place]))
+        more: dict[str, Any] = {} if solved else dict(start=float(starts[place]))
         references.append(
             builder.add(
                 name,
                 "STATE",
                 place,
                 fixed=solved,
-                attributes="limits",
+                limited=True,
                 causality="output" if name in shown else "local",
                 variability="continuous",
                 initial="calculated" if solved else "exact",
@@ -246,7 +247,7 @@ def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
     formulas, dae = builder.formulas, builder.dae
     for place, name in enumerate(formulas.held):
         causality = "output" if name in set(outputs) else "local"
-        more = dict(causality=causality, variability="discrete", initial="calculated")
+        more: dict[str, Any] = dict(causality=causality, variability="discrete", initial="calculated")
         builder.add(name, "HELD", len(formulas.inputs) + place, **more)
     for name in outputs:
         if name in builder.places_of:
@@ -258,8 +259,8 @@ def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
         leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
         held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
         variability = "discrete" if held else "continuous"
-        more = dict(causality="output", variability=variability, initial="calculated")
-        builder.add(name, "OUTPUT", builder.places[name], attributes="limits", **more)
+        more: dict[str, Any] = dict(causality="output", variability=variability, initial="calculated")
+        builder.add(name, "OUTPUT", builder.places[name], limited=True, **more)
         builder.places_of[name] = len(builder.variables) - 1
 
 
@@ -270,10 +271,12 @@ def _frictions(builder: _Builder) -> tuple[int, ...]:
         owner = name.rpartition(".")[0]
         prefix = f"{owner}." if owner else ""
         words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
-        more = dict(causality="local", variability="discrete", initial="calculated", type="integer")
+        more: dict[str, Any] = dict(
+            causality="local", variability="discrete", initial="calculated", type="integer"
+        )
         builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
-        more = dict(causality="local", variability="continuous", initial="calculated")
+        more: dict[str, Any] = dict(causality="local", variability="continuous", initial="calculated")
         indicators.append(
             builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
         )

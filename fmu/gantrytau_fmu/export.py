@@ -23,7 +23,10 @@ from gantrytau_fmu.terminals import icon, icon_svg, terminals_and_icons
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
-RUNTIME = "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
+RUNTIME = (
+    "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c "
+    "step.c calls.c component.c fmi2.c fmi3.c"
+)
 INCLUDED = ("functions.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
 LARGE = 100_000  # operations from which on the compiler is asked for less; its second level gains nothing
@@ -99,7 +102,8 @@ def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfac
     for one in found:
         if one not in BOTH:
             raise ModelError(
-                f"export_fmu: found the interface {one!r}, expected model-exchange or co-simulation{did_you_mean(str(one), BOTH)}"
+                f"export_fmu: found the interface {one!r}, expected model-exchange or co-simulation"
+                f"{did_you_mean(str(one), BOTH)}"
             )
     if not found:
         raise ModelError("export_fmu: found no interfaces, expected model-exchange, co-simulation or both")

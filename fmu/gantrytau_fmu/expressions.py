@@ -89,14 +89,16 @@ class Graph:
 
     def _folded(self, name: str, a: int, b: int) -> int:
         """The sum or product of two nodes that rarely change; numbers are computed."""
-        values = [self.nodes[i][1] if self.nodes[i][0] == "CONST" else None for i in (a, b)]
-        neutral = 0.0 if name == "ADD" else 1.0
-        if None not in values:
-            return self.node("CONST", values[0] + values[1] if name == "ADD" else values[0] * values[1])
-        if name == "MUL" and 0.0 in values:
+        first, second = (self.nodes[i][1] if self.nodes[i][0] == "CONST" else None for i in (a, b))
+        if first is not None and second is not None:
+            return self.node("CONST", first + second if name == "ADD" else first * second)
+        if name == "MUL" and 0.0 in (first, second):
             return self.node("CONST", 0.0)
-        if neutral in values:
-            return (a, b)[values.index(neutral) ^ 1]
+        neutral = 0.0 if name == "ADD" else 1.0
+        if first == neutral:
+            return b
+        if second == neutral:
+            return a
         return self.node(name, *sorted((a, b)))
 
     def _sum(self, terms: Iterable[tuple[int, int]]) -> int:

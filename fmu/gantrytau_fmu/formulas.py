@@ -144,12 +144,12 @@ def _input_derivatives(dae: Dae, everything: ca.SX) -> dict[str, ca.SX]:
         base, order = split_derivative(leaf.name())
         if order and base in known:
             found[leaf.name()] = leaf
-    return dict(
-        sorted(
-            found.items(),
-            key=lambda item: (split_derivative(item[0])[1], dae.known.index(split_derivative(item[0])[0])),
-        )
-    )
+
+    def place(name: str) -> tuple[int, int]:
+        base, order = split_derivative(name)
+        return order, dae.known.index(base)
+
+    return {name: found[name] for name in sorted(found, key=place)}
 
 
 def _blocks(
@@ -243,12 +243,12 @@ def _initial(
     fixed = set(dae.settings["fixed"])
     may_move = [k for k, n in enumerate(dae.choice.states) if n not in fixed]
     rank = np.linalg.matrix_rank(slopes[:, may_move], tol=1e-9 * max(1.0, np.abs(slopes).max(initial=0.0)))
-    _, _, columns = qr(slopes[:, may_move], pivoting=True)
+    columns = qr(slopes[:, may_move], mode="r", pivoting=True)[-1]
     chosen = tuple(sorted(may_move[k] for k in columns[:rank]))
-    _, _, kept = qr(slopes[:, list(chosen)].T, pivoting=True) if rank else (None, None, [])
+    kept = qr(slopes[:, list(chosen)].T, mode="r", pivoting=True)[-1] if rank else ()
     if rank < rows.numel():
         raise ModelError(
-            f"export_fmu: {dae.name}: found {rows.numel()} initial equations, of which only {rank} determine states that are not "
-            "fixed; remove those that repeat others or that contradict fixed starts"
+            f"export_fmu: {dae.name}: found {rows.numel()} initial equations, of which only {rank} determine states "
+            "that are not fixed; remove those that repeat others or that contradict fixed starts"
         )
     return rows[sorted(int(k) for k in kept[:rank])], chosen

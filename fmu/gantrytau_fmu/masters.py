@@ -234,8 +234,8 @@ class Master:
             if not worst:
                 return
         raise SolveError(
-            f"co-simulation: after {iterations} iterations at t = {self.grid.time(k):.6g} s the inputs do not agree with the "
-            f"outputs: {worst}; take a shorter step, or allow more iterations",
+            f"co-simulation: after {iterations} iterations at t = {self.grid.time(k):.6g} s the inputs do not agree with "
+            f"the outputs: {worst}; take a shorter step, or allow more iterations",
             time=self.grid.time(k),
         )
 

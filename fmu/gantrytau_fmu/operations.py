@@ -20,10 +20,8 @@ OTHERS = {
 }
 OPERATIONS = {name: f"{{0}} {sign} {{1}}" for name, sign in INFIX.items()}
 OPERATIONS |= {name: f"{call}({{0}})" for name, call in CALLS.items()}
-OPERATIONS |= {
-    n: f"{CALLS[n]}({{0}}, {{1}})"
-    for n in "POW CONSTPOW ATAN2 FMOD COPYSIGN FMIN FMAX HYPOT REMAINDER".split()
-}
+TWO = ("POW", "CONSTPOW", "ATAN2", "FMOD", "COPYSIGN", "FMIN", "FMAX", "HYPOT", "REMAINDER")
+OPERATIONS |= {name: f"{CALLS[name]}({{0}}, {{1}})" for name in TWO}
 OPERATIONS |= OTHERS
 
 
