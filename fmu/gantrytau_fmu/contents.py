@@ -259,7 +259,7 @@ def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
         leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
         held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
         variability = "discrete" if held else "continuous"
-        more: dict[str, Any] = dict(causality="output", variability=variability, initial="calculated")
+        more = dict(causality="output", variability=variability, initial="calculated")
         builder.add(name, "OUTPUT", builder.places[name], limited=True, **more)
         builder.places_of[name] = len(builder.variables) - 1
 
@@ -276,7 +276,7 @@ def _frictions(builder: _Builder) -> tuple[int, ...]:
         )
         builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
-        more: dict[str, Any] = dict(causality="local", variability="continuous", initial="calculated")
+        more = dict(causality="local", variability="continuous", initial="calculated")
         indicators.append(
             builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
         )
