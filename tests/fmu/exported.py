@@ -110,6 +110,12 @@ class Running:
         assert self.instance("ExitInitializationMode") == OK, self.instance.message
         return self
 
+    def settle(self) -> None:
+        """From event mode to continuous-time mode."""
+        assert self.instance.update() == OK
+        assert self.instance.update() == OK  # what was sampled in the first iteration asks for a second
+        assert self.instance("EnterContinuousTimeMode") == OK, self.instance.message
+
     def step(self, size: float) -> None:
         assert self.instance.step(self.time, size) == OK, self.instance.message
         self.time += size
@@ -187,3 +193,11 @@ class Numbers:
         )
         assert found.success
         return found.y.T
+
+    def cvodes(self, size: float) -> Any:
+        """x, u -> x after a step of that size in s, by CVODES at 1e-12; without implicit unknowns and time."""
+        x, u = ca.SX.sym("x", len(self.x)), ca.SX.sym("u", len(self.u))
+        rates = self.found(0.0, x, u, self.p, [])[: len(self.x)]
+        options = dict(reltol=1e-12, abstol=1e-14, max_num_steps=1_000_000)
+        step = ca.integrator("step", "cvodes", dict(x=x, p=u, ode=rates), 0.0, size, options)
+        return lambda at, inputs: np.array(step(x0=at, p=inputs)["xf"]).ravel()
