@@ -67,6 +67,7 @@ static void gt_get_nominals(const gt_instance *it, double *nominals);
 
 typedef struct { int again, terminate, nominals_changed, states_changed, next_defined; double next; } gt_event_info;
 static gt_status gt_update(gt_instance *it, gt_event_info *info); /* one event iteration */
+static gt_status gt_completed(gt_instance *it); /* after a step of the importer: refuses one across a singular pose */
 
 /* ---- step.c: Co-Simulation. The time is `time` afterwards, or where a failure stopped it. */
 static gt_status gt_step(gt_instance *it, double time, double size, double *reached);

@@ -66,6 +66,9 @@ static gt_status gt_initialize(gt_instance *it) {
     if (status == GT_OK) status = gt_refresh(it);
     if (status != GT_OK) return status;
     it->now.initialized = 1;
+    it->now.kept_time = it->now.time;
+    memcpy(it->now.kept_sides, it->now.sides, sizeof it->now.sides);
+    memset(it->now.side_rates, 0, sizeof it->now.side_rates);
     memset(it->now.ticks, 0, sizeof it->now.ticks);
     status = gt_check_clocks(it);
     if (status == GT_OK) status = gt_begin_modes(it);

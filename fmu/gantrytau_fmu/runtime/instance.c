@@ -23,7 +23,8 @@ typedef struct {
     /* the last point where the equations were solved, from which others are reached */
     double solved_time, solved_x[GT_ROOM(GT_STATES)], solved_u[GT_ROOM(GT_KNOWN)], solved_z[GT_ROOM(GT_ALGEBRAICS)];
     double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
-    double sides[GT_ROOM(GT_BLOCKS)]; /* signs of the determinants of the blocks there */
+    /* determinants of the blocks where they were solved last, where the last step ended, and their rates on it */
+    double sides[GT_ROOM(GT_BLOCKS)], kept_time, kept_sides[GT_ROOM(GT_BLOCKS)], side_rates[GT_ROOM(GT_BLOCKS)];
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
     int ready;     /* the experiment is set up */

@@ -50,6 +50,28 @@ static int gt_factor(int n, double *a, int *pivots, double *scales) {
     return sign;
 }
 
+/* How far factors are from those of a singular matrix: the smallest pivot, and the smallest row relative to the
+ * largest, for a row that vanishes is lost when it is scaled. */
+static double gt_regularity(int n, const double *a, const double *scales) {
+    double pivot = INFINITY, least = INFINITY, most = 0;
+    int i;
+    for (i = 0; i < n; i++) {
+        pivot = fmin(pivot, fabs(a[i + i * n]));
+        least = fmin(least, scales[i]);
+        most = fmax(most, scales[i]);
+    }
+    return pivot * least / most;
+}
+
+/* Determinant, of rows relative to the largest; sign: what gt_factor returned. */
+static double gt_determinant(int n, const double *a, const double *scales, int sign) {
+    double product = sign, least = INFINITY;
+    int i;
+    for (i = 0; i < n; i++) least = fmin(least, scales[i]);
+    for (i = 0; i < n; i++) product *= fabs(a[i + i * n]) * least / scales[i];
+    return product;
+}
+
 /* Solve with the factors: b (n) becomes the solution. */
 static void gt_solve_factored(int n, const double *a, const int *pivots, const double *scales, double *b) {
     int i, k;

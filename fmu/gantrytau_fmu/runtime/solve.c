@@ -7,6 +7,7 @@
 #define GT_ITERATIONS 50
 #define GT_HALVINGS 12
 #define GT_SMALL 1e-11     /* relative size of a Newton step that ends the iteration: the next would be its square */
+#define GT_SINGULAR 1e-7   /* relative to the largest coefficient: below, rounding moves a solution by its own root */
 #define GT_FAR 0.1         /* size of a first step, relative to 1 + |z|, from which on the way is followed */
 #define GT_STEPS_ON_THE_WAY 64
 
@@ -63,6 +64,14 @@ static double gt_relative(const gt_block *block, const double *z, const double *
     return largest;
 }
 
+static int gt_is_singular(const gt_instance *it, const gt_block *block) {
+    return !block->linear && gt_regularity(block->count, it->matrices + block->matrix, it->scales + block->first) < GT_SINGULAR;
+}
+
+static double gt_block_determinant(const gt_instance *it, const gt_block *block, int sign) {
+    return gt_determinant(block->count, it->matrices + block->matrix, it->scales + block->first, sign);
+}
+
 /* GT_DISCARD: not found, told nowhere if quiet. direct: give up where the first step is far. */
 static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int direct) {
     const gt_block *block = gt_blocks + number;
@@ -79,13 +88,15 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
         if (!(size < INFINITY)) return gt_block_fails(it, block, quiet, "have no finite solution");
         if (direct && iteration == 0 && !block->linear && size > GT_FAR) return GT_DISCARD;
         if (block->linear || size <= GT_SMALL) {
+            if (gt_is_singular(it, block))
+                return gt_block_fails(it, block, quiet, "do not determine them (they depend on each other)");
             for (i = 0; i < block->count; i++) z[i] += step[i];
             if (block->linear && block->count > 1) { /* one refinement: elimination alone costs three digits of many unknowns */
                 block->residual(it->a, residual, it->w);
                 gt_direction(it, block, residual, step);
                 for (i = 0; i < block->count; i++) z[i] += step[i];
             }
-            it->now.sides[number] = side;
+            it->now.sides[number] = gt_block_determinant(it, block, side);
             return GT_OK;
         }
         before = gt_norm(block->count, residual);
@@ -97,9 +108,10 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
         }
         if (halving == GT_HALVINGS) {
             /* rounding alone keeps the residual from falling where the step is that small */
-            if (size > 1e-8) return gt_block_fails(it, block, quiet, "could not be solved");
+            if (size > 1e-8 || gt_is_singular(it, block))
+                return gt_block_fails(it, block, quiet, "could not be solved");
             memcpy(z, old, block->count * sizeof(double));
-            it->now.sides[number] = side;
+            it->now.sides[number] = gt_block_determinant(it, block, side);
             return GT_OK;
         }
     }
@@ -185,6 +197,41 @@ static gt_status gt_refresh(gt_instance *it) {
     return GT_OK;
 }
 
+/* A block that is on the other side of a singular pose than where the last step ended, or -1. */
+static int gt_other_side(const gt_instance *it) {
+    int i;
+    for (i = 0; i < GT_BLOCKS; i++)
+        if (!gt_blocks[i].frictions && it->now.kept_sides[i] * it->now.sides[i] < 0) return i;
+    return -1;
+}
+
+/* Two ways to assemble a mechanism may cross in a singular pose: a determinant that was about to change its sign, and
+ * did not, may have come over to the other way. */
+static int gt_turned(const gt_instance *it) {
+    int i;
+    for (i = 0; i < GT_BLOCKS; i++) {
+        const double expected = it->now.kept_sides[i] + it->now.side_rates[i] * (it->now.time - it->now.kept_time);
+        if (!gt_blocks[i].frictions && expected * it->now.kept_sides[i] < 0) return 1;
+    }
+    return 0;
+}
+
+static void gt_keep_sides(gt_instance *it) {
+    const double gone = it->now.time - it->now.kept_time;
+    int i;
+    for (i = 0; i < GT_BLOCKS && gone != 0; i++) it->now.side_rates[i] = (it->now.sides[i] - it->now.kept_sides[i]) / gone;
+    memcpy(it->now.kept_sides, it->now.sides, sizeof it->now.sides);
+    it->now.kept_time = it->now.time;
+}
+
+static gt_status gt_completed(gt_instance *it) {
+    const gt_status status = gt_refresh(it);
+    const int passed = gt_other_side(it);
+    if (status == GT_OK && passed >= 0) return gt_block_fails(it, gt_blocks + passed, 0, "have passed a singular pose");
+    if (status == GT_OK) gt_keep_sides(it);
+    return status;
+}
+
 static gt_status gt_all_finite(gt_instance *it, int n, const double *values, const char *const *names, const char *what) {
     int i;
     for (i = 0; i < n; i++)
@@ -211,12 +258,16 @@ static gt_status gt_get_rates(gt_instance *it, double *rates) {
 
 /* Rates at a trial point of an integrator; GT_DISCARD where there are none. */
 static gt_status gt_rates_at(gt_instance *it, double time, const double *x, double *rates) {
-    double sum = 0;
+    double z[GT_ROOM(GT_ALGEBRAICS)], sum = 0;
     int i;
     gt_point_at(it, &time, x);
-    if (GT_BLOCKS && gt_solve(it, 1) != GT_OK) {
-        gt_point_at(it, &it->now.time, it->now.x);
-        return GT_DISCARD;
+    if (GT_BLOCKS) {
+        memcpy(z, it->now.z, sizeof z);
+        if (gt_solve(it, 1) != GT_OK || gt_other_side(it) >= 0) {
+            memcpy(it->now.z, z, sizeof z); /* a shorter step does not begin on the other side */
+            gt_point_at(it, &it->now.time, it->now.x);
+            return GT_DISCARD;
+        }
     }
     gt_rates(it->a, rates, it->w);
     gt_point_at(it, &it->now.time, it->now.x);

@@ -18,19 +18,11 @@ static double gt_error_norm(const gt_instance *it, const double *x, const double
 
 /* Put the model where a step has led; z is solved anew. */
 static gt_status gt_move(gt_instance *it, double time, const double *x) {
-    double sides[GT_ROOM(GT_BLOCKS)];
-    gt_status status;
-    int i;
-    memcpy(sides, it->now.sides, sizeof sides);
     it->now.time = time;
     memcpy(it->now.x, x, GT_STATES * sizeof(double));
     it->now.stale = it->outputs_stale = 1;
     if (GT_BLOCKS == 0 && GT_MODES == 0) return GT_OK;
-    status = gt_refresh(it);
-    for (i = 0; i < GT_BLOCKS && status == GT_OK; i++)
-        if (!gt_blocks[i].frictions && sides[i] * it->now.sides[i] < 0)
-            status = gt_block_fails(it, gt_blocks + i, 0, "have passed a singular pose");
-    return status;
+    return gt_completed(it);
 }
 
 static int gt_crossed(gt_instance *it) {
@@ -101,7 +93,15 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
             if (!(h > shortest)) return gt_too_short(it, h);
             continue;
         }
-        status = gt_move(it, last ? end : t + size, it->next);
+        it->now.time = last ? end : t + size;
+        if (GT_BLOCKS && gt_turned(it)) {
+            it->now.time = t;
+            h = 0.25 * size;
+            rejected = 1;
+            if (!(h > shortest)) return gt_too_short(it, h);
+            continue;
+        }
+        status = gt_move(it, it->now.time, it->next);
         if (status == GT_OK && gt_crossed(it)) {
             status = gt_locate(it, t, size, x);
             *event = 1;

@@ -1,0 +1,149 @@
+"""Exact stick-slip in exported FMUs, against motion pieced together from solutions of the linear equations."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from gantrytau import Fixed, Model, Parameter, connect, sin, time
+from gantrytau.mechanics import translational
+from gantrytau.mechanics.translational import StickSlipFriction
+from tests.fmu.exported import Exported, export
+
+STEP = 0.004
+M, C, COULOMB, BREAKAWAY = 2.0, 800.0, 6.0, 9.0
+
+
+class OnSpring(Model):
+    """A mass on a spring and on a floor, let go at 0.05 m."""
+
+    mass = translational.Mass(m=M, s=Fixed(0.05), v=Fixed(0.0))
+    spring = translational.Spring(c=C)
+    wall = translational.Fixed()
+    floor = StickSlipFriction(f_c=COULOMB, f_s=BREAKAWAY)
+
+    def equations(self):
+        yield connect(self.mass.flange, self.spring.flange_b)
+        yield connect(self.mass.flange, self.floor.flange)
+        yield connect(self.wall.flange, self.spring.flange_a)
+
+
+class Shaken(Model):
+    """A mass on a floor, pushed to and fro."""
+
+    amplitude = Parameter(10.0, unit="N", description="of the push")
+    w = Parameter(8.0, unit="rad/s", description="angular frequency of the push")
+    mass = translational.Mass(m=M, s=Fixed(0.0), v=Fixed(0.0))
+    push = translational.Force()
+    floor = StickSlipFriction(f_c=COULOMB, f_s=BREAKAWAY)
+
+    def equations(self):
+        yield connect(self.mass.flange, self.push.flange)
+        yield connect(self.mass.flange, self.floor.flange)
+        yield self.push.f == self.amplitude * sin(self.w * time)
+
+
+def on_spring(t: np.ndarray) -> np.ndarray:
+    """Half a period takes twice the Coulomb force over the stiffness off the amplitude, until the spring cannot break away."""
+    turns, sign, half = [0.05], 1, np.pi / np.sqrt(C / M)
+    while C * abs(turns[-1]) > BREAKAWAY:
+        turns.append(2 * sign * COULOMB / C - turns[-1])
+        sign = -sign
+    found = np.full(t.shape, turns[-1])
+    for k, turn in enumerate(turns[:-1]):
+        inside = (t >= k * half) & (t < (k + 1) * half)
+        centre = (-1) ** k * COULOMB / C
+        found[inside] = centre + (turn - centre) * np.cos(np.pi * (t[inside] / half - k))
+    return found
+
+
+def shaken(t: np.ndarray, amplitude: float = 10.0, w: float = 8.0) -> np.ndarray:
+    """Sticks until the push breaks away, slides until the speed is zero, and so on to the other side."""
+    away, half = np.arcsin(BREAKAWAY / amplitude) / w, np.pi / w
+
+    def speed(now):
+        return (amplitude / w * (np.cos(w * away) - np.cos(w * now)) - COULOMB * (now - away)) / M
+
+    def way(now):
+        gone = now - away
+        swing = (np.sin(w * now) - np.sin(w * away)) / w
+        return (amplitude / w * (np.cos(w * away) * gone - swing) - COULOMB * gone**2 / 2) / M
+
+    rest = brentq(speed, half / 2, half + away, xtol=1e-15)
+    assert rest < half + away  # it rests before it is pushed back
+    side, found, start = 1, np.zeros(t.shape), 0.0
+    for k in range(int(t[-1] / half) + 1):
+        gone = np.clip(t - k * half, away, rest)
+        found = np.where(t >= k * half + away, start + side * way(gone), found)
+        start, side = start + side * way(rest), -side
+    return found
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sticking")
+    return {
+        (model.__name__, solver): export(model(), folder / f"{model.__name__}_{solver}.fmu", solver=solver)
+        for model, solver in ((OnSpring, "dopri5"), (Shaken, "dopri5"), (OnSpring, "rodas4"), (Shaken, "rodas4"))
+    }
+
+
+def stepped(fmu: Exported, names: list[str], stop: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    times, found = STEP * np.arange(1, round(stop / STEP) + 1), []
+    with fmu.new() as run:
+        run.begin()
+        for k in range(len(times)):
+            run.time = k * STEP
+            run.step(STEP)
+            found.append(run[names])
+    return times, np.array(found)
+
+
+@pytest.mark.parametrize("solver", ["dopri5", "rodas4"])
+@pytest.mark.parametrize(("model", "truth"), [("OnSpring", on_spring), ("Shaken", shaken)])
+def test_co_simulation_finds_the_instants(fmus, model, truth, solver):
+    times, found = stepped(fmus[model, solver], ["mass.s"])
+    # a speed of 1e-8 m/s counts as rest, which the mass leaves within hundredths of a second
+    assert found[:, 0] == pytest.approx(truth(times), abs=2e-8 if model == "Shaken" else 5e-9)
+
+
+@pytest.mark.parametrize("solver", ["dopri5", "rodas4"])
+def test_what_sticks_stays_in_its_place(fmus, solver):
+    _, found = stepped(fmus["OnSpring", solver], ["mass.s", "mass.v", "floor.f"], 4.0)
+    resting = found[round(3.2 * np.pi / np.sqrt(C / M) / STEP) :]
+    assert np.ptp(resting[:, 0]) < 1e-9
+    assert resting[-1] == pytest.approx([-0.005, 0.0, 4.0], abs=1e-6)  # the force is that of the spring
+    assert abs(resting[-1, 1]) < 1e-15
+
+
+@pytest.mark.parametrize(("model", "truth"), [(OnSpring, on_spring), (Shaken, shaken)])
+@pytest.mark.parametrize("version", [2, 3])
+def test_model_exchange_with_the_events_of_fmpy(tmp_path, model, truth, version):
+    from fmpy import simulate_fmu
+
+    fmu = export(model(), tmp_path / "model.fmu", version)
+    result = simulate_fmu(
+        str(fmu.path),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        stop_time=1.0,
+        relative_tolerance=1e-9,
+        output_interval=STEP,
+        output=["mass.s"],
+    )
+    # a hundred times the tolerance, and what CVode leaves between an event and its end of search
+    assert result["mass.s"] == pytest.approx(truth(np.asarray(result["time"])), abs=1e-6)
+
+
+def test_carts_of_a_robot_that_nothing_pushes_enough_stay_where_they_are(exported):
+    fmu = exported("stick-slip")
+    tool, forces = [f"tool.r[{k}]" for k in range(3)], [f"carts[{k}].law.f" for k in range(3)]
+    with fmu.new() as run:
+        # the weight of the tool pulls at the carts with some 60 N
+        run.begin(**{f"carts[{k}].law.f_c": 200.0 for k in range(3)})
+        start, places = run[tool], []
+        assert np.abs(run[forces]).max() > 1.0
+        for k in range(500):
+            run.time = k * STEP
+            run.step(STEP)
+            places.append(run[tool])
+    assert np.abs(np.array(places) - start).max() < 1e-9
