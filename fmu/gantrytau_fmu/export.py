@@ -11,15 +11,15 @@ from typing import Literal
 
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau_fmu.archive import binary_members, write_fmu
-from gantrytau_fmu.code import ModelCode, model_code
-from gantrytau_fmu.compiling import NoCompiler, compile_libraries
-from gantrytau_fmu.contents import Contents, contents_of
-from gantrytau_fmu.description import build_description, model_description
-from gantrytau_fmu.documentation import documentation, licenses
+from gantrytau_fmu.building.archive import binary_members, write_fmu
+from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries
+from gantrytau_fmu.building.platforms import Platform, chosen
+from gantrytau_fmu.code.contents import Contents, contents_of
+from gantrytau_fmu.code.model_code import ModelCode, model_code
+from gantrytau_fmu.describing.description import build_description, model_description
+from gantrytau_fmu.describing.documentation import documentation, licenses
+from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
 from gantrytau_fmu.interface import Experiment, Interface, Interfaces
-from gantrytau_fmu.platforms import Platform, chosen
-from gantrytau_fmu.terminals import icon, icon_svg, terminals_and_icons
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")

@@ -16,7 +16,7 @@ import numpy as np
 
 from gantrytau import translate
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.platforms import native
+from gantrytau_fmu.building.platforms import native
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from tests.benchmarks.engine import FORCES
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, print_table, shown

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.platforms import native
+from gantrytau_fmu.building.platforms import native
 from tests.fmu.tiny_fmus import FMI2, lag2, pack, running3
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130

@@ -7,7 +7,7 @@ from typing import Any
 
 from fmpy.model_description import read_model_description
 
-from gantrytau_fmu.description import build_description, model_description
+from gantrytau_fmu.describing.description import build_description, model_description
 from gantrytau_fmu.interface import Experiment, Interface, Unknown, Variable
 
 VERSIONS = ("2.0", "3.0")

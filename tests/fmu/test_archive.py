@@ -7,8 +7,8 @@ import zipfile
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu import archive
-from gantrytau_fmu.archive import (
+from gantrytau_fmu.building import archive
+from gantrytau_fmu.building.archive import (
     binary_members,
     binary_path,
     check_target,
@@ -16,7 +16,7 @@ from gantrytau_fmu.archive import (
     write_archive,
     write_fmu,
 )
-from gantrytau_fmu.platforms import PLATFORMS
+from gantrytau_fmu.building.platforms import PLATFORMS
 
 MEMBERS = {
     "sources/fmu.c": b"int x;\n" * 1000,

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from gantrytau_fmu.checking import check_fmu
-from gantrytau_fmu.platforms import native
-from gantrytau_fmu.safety import DESCRIPTION
+from gantrytau_fmu.building.platforms import native
+from gantrytau_fmu.reading.checking import check_fmu
+from gantrytau_fmu.reading.safety import DESCRIPTION
 from tests.fmu.tiny_fmus import FMI2, FMI3, TERMINALS, lag2, lag3, pack, running3
 
 HERE = native()

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from gantrytau import GantryTauError, ModelError
-from gantrytau_fmu import compiling
-from gantrytau_fmu.compiling import NoCompiler, compile_libraries, compile_library, compiler
-from gantrytau_fmu.platforms import PLATFORMS, Platform, chosen, native
+from gantrytau_fmu.building import compiling
+from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries, compile_library, compiler
+from gantrytau_fmu.building.platforms import PLATFORMS, Platform, chosen, native
 from tests.fmu.binaries import exports, glibc_versions, imported_libraries, install_name
 
 SOURCES = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau_fmu.description_units import DISPLAYS
+from gantrytau_fmu.describing.units import DISPLAYS
 from gantrytau_fmu.interface import Variable
 from tests.fmu.interfaces import VERSIONS, interface, read
 

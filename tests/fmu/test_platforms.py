@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu.platforms import PLATFORMS, chosen, native
+from gantrytau_fmu.building.platforms import PLATFORMS, chosen, native
 
 
 def names(platforms) -> list[str]:

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from gantrytau import GantryTauError, ModelError
-from gantrytau_fmu.reading import read_fmu
+from gantrytau_fmu.reading.reading import read_fmu
 from tests.fmu.tiny_fmus import BUILD, FMI2, FMI3, TERMINALS, lag2, lag3, pack
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import simulate
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.cosimulation import cosimulate
+from gantrytau_fmu.systems.cosimulation import cosimulate
 from gantrytau_models import prototypes
 from gantrytau_models.gantry_tau import tool_ahead_of_carts
 from gantrytau_models.plant import MeasuredGantryTau

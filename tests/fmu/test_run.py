@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from gantrytau import ModelError
 from gantrytau.cli import app
-from gantrytau_fmu.single import run_fmu
-from gantrytau_fmu.ssp_writing import write_ssp
+from gantrytau_fmu.systems.single import run_fmu
+from gantrytau_fmu.systems.ssp_writing import write_ssp
 
 from .small_fmus import Builder, variable
 

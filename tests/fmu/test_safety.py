@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from gantrytau import GantryTauError, ModelError
-from gantrytau_fmu import safety
-from gantrytau_fmu.safe_xml import check_xml
-from gantrytau_fmu.safety import DESCRIPTION, open_archive, unpack
+from gantrytau_fmu.reading import safety
+from gantrytau_fmu.reading.safe_xml import check_xml
+from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive, unpack
 
 XML = b'<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription/>'
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu.cosimulation import cosimulate
-from gantrytau_fmu.ssp import STRUCTURE
-from gantrytau_fmu.ssp_writing import write_ssp
+from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.systems.ssp import STRUCTURE
+from gantrytau_fmu.systems.ssp_writing import write_ssp
 
 from .small_fmus import Builder, variable
 

@@ -1,5 +1,7 @@
 """Exact stick-slip in exported FMUs, against motion pieced together from solutions of the linear equations."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -43,7 +45,7 @@ class Shaken(Model):
 
 
 def on_spring(t: np.ndarray) -> np.ndarray:
-    """Half a period takes twice the Coulomb force over the stiffness off the amplitude, until the spring cannot break away."""
+    """Half a period takes twice the friction over the stiffness off the amplitude, until the spring cannot pull it loose."""
     turns, sign, half = [0.05], 1, np.pi / np.sqrt(C / M)
     while C * abs(turns[-1]) > BREAKAWAY:
         turns.append(2 * sign * COULOMB / C - turns[-1])
@@ -68,7 +70,7 @@ def shaken(t: np.ndarray, amplitude: float = 10.0, w: float = 8.0) -> np.ndarray
         swing = (np.sin(w * now) - np.sin(w * away)) / w
         return (amplitude / w * (np.cos(w * away) * gone - swing) - COULOMB * gone**2 / 2) / M
 
-    rest = brentq(speed, half / 2, half + away, xtol=1e-15)
+    rest: Any = brentq(speed, half / 2, half + away, xtol=1e-15)
     assert rest < half + away  # it rests before it is pushed back
     side, found, start = 1, np.zeros(t.shape), 0.0
     for k in range(int(t[-1] / half) + 1):
@@ -83,7 +85,12 @@ def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sticking")
     return {
         (model.__name__, solver): export(model(), folder / f"{model.__name__}_{solver}.fmu", solver=solver)
-        for model, solver in ((OnSpring, "dopri5"), (Shaken, "dopri5"), (OnSpring, "rodas4"), (Shaken, "rodas4"))
+        for model, solver in (
+            (OnSpring, "dopri5"),
+            (Shaken, "dopri5"),
+            (OnSpring, "rodas4"),
+            (Shaken, "rodas4"),
+        )
     }
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gantrytau_fmu.platforms import native
+from gantrytau_fmu.building.platforms import native
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 FMI2 = (

@@ -71,7 +71,7 @@ static gt_status gt_initial_equations(gt_instance *it);
 static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
 
-/* Where the functions of the model find their arguments; the order is that of ARRAYS in code.py. */
+/* Where the functions of the model find their arguments; the order is that of ARRAYS in code/model_code.py. */
 static void gt_point_at(gt_instance *it, const double *time, const double *x) {
     it->a[0] = time;
     it->a[1] = x;

@@ -28,7 +28,7 @@ def check(
 
     Exit code 1 if there are errors; warnings and notes alone give 0.
     """
-    from gantrytau_fmu.checking import check_fmu
+    from gantrytau_fmu.reading.checking import check_fmu
 
     with reporting(json):
         present(file)

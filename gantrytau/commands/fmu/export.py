@@ -138,7 +138,7 @@ def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
 
 def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: bool) -> None:
     """The file, what is in it, and how long it took."""
-    from gantrytau_fmu.reading import read_fmu
+    from gantrytau_fmu.reading.reading import read_fmu
 
     fmu = read_fmu(file)
     if json:

@@ -16,7 +16,7 @@ def info(file: FmuFile, json: Json = False) -> None:
 
     Only its files are read, and only if they are harmless: its binaries are not loaded.
     """
-    from gantrytau_fmu.reading import read_fmu
+    from gantrytau_fmu.reading.reading import read_fmu
 
     with reporting(json):
         present(file)
@@ -26,7 +26,7 @@ def info(file: FmuFile, json: Json = False) -> None:
 
 def present(file: Path) -> None:
     """CommandError if there is no such file."""
-    from gantrytau_fmu.safety import no_file
+    from gantrytau_fmu.reading.safety import no_file
 
     if not file.is_file():
         raise CommandError(no_file(file))

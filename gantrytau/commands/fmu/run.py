@@ -104,10 +104,10 @@ def _setting(text: str) -> tuple[str, Any]:
 
 def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
     if file.suffix.lower() != ".ssp":
-        from gantrytau_fmu.single import run_fmu
+        from gantrytau_fmu.systems.single import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
-    from gantrytau_fmu.cosimulation import cosimulate
+    from gantrytau_fmu.systems.cosimulation import cosimulate
 
     if me:
         raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")

@@ -1,0 +1,1 @@
+"""Platforms, compilers, and the archive."""

@@ -1,0 +1,114 @@
+"""C functions of a graph of expressions.
+
+An expression that is used once is written where it is used, others get a name. Long functions are cut into pieces
+of bounded length, because compilers need more than proportional time for long straight-line code; what one piece
+computes for another goes through a work array.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from gantrytau_fmu.code.expressions import Graph
+from gantrytau_fmu.code.operations import OPERATIONS, number_text
+
+PIECE = 1500  # operations per C function
+LINE = 160  # characters of an expression that is still written where it is used
+REPEATING = {name for name, form in OPERATIONS.items() if form.count("{0}") > 1}
+HOISTED = "c"
+
+
+@dataclass(frozen=True, eq=False)
+class CFunction:
+    """`static void name(const double *const *a, double *r, double *w)`; work: length of w."""
+
+    name: str
+    code: str
+    work: int
+    operations: int
+
+
+def c_function(
+    graph: Graph, name: str, roots: Sequence[int], *, hoisting: bool = False, seldom: bool = False
+) -> CFunction:
+    """The function whose results r are the roots, from the arrays of the graph, then the hoisted one.
+
+    hoisting: the one that fills the hoisted array; seldom: small code is worth more than fast one.
+    """
+    known = {} if hoisting else graph.hoisted
+    order = [n for n in graph.reached(roots, known=known) if n not in known and graph.inside(n)]
+    cut = [order[k : k + PIECE] for k in range(0, len(order), PIECE)] or [[]]
+    home = {number: k for k, part in enumerate(cut) for number in part}
+    uses = Counter(i for n in order for i in graph.inside(n)) + Counter(roots)
+    uses += Counter(i for n in order if graph.nodes[n][0] in REPEATING for i in graph.inside(n))
+    shared: dict[int, int] = {}
+    for number in order:
+        for i in graph.inside(number):
+            if home.get(i, home[number]) != home[number]:
+                shared.setdefault(i, len(shared))
+    pieces = [_Piece(graph, k, known, home, shared, uses) for k in range(len(cut))]
+    for piece, part in zip(pieces, cut, strict=True):
+        piece.write(part)
+    for place, root in enumerate(roots):
+        pieces[home.get(root, 0)].result(place, root)
+    mark = "GT_SELDOM " if seldom else ""
+    if len(pieces) == 1:
+        return CFunction(name, mark + _whole(name, graph, pieces[0].lines), 0, len(order))
+    code = [mark + _whole(f"{name}_{k}", graph, piece.lines) for k, piece in enumerate(pieces)]
+    code.append(_whole(name, graph, [f"  {name}_{k}(a, r, w);" for k in range(len(pieces))]))
+    return CFunction(name, "".join(code), len(shared), len(order))
+
+
+@dataclass(eq=False)
+class _Piece:
+    """One C function of the graph while it is written; texts: expressions by node, where they have one here."""
+
+    graph: Graph
+    number: int
+    known: Mapping[int, int]
+    home: Mapping[int, int]
+    shared: Mapping[int, int]
+    uses: Mapping[int, int]
+    lines: list[str] = field(default_factory=list)
+    texts: dict[int, str] = field(default_factory=dict)
+
+    def write(self, order: Sequence[int]) -> None:
+        names = 0
+        for node in order:
+            operation, *inside = self.graph.nodes[node]
+            text = OPERATIONS[operation].format(*(self.word(i) for i in inside))
+            if self.uses[node] == 1 and node not in self.shared and len(text) < LINE:
+                self.texts[node] = f"({text})" if not text.endswith(")") or " " in text else text
+                continue
+            self.texts[node] = f"v{names}"
+            names += 1
+            self.lines.append(f"  const double {self.texts[node]} = {text};")
+            if node in self.shared:
+                self.lines.append(f"  w[{self.shared[node]}] = {self.texts[node]};")
+
+    def word(self, node: int) -> str:
+        """How a node is called in this piece."""
+        if node in self.known:
+            return f"{HOISTED}[{self.known[node]}]"
+        key = self.graph.nodes[node]
+        if key[0] == "CONST":
+            return number_text(key[1])
+        if key[0] == "INPUT":
+            return f"{key[1]}[{key[2]}]"
+        return self.texts[node] if self.home[node] == self.number else f"w[{self.shared[node]}]"
+
+    def result(self, place: int, root: int) -> None:
+        self.lines.append(f"  r[{place}] = {self.word(root)};")
+
+
+def _whole(name: str, graph: Graph, body: Sequence[str]) -> str:
+    text = "".join(body)
+    used = [(k, n) for k, n in enumerate([*graph.arrays, HOISTED]) if f"{n}[" in text]
+    lines = [
+        f"static void {name}(const double *const *a, double *restrict r, double *restrict w) {{",
+        *(f"  const double *const {n} = a[{k}];" for k, n in used),
+        *body,
+        "  (void)a; (void)r; (void)w;" + "".join(f" (void){n};" for _, n in used),
+        "}",
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,383 @@
+"""The variables of an FMU, made of the formulas of a model: who they are to the outside and to the runtime."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae
+from gantrytau.flat_model import FlatVariable
+from gantrytau.symbols import split_derivative
+from gantrytau_fmu.code.expressions import Graph
+from gantrytau_fmu.code.formulas import Formulas, column, formulas_of, numbers_of
+from gantrytau_fmu.code.model_code import Entry, output_places
+from gantrytau_fmu.interface import Unknown, Variable
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """Variables and model structure of an FMU (see Interface), and the tables of the runtime, in the same order."""
+
+    formulas: Formulas
+    variables: tuple[Variable, ...]
+    entries: tuple[Entry, ...]
+    constants: tuple[float, ...]
+    nominals: tuple[float, ...]
+    outputs: tuple[Unknown, ...]
+    derivatives: tuple[Unknown, ...]
+    initial_unknowns: tuple[Unknown, ...]
+    indicators: tuple[int, ...]
+    terminals: dict[str, dict[str, int]]
+    description: str
+    wanted: tuple[ca.SX, ...]
+    graph: Graph
+
+
+def fmi_name(name: str) -> str:
+    """`der(der(x))` is `der(x,2)` in the structured naming convention (FMI 3.0.2, section 2.4.7.5.1)."""
+    base, order = split_derivative(name)
+    return name if order < 2 else f"der({base},{order})"
+
+
+@dataclass(eq=False)
+class _Builder:
+    dae: Dae
+    formulas: Formulas
+    places: dict[str, int]
+    outputs: frozenset[str]
+    variables: list[Variable] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    constants: list[float] = field(default_factory=list)
+    places_of: dict[str, int] = field(default_factory=dict)
+    rates: list[int] = field(default_factory=list)  # references of the derivatives of the states
+
+    def __post_init__(self) -> None:
+        flat = self.dae.flat
+        everything = (*flat.parameters, *flat.variables, *flat.propagated)
+        self.declared = {n: (v, k) for v in everything for k, n in enumerate(v.elements)}
+        self.taken: set[str] = set()
+
+    def add(
+        self, name: str, kind: str, index: int, *, fixed: bool = False, limited: bool = False, **more: Any
+    ) -> int:
+        """A variable of the model by its name there; limited: with the limits that its declaration gives."""
+        base, order = split_derivative(name)
+        declaration, place = self.declared.get(base, (None, 0))
+        reference = len(self.variables)
+        unit, words = "", ""
+        if declaration is not None:
+            unit, words = declaration.unit or "", declaration.description
+            if order:
+                unit = _per_second(unit, order)
+                words = (
+                    f"{'second ' if order == 2 else ''}time derivative of {base}"
+                    if order < 3
+                    else f"time derivative {order} of {base}"
+                )
+            elif limited:
+                more = {**self.limits(declaration, place), **more}
+        more.setdefault("unit", unit)
+        more.setdefault("description", words)
+        found, width = fmi_name(name), int(order > 1)
+        while (
+            found in self.taken
+        ):  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
+            width += 1
+            found = f"der({base},{order:0{width}})" if order else found + "_"
+        self.taken.add(found)
+        self.variables.append(Variable(name=found, reference=reference, **more))
+        self.entries.append(Entry(kind, index, fixed, found))
+        self.places_of.setdefault(name, reference)
+        return reference
+
+    def limits(self, declaration: FlatVariable, place: int) -> dict[str, float]:
+        """min, max and nominal as numbers, where they are declared and finite."""
+        found = {}
+        for word in ("min", "max", "nominal"):
+            values = getattr(declaration, word)
+            if values is not None:
+                number = float(self.dae.table.number(values[place])[0])
+                if np.isfinite(number) and (word != "nominal" or number > 0):
+                    found[word] = number
+        return found
+
+
+def _per_second(unit: str, order: int) -> str:
+    """The unit of a derivative, with one '/' as Modelica writes it."""
+    if not unit:
+        return ""
+    seconds = "s" if order == 1 else f"s{order}"
+    above, _, below = unit.partition("/")
+    if not below:
+        return f"{above}/{seconds}"
+    factors = [*below.strip("()").split(".")]
+    times = [f for f in factors if f.rstrip("0123456789") == "s"]
+    power = order + sum(int(f[1:] or 1) for f in times)
+    rest = [f for f in factors if f not in times]
+    joined = ".".join([*rest, "s" if power == 1 else f"s{power}"])
+    return f"{above}/({joined})" if rest else f"{above}/{joined}"
+
+
+def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
+    """What an FMU of a translated model holds; outputs: scalar names of what it shows."""
+    formulas = formulas_of(dae, _evaluated(dae, outputs))
+    graph, places, wanted = output_places(formulas)
+    builder = _Builder(dae, formulas, places, frozenset(outputs))
+    builder.add(
+        "time", "TIME", 0, causality="independent", variability="continuous", unit="s", description="time"
+    )
+    _parameters(builder)
+    _inputs(builder)
+    _states(builder, outputs)
+    _outputs(builder, outputs)
+    indicators = _frictions(builder)
+    structure = _structure(builder, Dependencies(formulas, wanted), outputs)
+    return Contents(
+        formulas=formulas,
+        variables=tuple(builder.variables),
+        entries=tuple(builder.entries),
+        constants=tuple(builder.constants),
+        nominals=tuple(_nominal(builder, n) for n in formulas.states),
+        **structure,
+        indicators=indicators,
+        terminals=_terminals(builder),
+        description=f"{dae.name}, a model of gantrytau",
+        wanted=tuple(wanted),
+        graph=graph,
+    )
+
+
+def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
+    """What needs an output function: outputs that are no states, and parameters that follow from others."""
+    direct = {*dae.states, *(f"der({n})" for n in dae.states), *(s.name for s in dae.flat.sampled)}
+    dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
+    varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
+    return [*dependent, *varying]
+
+
+def _nominal(builder: _Builder, name: str) -> float:
+    declaration, place = builder.declared.get(split_derivative(name)[0], (None, 0))
+    return builder.limits(declaration, place).get("nominal", 1.0) if declaration is not None else 1.0
+
+
+def _parameters(builder: _Builder) -> None:
+    table, formulas = builder.dae.table, builder.formulas
+    early = formulas.start_parameters
+    for place, name in enumerate(table.independent):
+        fixed = name in early
+        builder.add(
+            name,
+            "PARAMETER",
+            place,
+            fixed=fixed,
+            limited=True,
+            causality="parameter",
+            variability="fixed" if fixed else "tunable",
+            initial="exact",
+            start=table.values[name],
+        )
+    for name, expression in table.expressions.items():
+        if expression.is_constant():
+            _constant(builder, name, table.values[name], "local")
+            continue
+        tunable = any(s.name() not in early for s in ca.symvar(expression))
+        more: dict[str, Any] = dict(variability="tunable" if tunable else "fixed", initial="calculated")
+        builder.add(name, "OUTPUT", builder.places[name], causality="local", **more)
+
+
+def _constant(builder: _Builder, name: str, value: float, causality: str) -> None:
+    more: dict[str, Any] = dict(causality=causality, variability="constant", initial="exact", start=value)
+    builder.add(name, "CONSTANT", len(builder.constants), **more)
+    builder.constants.append(value)
+
+
+def _inputs(builder: _Builder) -> None:
+    start = numbers_of(builder.dae, builder.formulas.arrays)["u"]
+    for place, name in enumerate(builder.formulas.inputs):
+        builder.add(
+            name,
+            "INPUT",
+            place,
+            limited=True,
+            causality="input",
+            variability="continuous",
+            start=float(start[place]),
+        )
+
+
+def _states(builder: _Builder, outputs: Sequence[str]) -> None:
+    formulas, shown = builder.formulas, set(outputs)
+    starts = np.array(builder.dae.table.number(formulas.starts)) if formulas.states else []
+    references = []
+    for place, name in enumerate(formulas.states):
+        solved = place in formulas.initial_states
+        more: dict[str, Any] = {} if solved else dict(start=float(starts[place]))
+        references.append(
+            builder.add(
+                name,
+                "STATE",
+                place,
+                fixed=solved,
+                limited=True,
+                causality="output" if name in shown else "local",
+                variability="continuous",
+                initial="calculated" if solved else "exact",
+                **more,
+            )
+        )
+    for place, name in enumerate(formulas.states):
+        rate = f"der({name})"
+        own = rate not in builder.places_of  # else a state of that name is shown
+        builder.rates.append(
+            builder.add(
+                rate,
+                "DERIVATIVE",
+                place,
+                causality="output" if own and rate in shown else "local",
+                variability="continuous",
+                initial="calculated",
+                derivative=references[place],
+            )
+        )
+
+
+def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
+    formulas, dae = builder.formulas, builder.dae
+    for place, name in enumerate(formulas.held):
+        causality = "output" if name in set(outputs) else "local"
+        more: dict[str, Any] = dict(causality=causality, variability="discrete", initial="calculated")
+        builder.add(name, "HELD", len(formulas.inputs) + place, **more)
+    for name in outputs:
+        if name in builder.places_of:
+            continue
+        expression = dae.expression(name)
+        if expression.is_constant():
+            _constant(builder, name, float(expression), "output")
+            continue
+        leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
+        held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
+        variability = "discrete" if held else "continuous"
+        more = dict(causality="output", variability=variability, initial="calculated")
+        builder.add(name, "OUTPUT", builder.places[name], limited=True, **more)
+        builder.places_of[name] = len(builder.variables) - 1
+
+
+def _frictions(builder: _Builder) -> tuple[int, ...]:
+    """Mode and event indicator of each friction with exact stick-slip; references of the indicators."""
+    indicators = []
+    for place, name in enumerate(builder.formulas.frictions):
+        owner = name.rpartition(".")[0]
+        prefix = f"{owner}." if owner else ""
+        words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
+        more: dict[str, Any] = dict(
+            causality="local", variability="discrete", initial="calculated", type="integer"
+        )
+        builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
+        words = f"{owner or name}: an event where it falls through zero"
+        more = dict(causality="local", variability="continuous", initial="calculated")
+        indicators.append(
+            builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        )
+    return tuple(indicators)
+
+
+def _terminals(builder: _Builder) -> dict[str, dict[str, int]]:
+    """Components that have inputs, each with its own inputs and outputs by their names there."""
+    found: dict[str, dict[str, int]] = {}
+    owners = {n.rpartition(".")[0] for n in builder.formulas.inputs if not n.startswith("der(")}
+    for variable in builder.variables:
+        owner, _, member = variable.name.rpartition(".")
+        if owner in owners and owner and variable.causality in ("input", "output"):
+            found.setdefault(owner, {})[member] = variable.reference
+    return found
+
+
+class Dependencies:
+    """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
+
+    rates, outputs, samples: boolean rows over (states, inputs, parameters).
+    """
+
+    def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
+        arrays = formulas.arrays
+        held, inputs = len(formulas.held), len(formulas.inputs)
+        sizes = [arrays["x"].numel(), inputs + held, arrays["p"].numel()]
+        z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
+        place = 0
+        for block in formulas.blocks:
+            z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
+            place += len(block.names)
+        own = slice(sizes[0] + inputs, sizes[0] + inputs + held)
+        samples = self._rows(formulas, formulas.samples, z)
+        for _ in range(held):  # what is held may depend on what is held
+            samples |= samples[:, own] @ samples
+        known = np.eye(sum(sizes), dtype=bool)
+        known[own] = samples
+        shown = np.delete(np.arange(sum(sizes)), own)
+        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, shown]
+        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, shown]
+        self.samples = samples[:, shown]
+
+    @staticmethod
+    def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
+        """Dependence of a vector on (x, u, p), directly and through z."""
+        arrays = formulas.arrays
+        function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
+        places = [list(arrays).index(n) for n in "xupz"]
+        patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
+        x, u, p, through = [
+            found.reshape(expression.numel(), arrays[n].numel())
+            for n, found in zip("xupz", patterns, strict=True)
+        ]
+        return np.hstack([x, u, p]) | through @ z
+
+
+def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
+    """What an output depends on."""
+    formulas, entry = builder.formulas, builder.entries[builder.places_of[name]]
+    if entry.kind == "OUTPUT":
+        return depends.outputs[entry.index]
+    if entry.kind == "DERIVATIVE":
+        return depends.rates[entry.index]
+    if entry.kind == "HELD":
+        return depends.samples[entry.index - len(formulas.inputs)]
+    row = np.zeros(depends.outputs.shape[1], dtype=bool)
+    if entry.kind == "STATE":
+        row[entry.index] = True
+    return row
+
+
+def _structure(
+    builder: _Builder, depends: Dependencies, outputs: Sequence[str]
+) -> dict[str, tuple[Unknown, ...]]:
+    """Outputs, derivatives and initial unknowns, each with what it depends on."""
+    formulas, found = builder.formulas, builder.places_of
+    count = len(formulas.states) + len(formulas.inputs)
+    names = (*formulas.states, *formulas.inputs, *formulas.parameters)
+    references = np.array([found[n] for n in names], dtype=int)
+    solved = {formulas.states[k] for k in formulas.initial_states}
+    first = np.array([n not in solved for n in names], dtype=bool)
+    shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
+    rows = {found[n]: _row(builder, depends, n) for n in shown}
+    rates = dict(zip(builder.rates, depends.rates, strict=True))
+
+    def unknown(reference: int, chosen: np.ndarray) -> Unknown:
+        known = tuple(sorted(references[np.flatnonzero(chosen)].tolist()))
+        return Unknown(reference, known, ("dependent",) * len(known))
+
+    def limited(row: np.ndarray) -> np.ndarray:
+        return row & (np.arange(row.size) < count)
+
+    # what initial equations determine depends on all that they may hold
+    at_start = {
+        r: (row | first) if (row & ~first).any() else row & first for r, row in {**rows, **rates}.items()
+    }
+    at_start |= {found[n]: first for n in solved}
+    calculated = [r for r in at_start if builder.variables[r].initial == "calculated"]
+    return dict(
+        outputs=tuple(unknown(r, limited(row)) for r, row in rows.items()),
+        derivatives=tuple(unknown(r, limited(row)) for r, row in rates.items()),
+        initial_unknowns=tuple(unknown(r, at_start[r] & first) for r in sorted(calculated)),
+    )

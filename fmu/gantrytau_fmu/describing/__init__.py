@@ -1,0 +1,1 @@
+"""The XML, the page, the licences and the icon of an FMU."""

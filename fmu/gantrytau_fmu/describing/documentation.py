@@ -1,0 +1,232 @@
+"""documentation/ of an FMU: one page for who receives it without the toolkit, and its licences.
+
+FMI 3.0.2, section 2.5.1.1; FMI 2.0.4, section 2.3: index.html is the entry, licenses/license.txt that of the licences.
+"""
+
+from collections.abc import Iterable
+from html import escape
+from itertools import groupby
+
+from gantrytau_fmu.describing.checks import initial_of, limit
+from gantrytau_fmu.describing.license import BSD_3_CLAUSE
+from gantrytau_fmu.describing.xml_text import plain
+from gantrytau_fmu.interface import Interface, Variable
+
+MANY = 300  # outputs; more of them are grouped by component and folded
+STYLE = """:root{color-scheme:light dark}
+body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem}
+table{border-collapse:collapse;font-size:.88rem;width:100%}
+th,td{text-align:left;vertical-align:top;padding:.15rem .8rem .15rem 0;border-bottom:1px solid #8885}
+td:first-child,code,pre{font-family:ui-monospace,monospace}
+pre{overflow-x:auto;padding:.6rem;border:1px solid #8885}
+summary{cursor:pointer}"""
+SOLVERS = {
+    "dopri5": "DOPRI5, the explicit Runge-Kutta method 5(4) of Dormand and Prince with adaptive steps",
+    "rodas4": "Rodas4, a linearly implicit (Rosenbrock) method of order 4 with adaptive steps, for stiff models",
+}
+KINDS = {"model-exchange": "Model Exchange", "co-simulation": "Co-Simulation"}
+
+
+def documentation(interface: Interface, fmi: str) -> bytes:
+    """documentation/index.html: what the model is, what it needs, its variables, how to use it; no scripts."""
+    name = _text(interface.name)
+    parts = [
+        f"<h1>{name}</h1>",
+        f"<p>{_text(interface.description)}</p>" if interface.description else "",
+        _facts(interface, fmi),
+        _needs(),
+        _variables(interface),
+        _solution(interface),
+        _use(interface, fmi),
+        _license(interface),
+    ]
+    head = f'<meta charset="utf-8"><title>{name}</title><style>{STYLE}</style>'
+    text = f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(filter(None, parts))
+    return (text + "\n</body></html>\n").encode()
+
+
+def licenses(interface: Interface) -> dict[str, bytes]:
+    """Licence texts by their path in the archive, the same in FMI 2 and 3.
+
+    The entry, license.txt, tells the licence of the model, which is its author's, from that of the runtime.
+    """
+    model = interface.license or "none was stated; ask the author of the model"
+    owner = [
+        line for line in (interface.author and f"Author: {interface.author}", interface.copyright) if line
+    ]
+    text = "\n".join(
+        [
+            f"Licences of the FMU {plain(interface.name)}",
+            "",
+            "1. The model",
+            *owner,
+            f"Licence: {model}",
+            "",
+            "2. The runtime: the C code that answers the FMI functions and integrates, in sources/ and binaries/",
+            "Licence: BSD-3-Clause, see gantrytau.txt",
+            "",
+            "3. The C code of the equations, sources/model.c",
+            "It was written by gantrytau from the model, and is part of the model: the licence of the model holds for it.",
+            "",
+        ]
+    )
+    folder = "documentation/licenses/"
+    return {folder + "license.txt": text.encode(), folder + "gantrytau.txt": BSD_3_CLAUSE.encode()}
+
+
+def _text(text: str) -> str:
+    return escape(plain(text), quote=False)
+
+
+def _facts(interface: Interface, fmi: str) -> str:
+    kinds = " and ".join(KINDS[kind] for kind in interface.interfaces)
+    rows = {
+        "FMI": f"{fmi}, {kinds}",
+        "Version": interface.version,
+        "Author": interface.author,
+        "Copyright": interface.copyright,
+        "Made with": " ".join(filter(None, (interface.tool, interface.generated))),
+        "Token": interface.token,
+    }
+    return _table((), ((_text(name), _text(value)) for name, value in rows.items() if value))
+
+
+def _needs() -> str:
+    return (
+        "<h2>What it needs</h2>\n<p>Nothing but the C and mathematics library of the operating system: no Python, no "
+        "toolkit, no licence server, no network. The platforms are the folders of <code>binaries/</code>; where "
+        "<code>sources/</code> is there, the one file <code>fmu.c</code> compiles with any C99 compiler for others. "
+        "It may be instantiated any number of times, also in threads.</p>"
+    )
+
+
+def _variables(interface: Interface) -> str:
+    variables = interface.variables
+    states = [
+        variables[place]
+        for u in interface.derivatives
+        if (place := variables[u.reference].derivative) is not None
+    ]
+    outputs = [v for v in variables if v.causality == "output"]
+    hidden = sum(v.causality == "local" for v in variables) - sum(v.causality == "local" for v in states)
+    parts = [
+        _section("Inputs", [v for v in variables if v.causality == "input"]),
+        _section("Outputs", outputs) if len(outputs) <= MANY else _grouped("Outputs", outputs),
+        _section("Parameters", [v for v in variables if v.causality == "parameter"]),
+        _section("States", states),
+        f"<p>Local variables besides: {hidden}, listed in <code>modelDescription.xml</code>.</p>"
+        if hidden
+        else "",
+    ]
+    return "\n".join(filter(None, parts))
+
+
+def _section(title: str, variables: list[Variable]) -> str:
+    if not variables:
+        return ""
+    return f"<h2>{title} ({len(variables)})</h2>\n" + _variable_table((v.name, v) for v in variables)
+
+
+def _grouped(title: str, variables: list[Variable]) -> str:
+    """Outputs by component, elements of a vector on one row, folded."""
+    groups: dict[str, list[Variable]] = {}
+    for variable in variables:
+        groups.setdefault(_component(variable.name), []).append(variable)
+    parts = [f"<h2>{title} ({len(variables)}), by component</h2>"]
+    for component, members in groups.items():
+        table = _variable_table(_folded(members))
+        parts.append(f"<details><summary>{_text(component)} ({len(members)})</summary>\n{table}</details>")
+    return "\n".join(parts)
+
+
+def _component(name: str) -> str:
+    """The part of the model a variable belongs to: "carts[0]" for "der(carts[0].s)"."""
+    inner = name.removeprefix("der(")
+    return inner.split(".")[0] if "." in inner and "'" not in inner else "the model itself"
+
+
+def _folded(variables: list[Variable]) -> Iterable[tuple[str, Variable]]:
+    """Neighbours that differ by their last index only, as one row: "tool.r[0] ... [2]"."""
+    for _, group in groupby(
+        variables, lambda v: (_base(v.name), v.unit, v.description, v.type, v.variability)
+    ):
+        members = list(group)
+        name = members[0].name
+        yield (
+            (name if len(members) == 1 else f"{name} ... {members[-1].name[len(_base(name)) :]}"),
+            members[0],
+        )
+
+
+def _base(name: str) -> str:
+    place = name.rfind("[")
+    return name[:place] if place > 0 and name.rstrip(")").endswith("]") else name
+
+
+def _variable_table(rows: Iterable[tuple[str, Variable]]) -> str:
+    head = ("Name", "Unit", "Start", "Limits", "Description")
+    return _table(head, ((_text(name), _text(v.unit), _start(v), _limits(v), _note(v)) for name, v in rows))
+
+
+def _start(variable: Variable) -> str:
+    if variable.start is None or initial_of(variable) == "calculated":
+        return ""
+    return f"{variable.start:.9g}" + (" (guess)" if initial_of(variable) == "approx" else "")
+
+
+def _limits(variable: Variable) -> str:
+    low, high = limit(variable.min), limit(variable.max)
+    if low is None:
+        return "" if high is None else f"&le; {high:.9g}"
+    return f"&ge; {low:.9g}" if high is None else f"{low:.9g} to {high:.9g}"
+
+
+def _note(variable: Variable) -> str:
+    fixed = (
+        "set before the start" if (variable.causality, variable.variability) == ("parameter", "fixed") else ""
+    )
+    return "; ".join(filter(None, (_text(variable.description), fixed)))
+
+
+def _table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> str:
+    top = "".join(f"<th>{cell}" for cell in head)
+    body = "\n".join("<tr>" + "".join(f"<td>{cell}" for cell in row) for row in rows)
+    return "<table>\n" + (f"<tr>{top}\n" if top else "") + body + "\n</table>"
+
+
+def _solution(interface: Interface) -> str:
+    told = interface.experiment
+    solver = _text(SOLVERS.get(interface.solver, interface.solver))
+    count = len(interface.derivatives)
+    parts = [f"States: {count}; event indicators: {len(interface.indicators)}."]
+    if "co-simulation" in interface.interfaces and count:
+        parts.append(
+            f"Co-Simulation integrates with {solver}; relative tolerance {told.tolerance:g} unless the importer sets "
+            "another. Inputs are held during a step."
+        )
+    parts.append("Directional derivatives are exact; states can be saved, restored and serialised.")
+    return "<h2>Solution</h2>\n<p>" + " ".join(parts) + "</p>"
+
+
+def _use(interface: Interface, fmi: str) -> str:
+    told, file = interface.experiment, f"{interface.identifier}.fmu"
+    adjustable = any(v.causality == "parameter" and v.variability == "tunable" for v in interface.variables)
+    listed = [
+        f"Import <code>{file}</code> in a tool that reads FMI {fmi}, such as Simulink, Dymola, OpenModelica or FMPy.",
+        f"Default experiment: {told.start:g} s to {told.stop:g} s"
+        + (f", step {told.step:g} s." if "co-simulation" in interface.interfaces else "."),
+        "Parameters are set before initialisation"
+        + ("; those not marked may be changed later too." if adjustable else "."),
+        "A call that fails logs why and names the variable, in the categories <code>logStatusError</code> and "
+        "<code>logStatusWarning</code>; <code>logEvents</code> and <code>logCalls</code> tell more.",
+    ]
+    step = f", output_interval={told.step:g}" if "co-simulation" in interface.interfaces else ""
+    script = f"from fmpy import simulate_fmu\nresult = simulate_fmu({file!r}, stop_time={told.stop:g}{step})"
+    items = "".join(f"<li>{item}\n" for item in listed)
+    return f"<h2>How to use it</h2>\n<ul>\n{items}</ul>\n<pre>{escape(script, quote=False)}</pre>"
+
+
+def _license(interface: Interface) -> str:
+    model = _text(interface.license) or "none stated"
+    link = '<a href="licenses/license.txt">licenses/license.txt</a>'
+    return f"<h2>Licence</h2>\n<p>Model: {model}. Runtime: BSD-3-Clause. See {link}.</p>"

@@ -1,0 +1,313 @@
+"""What an FMU is, read from its files alone: nothing of it is loaded or run."""
+
+import importlib
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from gantrytau.errors import ModelError
+from gantrytau_fmu.building.platforms import ALIASES
+from gantrytau_fmu.reading.described import (
+    FmuDescription,
+    FmuExperiment,
+    FmuInterface,
+    FmuTerminal,
+    FmuVariable,
+    Value,
+)
+from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive
+
+__all__ = [
+    "FmuDescription",
+    "FmuFiles",
+    "FmuVariable",
+    "model_of",
+    "read_files",
+    "read_fmu",
+    "schema_problems",
+]
+
+BUILD = "sources/buildDescription.xml"
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+_SHOWN = 3  # problems of a model description that a message lists
+_KINDS = {
+    "modelExchange": "model-exchange",
+    "coSimulation": "co-simulation",
+    "scheduledExecution": "scheduled-execution",
+}
+_FOLDERS = ALIASES | {"linux32": "x86-linux", "win32": "x86-windows", "darwin32": "x86-darwin"}
+
+
+@dataclass(frozen=True)
+class FmuFiles:
+    """What of an archive describes it: its XML files, checked and of a known version, and the names of all."""
+
+    path: Path
+    fmi: str  # "2.0" or "3.0"
+    description: bytes
+    build: bytes | None
+    terminals: bytes | None
+    names: tuple[str, ...]
+    size: int
+    unpacked: int
+
+    def packed(self) -> BytesIO:
+        """The model description as an archive of its own: what FMPy reads has passed our checks."""
+        packed = BytesIO()
+        with zipfile.ZipFile(packed, "w") as archive:
+            archive.writestr(DESCRIPTION, self.description)
+            if self.build is not None:
+                archive.writestr(BUILD, self.build)
+        packed.seek(0)
+        return packed
+
+
+def read_fmu(path: str | os.PathLike[str]) -> FmuDescription:
+    """Describe an FMU of FMI 2.0 or 3.0 without loading its binaries.
+
+    Raises ModelError for an archive that is damaged or unsafe (see `safety.open_archive`), for FMI 1.0 and other
+    versions, and for a model description that breaks its schema or contradicts itself.
+    """
+    files = read_files(path)
+    if problems := schema_problems(files):
+        more = f"\n  ... and {len(problems) - _SHOWN} more" if len(problems) > _SHOWN else ""
+        listed = "".join(f"\n  {problem}" for problem in problems[:_SHOWN])
+        raise ModelError(
+            f"{files.path}: found a {DESCRIPTION} that breaks the schema of FMI {files.fmi}, expected a valid one; "
+            f"ask its author for another export{listed}{more}"
+        )
+    return describe(files, model_of(files))
+
+
+def read_files(path: str | os.PathLike[str]) -> FmuFiles:
+    """The XML files of an FMU, its version known; ModelError for an unsafe archive or another version."""
+    with open_archive(path) as archive:
+        description = archive.xml(DESCRIPTION)
+        build, terminals = (
+            archive.xml(name) if name in archive.names else None for name in (BUILD, TERMINALS)
+        )
+        names, unpacked = archive.names, archive.size
+    path = Path(path)
+    fmi = _version(path, description)
+    return FmuFiles(path, fmi, description, build, terminals, names, path.stat().st_size, unpacked)
+
+
+def _version(path: Path, description: bytes) -> str:
+    """2.0 or 3.0; ModelError for all else."""
+    root = ElementTree.fromstring(description)
+    if root.tag != "fmiModelDescription":
+        raise ModelError(
+            f"{path}: {DESCRIPTION} begins with '{root.tag}', expected fmiModelDescription; check the file"
+        )
+    version = root.get("fmiVersion", "")
+    if version == "2.0" or re.fullmatch(r"3\.0([.-].*)?", version):
+        return version[:3]
+    remedy = "export it again as FMI 2.0 or 3.0" if version.startswith("1.") else "use one of these versions"
+    raise ModelError(f"{path}: found FMI version '{version}', expected 2.0 or 3.0; {remedy}")
+
+
+def schema_problems(files: FmuFiles) -> list[str]:
+    """Where the XML files break the official schemas, which FMPy brings along; [] if nowhere."""
+    major = files.fmi[0]
+    schemas = [(DESCRIPTION, files.description, f"fmi{major}/fmi{major}ModelDescription.xsd")]
+    if files.fmi == "3.0":
+        schemas.append((BUILD, files.build or b"", "fmi3/fmi3BuildDescription.xsd"))
+        schemas.append((TERMINALS, files.terminals or b"", "fmi3/fmi3TerminalsAndIcons.xsd"))
+    return [problem for name, text, schema in schemas if text for problem in _breaches(name, text, schema)]
+
+
+def _breaches(name: str, text: bytes, schema: str) -> Iterator[str]:
+    """Where one XML file breaks its schema."""
+    import fmpy
+
+    etree: Any = importlib.import_module("lxml.etree")  # has no types
+    rules: Any = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / schema))
+    try:
+        root = etree.fromstring(text, etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:
+        yield f"{name}: {error}"
+        return
+    if not rules.validate(root):
+        for entry in rules.error_log:
+            yield f"{name}, line {entry.line}: {entry.message}"
+
+
+def model_of(files: FmuFiles) -> Any:
+    """FMPy's `ModelDescription` of an FMU that is valid; ModelError if it contradicts itself."""
+    from fmpy.model_description import read_model_description
+
+    with _consistent(files.path):
+        return read_model_description(files.packed(), validate=False)  # type: ignore[arg-type]
+
+
+@contextmanager
+def _consistent(path: Path) -> Iterator[None]:
+    """Whatever goes wrong when the contents of valid XML are put together, as ModelError."""
+    try:
+        yield
+    except ModelError:
+        raise
+    except KeyError as error:
+        what = f"it names {error}, which it does not define"
+    except Exception as error:  # FMPy raises what comes, as AttributeError, TypeError and plain Exception
+        what = str(error) or type(error).__name__
+    else:
+        return
+    raise ModelError(
+        f"{path}: found a {DESCRIPTION} that contradicts itself ({what}), expected a consistent one; "
+        "ask its author for another export"
+    )
+
+
+def describe(files: FmuFiles, model: Any) -> FmuDescription:
+    """FMPy's description as a record; model: its ModelDescription."""
+    with _consistent(files.path):
+        interfaces = tuple(_interfaces(model))
+        sources = {
+            f"sources/{name}"
+            for configuration in model.buildConfigurations
+            for sources in configuration.sourceFileSets
+            for name in sources.sourceFiles
+        }
+        return FmuDescription(
+            path=files.path,
+            fmi=files.fmi,
+            name=model.modelName or "",
+            token=model.instantiationToken or "",
+            description=model.description or "",
+            tool=model.generationTool or "",
+            generated=model.generationDateAndTime or "",
+            author=model.author or "",
+            version=model.version or "",
+            license=model.license or "",
+            interfaces=interfaces,
+            variables=tuple(_variable(variable) for variable in model.modelVariables),
+            outputs=tuple(unknown.variable.name for unknown in model.outputs),
+            states=tuple(
+                unknown.variable.derivative.name
+                for unknown in model.derivatives
+                if unknown.variable.derivative is not None
+            ),
+            dependencies={
+                unknown.variable.name: _names(unknown.dependencies)
+                for unknown in (*model.outputs, *model.derivatives)
+            },
+            indicators=model.numberOfEventIndicators,
+            platforms=_platforms(files.names, {interface.identifier for interface in interfaces}),
+            sources=tuple(sorted(sources)),
+            experiment=_experiment(model.defaultExperiment),
+            terminals=tuple(_terminals(files.terminals)),
+            size=files.size,
+            unpacked=files.unpacked,
+        )
+
+
+def _interfaces(model: Any) -> Iterator[FmuInterface]:
+    for attribute, kind in _KINDS.items():
+        interface = getattr(model, attribute)
+        if interface is not None:
+            capabilities = {
+                field.name: getattr(interface, field.name)
+                for field in type(interface).__attrs_attrs__
+                if field.name != "modelIdentifier"
+            }
+            yield FmuInterface(kind, interface.modelIdentifier, capabilities)
+
+
+def _variable(variable: Any) -> FmuVariable:
+    """One of FMPy's ModelVariable as a record, with unit and limits of its declared type where it has none."""
+    declared = variable.declaredType
+
+    def said(attribute: str) -> Any:
+        own = getattr(variable, attribute)
+        return getattr(declared, attribute) if own is None and declared is not None else own
+
+    least, greatest, nominal = (
+        None if (text := said(attribute)) is None else float(text) for attribute in ("min", "max", "nominal")
+    )
+    return FmuVariable(
+        name=variable.name,
+        reference=variable.valueReference,
+        type=variable.type,
+        causality=variable.causality,
+        variability=variable.variability,
+        initial=variable.initial,
+        start=_value(variable),
+        unit=said("unit") or "",
+        description=variable.description or (declared.description if declared else None) or "",
+        min=least,
+        max=greatest,
+        nominal=nominal,
+        shape=tuple(variable.shape or ()),
+        derivative=None if variable.derivative is None else variable.derivative.name,
+    )
+
+
+def _value(variable: Any) -> Value | None:
+    """The start value in its own type; a tuple for arrays."""
+    if variable.start is None:
+        return None
+    read: Any = str
+    if variable.type in ("Real", "Float32", "Float64"):
+        read = float
+    elif variable.type == "Boolean":
+        read = ("true", "1").__contains__
+    elif variable.type in ("Integer", "Enumeration") or "Int" in variable.type:
+        read = int
+    if variable.dimensions and read is not str:
+        return tuple(read(text) for text in variable.start.split())
+    return read(variable.start)
+
+
+def _names(dependencies: Iterable[Any] | None) -> tuple[str, ...] | None:
+    return None if dependencies is None else tuple(variable.name for variable in dependencies)
+
+
+def _experiment(found: Any) -> FmuExperiment:
+    if found is None:
+        return FmuExperiment()
+    said = (found.startTime, found.stopTime, found.tolerance, found.stepSize)
+    return FmuExperiment(*(None if text is None else float(text) for text in said))
+
+
+def _platforms(names: Iterable[str], identifiers: set[str]) -> tuple[str, ...]:
+    """The platforms that have a binary for each identifier, by the names of FMI 3."""
+    held: dict[str, set[str]] = {}
+    for name in names:
+        parts = name.split("/")
+        if len(parts) == 3 and parts[0] == "binaries":
+            platform = _FOLDERS.get(parts[1], parts[1])
+            suffix = ".dll" if "windows" in platform else ".dylib" if "darwin" in platform else ".so"
+            if parts[2].endswith(suffix):
+                held.setdefault(platform, set()).add(parts[2].removesuffix(suffix))
+    return tuple(sorted(platform for platform, stems in held.items() if identifiers <= stems))
+
+
+def _terminals(text: bytes | None) -> Iterator[FmuTerminal]:
+    if text is None:
+        return
+    for terminal in ElementTree.fromstring(text).iterfind("Terminals/Terminal"):
+        said: Mapping[str, str] = terminal.attrib
+        yield FmuTerminal(
+            said.get("name", ""),
+            said.get("terminalKind", ""),
+            said.get("description", ""),
+            dict(_members(terminal)),
+        )
+
+
+def _members(terminal: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Name of a member, with the names of inner terminals before it, and its variable."""
+    for member in terminal.iterfind("TerminalMemberVariable"):
+        variable = member.get("variableName", "")
+        yield member.get("memberName") or variable, variable
+    for inner in terminal.iterfind("Terminal"):
+        for name, variable in _members(inner):
+            yield f"{inner.get('name', '')}.{name}", variable

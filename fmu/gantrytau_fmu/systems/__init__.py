@@ -1,0 +1,1 @@
+"""Systems of FMUs: co-simulation and SSP."""

@@ -1,0 +1,297 @@
+"""The masters: how components step from one communication point to the next, and how they begin.
+
+Communication points are begin + k step. u_i are the inputs of component i that others drive, y_i its outputs.
+Gauss-Seidel: one after the other; u_i comes from those before at k+1 and from those behind at k.
+Jacobi: all from k. Iteration: u_i is the mean of y(k) and y(k+1), found by repeating the step from saved states, which
+is of second order; sampled components step once, before the others, as a sample is taken when a step begins.
+A component with a step of m points takes it in Jacobi when its interval begins, its outputs being seen when it ends.
+In Gauss-Seidel one that stands before all faster ones steps when its interval begins (a sampled controller holds its
+answer until it ends), the others when the faster ones have come to its end.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from gantrytau.errors import ModelError, SolveError
+from gantrytau_fmu.systems.ordering import is_sampled
+from gantrytau_fmu.systems.system import Drive, System
+
+Order = Literal["gauss-seidel", "jacobi", "iterate"]
+SMALL = 1e-6  # magnitude below which agreement is absolute: noise around zero never agrees relatively
+
+
+class Part(Protocol):
+    """A running component, in this process or in one of its own; see `Slave`."""
+
+    def begin(
+        self, start: Mapping[str, float | str], begin: float, stop: float, tolerance: float | None
+    ) -> None: ...
+    def started(self) -> None: ...
+    def get(self, names: tuple[str, ...]) -> list[float]: ...
+    def set(self, names: tuple[str, ...], values: Sequence[float]) -> None: ...
+    def step(
+        self,
+        time: float,
+        size: float,
+        known: tuple[str, ...],
+        values: Sequence[float],
+        wanted: tuple[str, ...],
+    ) -> list[float]: ...
+    def save(self) -> None: ...
+    def restore(self) -> None: ...
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Communication points begin + k step for k = 0 .. count, the last one at stop."""
+
+    begin: float
+    stop: float
+    step: float
+    count: int
+    even: bool  # whether the last interval is as long as the others
+
+    def time(self, k: int) -> float:
+        return self.stop if k == self.count else self.begin + k * self.step
+
+    def size(self, first: int, last: int) -> float:
+        if last == self.count and not self.even:
+            return self.stop - self.time(first)
+        return (last - first) * self.step
+
+
+def make_grid(begin: float, stop: float, step: float) -> Grid:
+    """The points from begin to stop; the last interval is shorter if the step does not divide the span."""
+    ratio = (stop - begin) / step
+    count = round(ratio)
+    even = count > 0 and abs(ratio - count) < 1e-9 * count  # rounding of decimal steps stays far below
+    return Grid(begin, stop, step, count if even else int(np.ceil(ratio)), even)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How often a component steps: once in `multiple` intervals, `parts` times within one."""
+
+    multiple: int = 1
+    parts: int = 1
+
+
+@dataclass(frozen=True)
+class _Feed:
+    """Where the value of an input comes from: an output of another component, or a function of time."""
+
+    name: str
+    owner: str = ""
+    place: int = 0
+    factor: float = 1.0
+    offset: float = 0.0
+    drive: Drive | None = None
+
+
+class Master:
+    """The running components of a system, with the values that they exchange.
+
+    wanted: names of each component to be read at every point; those that drive others are added.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        parts: Mapping[str, Part],
+        sequence: Sequence[str],
+        paces: Mapping[str, Pace],
+        grid: Grid,
+        wanted: Mapping[str, Sequence[str]],
+    ):
+        self.system, self.parts, self.sequence, self.paces, self.grid = (
+            system,
+            parts,
+            tuple(sequence),
+            paces,
+            grid,
+        )
+        sources = {
+            name: [link.source[1] for link in system.links if link.source[0] == name] for name in parts
+        }
+        self.wanted = {name: tuple(dict.fromkeys([*wanted[name], *sources[name]])) for name in parts}
+        self.feeds = {name: self._feeds(name) for name in parts}
+        self.known = {name: tuple(feed.name for feed in self.feeds[name]) for name in parts}
+        self.sampled = [name for name in self.sequence if is_sampled(system, name)]
+        self.values: dict[str, list[float]] = {}
+        self.pending: dict[int, list[tuple[str, list[float]]]] = {}
+        self.largest: dict[str, np.ndarray] = {}
+
+    def inputs(self, name: str, time: float) -> list[float]:
+        """What drives the inputs `known` of a component now."""
+        return self._driven(name) + self._external(name, time)
+
+    def read(self) -> None:
+        """Read all components."""
+        for name, part in self.parts.items():
+            self.values[name] = part.get(self.wanted[name])
+            self.check(name, self.grid.begin)
+
+    def advance(self, k: int, order: Order, agreement: float, iterations: int) -> None:
+        """From point k to k + 1."""
+        if order == "jacobi":
+            self._jacobi(k)
+        elif order == "gauss-seidel":
+            self._gauss_seidel(k)
+        else:
+            self._iterate(k, agreement, iterations)
+
+    def check(self, name: str, time: float) -> None:
+        """SolveError if a component gave values that are not finite."""
+        if all(map(np.isfinite, self.values[name])):
+            return
+        pairs = zip(self.wanted[name], self.values[name], strict=True)
+        bad = [f"{name}.{scalar} = {value}" for scalar, value in pairs if not np.isfinite(value)]
+        raise SolveError(
+            f"{name}: found {', '.join(bad[:6])} at t = {time:.6g} s, expected finite values; take a shorter step, "
+            "or look at what drives this component",
+            time=time,
+        )
+
+    def _feeds(self, name: str) -> list[_Feed]:
+        links = [link for link in self.system.links if link.target[0] == name]
+        feeds = [
+            _Feed(
+                link.target[1],
+                link.source[0],
+                self.wanted[link.source[0]].index(link.source[1]),
+                link.factor,
+                link.offset,
+            )
+            for link in links
+        ]
+        drives = self.system.drives.items()
+        return feeds + [_Feed(scalar, drive=drive) for (owner, scalar), drive in drives if owner == name]
+
+    def _step(self, name: str, first: int, last: int) -> list[float]:
+        """Step a component over the points from first to last; what others give stays, functions of time go on.
+
+        A function of time is held over a step, or a part of one, at its value in the middle: the mean to second order.
+        """
+        begin, parts, found = self.grid.time(first), self.paces[name].parts, []
+        size = self.grid.size(first, last) / parts
+        for part in range(parts):
+            time = begin + part * size
+            values = self.inputs(name, time + size / 2)
+            found = self.parts[name].step(time, size, self.known[name], values, self.wanted[name])
+        return found
+
+    def _interval(self, name: str, k: int) -> tuple[int, int] | None:
+        """First and last point of the step that a component takes at k, None if it takes none."""
+        multiple = self.paces[name].multiple
+        first = k - k % multiple
+        last = min(first + multiple, self.grid.count)
+        return (first, last) if k + 1 == last or (self._ahead(name) and k == first) else None
+
+    def _ahead(self, name: str) -> bool:
+        """Whether all faster components come later in the sequence."""
+        place, pace = self.sequence.index(name), self.paces[name].multiple
+        return all(self.paces[other].multiple >= pace for other in self.sequence[:place])
+
+    def _gauss_seidel(self, k: int) -> None:
+        for name in self.sequence:
+            interval = self._interval(name, k)
+            if interval is None or (self._ahead(name) and k != interval[0]):
+                continue
+            self.values[name] = self._step(name, *interval)
+            self.check(name, self.grid.time(interval[1]))
+
+    def _jacobi(self, k: int) -> None:
+        for name in self.sequence:
+            if k % self.paces[name].multiple == 0:
+                last = min(k + self.paces[name].multiple, self.grid.count)
+                self.pending.setdefault(last, []).append((name, self._step(name, k, last)))
+        for name, values in self.pending.pop(k + 1, ()):
+            self.values[name] = values
+            self.check(name, self.grid.time(k + 1))
+
+    def _iterate(self, k: int, agreement: float, iterations: int) -> None:
+        """Repeat the step until the outputs at its end are those that the inputs used were made of."""
+        worst = ""
+        for name in self.sampled:  # a sample is taken as the step begins, from what there is then
+            self.values[name] = self._step(name, k, k + 1)
+            self.check(name, self.grid.time(k + 1))
+        repeated = [name for name in self.sequence if name not in self.sampled]
+        before = {name: self._driven(name) for name in repeated}
+        for name in repeated:
+            self.parts[name].save()
+        for sweep in range(iterations):
+            used = {}
+            for name in repeated:
+                if sweep:
+                    self.parts[name].restore()
+                used[name] = self._driven(name)
+                self._implicit_step(name, k, before[name])
+            worst = self._disagreement(used, agreement)
+            if not worst:
+                return
+        raise SolveError(
+            f"co-simulation: after {iterations} iterations at t = {self.grid.time(k):.6g} s the inputs do not agree with "
+            f"the outputs: {worst}; take a shorter step, or allow more iterations",
+            time=self.grid.time(k),
+        )
+
+    def _implicit_step(self, name: str, k: int, before: Sequence[float]) -> None:
+        """A step with the mean of the inputs at both its ends, and the outputs for those at its end."""
+        part, begin, size = self.parts[name], self.grid.time(k), self.grid.size(k, k + 1)
+        after = self._driven(name)
+        mean = [(a + b) / 2 for a, b in zip(before, after, strict=True)]
+        pieces = self.paces[name].parts
+        for piece in range(pieces):
+            time = begin + piece * size / pieces
+            values = mean + self._external(name, time + size / pieces / 2)
+            part.step(time, size / pieces, self.known[name], values, self.wanted[name])
+        part.set(self.known[name], after + self._external(name, self.grid.time(k + 1)))
+        self.values[name] = part.get(self.wanted[name])
+        self.check(name, self.grid.time(k + 1))
+
+    def _driven(self, name: str) -> list[float]:
+        """The inputs of a component that outputs of others drive; they come first in `known`."""
+        feeds = [feed for feed in self.feeds[name] if not feed.drive]
+        return [self.values[feed.owner][feed.place] * feed.factor + feed.offset for feed in feeds]
+
+    def _external(self, name: str, time: float) -> list[float]:
+        """The inputs of a component that functions of time drive."""
+        return [feed.drive(time) for feed in self.feeds[name] if feed.drive]
+
+    def _disagreement(self, used: Mapping[str, list[float]], agreement: float) -> str:
+        """The input that agrees least, with both values, or nothing if all agree."""
+        found: list[tuple[float, str]] = []
+        for name, before in used.items():
+            if not before:
+                continue
+            old, new = np.array(before), np.array(self._driven(name))
+            scale = np.maximum(self.largest.get(name, SMALL), np.maximum(abs(old), abs(new)))
+            self.largest[name] = scale
+            place = int(np.argmax(abs(new - old) / scale))
+            words = f"{name}.{self.known[name][place]} was {old[place]:.6g}, is {new[place]:.6g}"
+            found.append((float(abs(new - old)[place] / scale[place]), words))
+        worst = max(found, default=(0.0, ""))
+        return worst[1] if worst[0] > agreement else ""
+
+
+def paces_of(system: System, step: float, steps: Mapping[str, Any]) -> dict[str, Pace]:
+    """How often each component steps; ModelError for steps that are no multiple and no fraction of `step`."""
+    found = {name: Pace() for name in system.components}
+    for name, own in steps.items():
+        if name not in found:
+            raise ModelError(f"steps: there is no component '{name}'; there is {', '.join(found)}")
+        good = isinstance(own, (int, float, np.number)) and np.isfinite(own) and own > 0
+        ratio = float(own) / step if good else 0.0
+        if good and ratio >= 1 and abs(ratio - round(ratio)) < 1e-9 * ratio:
+            found[name] = Pace(multiple=round(ratio))
+        elif good and ratio < 1 and abs(1 / ratio - round(1 / ratio)) < 1e-9 / ratio:
+            found[name] = Pace(parts=round(1 / ratio))
+        else:
+            raise ModelError(
+                f"steps: {name} has {own!r} s, expected a whole multiple or fraction of the step of {step:g} s"
+            )
+    return found
