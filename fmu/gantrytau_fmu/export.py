@@ -11,7 +11,7 @@ from typing import Literal
 
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau_fmu.building.archive import binary_members, write_fmu
+from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
 from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
@@ -66,6 +66,7 @@ def export_fmu(
     wanted_interfaces = _interfaces(interfaces)
     _check(fmi, solver, tolerance)
     targets = chosen(platforms)
+    check_target(path)
     dae = _translated(model, given, find, states)
     contents = contents_of(dae, _outputs(dae, find))
     name = dae.name

@@ -109,7 +109,7 @@ def _beside_python(folder: Path) -> Iterator[Row]:
         apart = max(abs(a - b) for a, b in zip(ends[""][:3], ends[title][:3], strict=True))
         assert apart < 1e-5  # m after a second: they are the same robot
         ratio, figure = median[title] / median[""], f"the same, times faster than PythonFMU, {title}"
-        if title == FIXED:
+        if title == CONTROLLED:
             yield at_least(figure, round(ratio, 1), 20)
             yield shown("the positions of the two after 1 s, apart", f"{1e9 * apart:.2g} nm")
         else:

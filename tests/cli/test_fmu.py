@@ -144,7 +144,7 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
         (["--fmi", "1.0"], "--fmi 1.0: expected 2.0 or 3.0"),
         (["--interface", "co"], "--interface co: expected both or me or cs"),
         (["--solver", "rodas"], "--solver rodas: expected dopri5 or rodas4; did you mean 'rodas4'?"),
-        (["--to", "cart.zip"], "--to cart.zip: found the suffix '.zip', expected .fmu"),
+        (["--to", "cart.zip"], "--to cart.zip: found the suffix '.zip', expected '.fmu'"),
         (
             ["--to", "no/where/cart.fmu"],
             "--to no/where/cart.fmu: the folder 'no/where' does not exist; create it",
@@ -160,7 +160,7 @@ def test_wrong_options_are_told_before_the_work(fails, asked, cart, arguments, m
 def test_a_folder_is_no_file(fails, asked, cart, tmp_path):
     (tmp_path / "cart.fmu").mkdir()
     message = fails(MISUSE, "fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu")
-    assert "cart.fmu is a folder, expected the name of a file in it" in message
+    assert "cart.fmu: found a folder, expected a file that ends in '.fmu'; name a file in it" in message
 
 
 def test_an_unwritable_folder_is_told(fails, asked, cart, tmp_path, monkeypatch):
@@ -169,7 +169,9 @@ def test_an_unwritable_folder_is_told(fails, asked, cart, tmp_path, monkeypatch)
 
     monkeypatch.setattr(Path, "touch", refuse)
     message = fails(MISUSE, "fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu")
-    assert "cart.fmu: Permission denied; name another place" in message
+    assert (
+        "cart.fmu: cannot be written (Permission denied), expected a folder that may be written to" in message
+    )
     assert list(tmp_path.glob("*.fmu")) == []
 
 

@@ -3,10 +3,12 @@
 import json
 import random
 import re
+import struct
 
 import pytest
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau_fmu.building.archive import universal
 from gantrytau_fmu.reading.reading import read_fmu
 from tests.fmu.tiny_fmus import BUILD, FMI2, FMI3, TERMINALS, lag2, lag3, pack
 
@@ -81,6 +83,27 @@ def test_platforms_have_a_binary_for_each_interface(path):
         pack(path, {"modelDescription.xml": FMI2} | {f"binaries/{name}": b"" for name in binaries})
     )
     assert fmu.platforms == ("x86-linux", "x86_64-darwin", "x86_64-linux", "x86_64-windows")
+
+
+ELF_ARM = b"\x7fELF".ljust(18) + struct.pack("<H", 183)
+PE_ARM = b"MZ".ljust(0x3C) + struct.pack("<I", 0x40) + b"PE\0\0" + struct.pack("<H", 0xAA64)
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "platforms"),
+    [
+        ("linux64/lag.so", ELF_ARM, ("aarch64-linux",)),
+        ("linux64/lag.so", ELF_ARM[:10], ("x86_64-linux",)),
+        ("win64/lag.dll", PE_ARM, ("aarch64-windows",)),
+        ("darwin64/lag.dylib", universal(b"", b""), ("aarch64-darwin", "x86_64-darwin")),
+        ("darwin64/lag.dylib", struct.pack("<2I", 0xFEEDFACF, 0x0100000C), ("aarch64-darwin",)),
+        ("darwin64/lag.dylib", b"?", ("x86_64-darwin",)),
+    ],
+)
+def test_a_folder_of_fmi_2_says_the_system_and_the_library_its_processors(path, name, head, platforms):
+    assert (
+        read_fmu(pack(path, {"modelDescription.xml": FMI2, f"binaries/{name}": head})).platforms == platforms
+    )
 
 
 def test_it_prints_itself(path):

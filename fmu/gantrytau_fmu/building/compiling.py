@@ -92,7 +92,7 @@ def compiler(platform: Platform) -> list[str]:
     elif not has_zig:
         raise ModelError(
             f"{platform.name}: found no package ziglang, expected it for every platform but 'native'; "
-            "pip install 'gantrytau[cross]', or take platforms=('native',)"
+            "pip install 'gantrytau[cross]', or take 'native' alone"
         )
     target = ["-target", platform.target] if platform.target else ["-mcpu=baseline"]
     return [sys.executable, "-m", "ziglang", "cc", *target]

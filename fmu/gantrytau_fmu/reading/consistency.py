@@ -5,7 +5,6 @@ FMI 2.0.4, sections 2.2 and 2.3; FMI 3.0.2, sections 2.4 and 2.5.
 
 import math
 import re
-import struct
 from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
@@ -13,15 +12,8 @@ from xml.etree import ElementTree
 from gantrytau_fmu.building.platforms import ALIASES, native
 from gantrytau_fmu.reading.checking import Finding
 from gantrytau_fmu.reading.described import FmuDescription, FmuVariable
+from gantrytau_fmu.reading.libraries import misplaced
 from gantrytau_fmu.reading.reading import FmuFiles
-from gantrytau_fmu.reading.safety import open_archive
-
-_HEADS = {  # first bytes of binaries: system -> words, magic numbers
-    "linux": ("ELF", (b"\x7fELF",)),
-    "windows": ("PE", (b"MZ",)),
-    "darwin": ("Mach-O", (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe")),
-}
-_MACHINES = {"x86_64": 62, "aarch64": 183, "x86": 3}  # of ELF
 
 
 def inconsistencies(fmu: FmuDescription, files: FmuFiles, model: Any) -> Iterator[Finding]:
@@ -207,28 +199,9 @@ def _binaries(fmu: FmuDescription, files: FmuFiles) -> Iterator[Finding]:
         remedy = "it can be compiled from its sources" if fmu.sources else "ask for an export for it"
         yield Finding("warning", f"it has no binary for this machine ({here}); {remedy}")
     identifiers = {interface.identifier for interface in fmu.interfaces}
-    with open_archive(files.path, verify=False) as archive:
-        for name in archive.names:
-            parts = name.split("/")
-            if parts[0] != "binaries" or len(parts) != 3:
-                continue
-            if fmu.fmi == "3.0" and parts[1] in ALIASES:
-                yield Finding("error", f"{name}: FMI 3 calls this folder {ALIASES[parts[1]]}")
-            if parts[2].rpartition(".")[0] in identifiers:
-                head = next(iter(archive.chunks(name)), b"")
-                yield from _head(name, ALIASES.get(parts[1], parts[1]), head)
-
-
-def _head(name: str, platform: str, head: bytes) -> Iterator[Finding]:
-    """Whether a binary is what its folder says."""
-    processor, _, system = platform.partition("-")
-    words, magic = _HEADS.get(system, ("", ()))
-    if magic and not head.startswith(magic):
-        yield Finding("error", f"{name}: this is no {words} file, expected a shared library for {platform}")
-    elif system == "linux" and len(head) >= 20 and processor in _MACHINES:
-        (machine,) = struct.unpack_from("<H", head, 18)
-        if machine != _MACHINES[processor]:
-            yield Finding(
-                "error",
-                f"{name}: this library is for another processor (ELF machine {machine}), expected {platform}",
-            )
+    for name, head in files.libraries.items():
+        _, folder, file = name.split("/")
+        if fmu.fmi == "3.0" and folder in ALIASES:
+            yield Finding("error", f"{name}: FMI 3 calls this folder {ALIASES[folder]}")
+        if file.rpartition(".")[0] in identifiers and (problem := misplaced(folder, head)):
+            yield Finding("error", f"{name}: {problem}")

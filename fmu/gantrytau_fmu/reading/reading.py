@@ -13,7 +13,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.building.platforms import ALIASES
 from gantrytau_fmu.reading.described import (
     FmuDescription,
     FmuExperiment,
@@ -22,6 +21,7 @@ from gantrytau_fmu.reading.described import (
     FmuVariable,
     Value,
 )
+from gantrytau_fmu.reading.libraries import HEAD, platforms_of
 from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive
 
 __all__ = [
@@ -42,12 +42,14 @@ _KINDS = {
     "coSimulation": "co-simulation",
     "scheduledExecution": "scheduled-execution",
 }
-_FOLDERS = ALIASES | {"linux32": "x86-linux", "win32": "x86-windows", "darwin32": "x86-darwin"}
 
 
 @dataclass(frozen=True)
 class FmuFiles:
-    """What of an archive describes it: its XML files, checked and of a known version, and the names of all."""
+    """What of an archive describes it: its XML files, checked and of a known version, and the names of all.
+
+    libraries: the first bytes of what stands in the folders of binaries, by name.
+    """
 
     path: Path
     fmi: str  # "2.0" or "3.0"
@@ -55,6 +57,7 @@ class FmuFiles:
     build: bytes | None
     terminals: bytes | None
     names: tuple[str, ...]
+    libraries: Mapping[str, bytes]
     size: int
     unpacked: int
 
@@ -94,9 +97,14 @@ def read_files(path: str | os.PathLike[str]) -> FmuFiles:
             archive.xml(name) if name in archive.names else None for name in (BUILD, TERMINALS)
         )
         names, unpacked = archive.names, archive.size
+        libraries = {
+            name: next(iter(archive.chunks(name)), b"")[:HEAD]
+            for name in names
+            if name.startswith("binaries/") and name.count("/") == 2 and not name.endswith("/")
+        }
     path = Path(path)
     fmi = _version(path, description)
-    return FmuFiles(path, fmi, description, build, terminals, names, path.stat().st_size, unpacked)
+    return FmuFiles(path, fmi, description, build, terminals, names, libraries, path.stat().st_size, unpacked)
 
 
 def _version(path: Path, description: bytes) -> str:
@@ -200,7 +208,7 @@ def describe(files: FmuFiles, model: Any) -> FmuDescription:
                 for unknown in (*model.outputs, *model.derivatives)
             },
             indicators=model.numberOfEventIndicators,
-            platforms=_platforms(files.names, {interface.identifier for interface in interfaces}),
+            platforms=_platforms(files.libraries, {interface.identifier for interface in interfaces}),
             sources=tuple(sorted(sources)),
             experiment=_experiment(model.defaultExperiment),
             terminals=tuple(_terminals(files.terminals)),
@@ -277,16 +285,15 @@ def _experiment(found: Any) -> FmuExperiment:
     return FmuExperiment(*(None if text is None else float(text) for text in said))
 
 
-def _platforms(names: Iterable[str], identifiers: set[str]) -> tuple[str, ...]:
+def _platforms(libraries: Mapping[str, bytes], identifiers: set[str]) -> tuple[str, ...]:
     """The platforms that have a binary for each identifier, by the names of FMI 3."""
     held: dict[str, set[str]] = {}
-    for name in names:
-        parts = name.split("/")
-        if len(parts) == 3 and parts[0] == "binaries":
-            platform = _FOLDERS.get(parts[1], parts[1])
+    for name, head in libraries.items():
+        _, folder, file = name.split("/")
+        for platform in platforms_of(folder, head):
             suffix = ".dll" if "windows" in platform else ".dylib" if "darwin" in platform else ".so"
-            if parts[2].endswith(suffix):
-                held.setdefault(platform, set()).add(parts[2].removesuffix(suffix))
+            if file.endswith(suffix):
+                held.setdefault(platform, set()).add(file.removesuffix(suffix))
     return tuple(sorted(platform for platform, stems in held.items() if identifiers <= stems))
 
 

@@ -11,8 +11,8 @@ from gantrytau.commands.choice import source_of
 from gantrytau.commands.fmu.info import counted
 from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
-from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting, writable
-from gantrytau.errors import did_you_mean
+from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting
+from gantrytau.errors import ModelError, did_you_mean
 
 INTERFACES = {
     "both": ("model-exchange", "co-simulation"),
@@ -89,7 +89,7 @@ def export(
         }
         chosen = build(model, prototype, set_ or ())
         file = to or Path(f"{chosen.name}.fmu")
-        _rehearse(file)
+        _check(file)
         begin = time.perf_counter()
         told = _exported(chosen, file, policy)
         _show(chosen, file, time.perf_counter() - begin, told, json)
@@ -105,23 +105,14 @@ def _proposed(found: str, expected: Any) -> str:
     return words if "did you mean" in words else ""
 
 
-def _rehearse(file: Path) -> None:
+def _check(file: Path) -> None:
     """Find out before the work whether the file can be written; CommandError if not."""
-    from gantrytau.result_files import replacing
+    from gantrytau_fmu.building.archive import check_target
 
-    if file.suffix.lower() != ".fmu":
-        raise CommandError(f"--to {file}: found the suffix '{file.suffix}', expected .fmu")
-    if not file.parent.is_dir():
-        raise CommandError(
-            f"--to {file}: the folder '{file.parent}' does not exist; create it, or name another one"
-        )
-    trial = file.with_name(f".{file.stem}.trial.fmu")
-    with writable(file):
-        try:
-            with replacing(trial) as partial:
-                partial.touch()
-        finally:
-            trial.unlink(missing_ok=True)
+    try:
+        check_target(file)
+    except ModelError as error:
+        raise CommandError(f"--to {error}") from error
 
 
 def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
