@@ -12,7 +12,7 @@ from gantrytau_fmu.code.formulas import Formulas, column, numbers_of
 from gantrytau_fmu.code.operations import number_text
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
-SELDOM = {"gt_outputs", "gt_starts", "gt_initial", "gt_forward", "gt_by_parameters"}
+SELDOM = {"gt_outputs", "gt_starts", "gt_initial", "gt_forward", "gt_by_parameters", "gt_initial_slopes"}
 ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
 
 
@@ -119,6 +119,7 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[CFunction]:
         "gt_samples": formulas.samples,
         "gt_forward": _along(everything, point, way),
         "gt_by_parameters": _along(everything, s["p"], s["dp"]),
+        "gt_initial_slopes": _along(formulas.initial, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])),
     }
     for k, block in enumerate(formulas.blocks):
         named[f"gt_residual_{k}"] = block.residual

@@ -20,7 +20,7 @@ static gt_status gt_factors(gt_instance *it) {
 }
 
 /* dz that keeps all residuals at zero, then g; blocks must be factored. */
-static void gt_along(gt_instance *it, int parameters) {
+static void gt_along_states(gt_instance *it, int parameters) {
     double step[GT_LARGEST_BLOCK_ROOM];
     int number;
     memset(it->dz, 0, sizeof it->dz);
@@ -40,6 +40,36 @@ static void gt_clear_direction(gt_instance *it) {
     memset(it->dp, 0, sizeof it->dp);
 }
 
+/* Before initialisation ends, the states that initial equations determine are unknowns. */
+static int gt_starts_follow(const gt_instance *it) {
+    return GT_INITIAL > 0 && it->mode == GT_INITIALIZATION;
+}
+
+static gt_status gt_initial_factors(gt_instance *it) {
+    int j;
+    for (j = 0; j < GT_INITIAL; j++) {
+        gt_clear_direction(it);
+        it->dx[gt_initial_states[j]] = 1;
+        gt_along_states(it, 0);
+        gt_initial_slopes(it->a, it->initial + j * GT_INITIAL, it->w);
+    }
+    if (gt_factor(GT_INITIAL, it->initial, it->initial_pivots, it->initial_scales)) return GT_OK;
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the initial equations do not determine %s%s at time = %.9g s; check start values, inputs "
+                  "and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
+}
+
+/* g in the direction that is seeded; as long as initial equations hold, dx that keeps them at zero as well. */
+static void gt_along(gt_instance *it, int parameters) {
+    double step[GT_ROOM(GT_INITIAL)];
+    int i;
+    gt_along_states(it, parameters);
+    if (!gt_starts_follow(it)) return;
+    gt_initial_slopes(it->a, step, it->w);
+    gt_solve_factored(GT_INITIAL, it->initial, it->initial_pivots, it->initial_scales, step);
+    for (i = 0; i < GT_INITIAL; i++) it->dx[gt_initial_states[i]] = -step[i];
+    gt_along_states(it, parameters);
+}
+
 static gt_status gt_ready(gt_instance *it) {
     gt_status status = gt_present(it);
     if (status == GT_OK) status = gt_refresh(it);
@@ -47,6 +77,7 @@ static gt_status gt_ready(gt_instance *it) {
         status = gt_factors(it);
         it->factors_stale = status != GT_OK;
     }
+    if (status == GT_OK && gt_starts_follow(it)) status = gt_initial_factors(it);
     return status;
 }
 
@@ -65,7 +96,11 @@ static double *gt_seed(gt_instance *it, unsigned reference) {
     if (gt_known_reference(it, reference) != GT_OK) return NULL;
     switch ((gt_kind)gt_variables[reference].kind) {
     case GT_TIME: return &it->dt;
-    case GT_STATE: return it->dx + gt_variables[reference].index;
+    case GT_STATE:
+        if (!gt_variables[reference].fixed || !gt_starts_follow(it)) return it->dx + gt_variables[reference].index;
+        gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: %s is no known before initialisation ends, for it follows from initial equations; take "
+               "what they depend on", GT_NAME, gt_name(reference));
+        return NULL;
     case GT_INPUT: case GT_HELD: return it->du + gt_variables[reference].index;
     case GT_PARAMETER: return it->dp + gt_variables[reference].index;
     default:

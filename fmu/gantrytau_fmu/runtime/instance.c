@@ -25,6 +25,7 @@ typedef struct {
     double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
     /* determinants of the blocks where they were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_BLOCKS)], kept_time, kept_sides[GT_ROOM(GT_BLOCKS)], side_rates[GT_ROOM(GT_BLOCKS)];
+    double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)]; /* there, in Model Exchange */
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
     int ready;     /* the experiment is set up */
@@ -47,6 +48,9 @@ struct gt_instance {
     double scales[GT_ROOM(GT_ALGEBRAICS)];
     double dt, dx[GT_ROOM(GT_STATES)], du[GT_ROOM(GT_KNOWN)], dz[GT_ROOM(GT_ALGEBRAICS)], dp[GT_ROOM(GT_PARAMETERS)];
     double g[GT_ROOM(GT_SLOPES)];
+    /* slopes of the initial equations by the states that they determine, factored */
+    double initial[GT_ROOM(GT_INITIAL * GT_INITIAL)], initial_scales[GT_ROOM(GT_INITIAL)];
+    int initial_pivots[GT_ROOM(GT_INITIAL)];
     double k[7][GT_ROOM(GT_STATES)], trial[GT_ROOM(GT_STATES)], next[GT_ROOM(GT_STATES)];
     double jacobian[GT_ROOM(GT_STATES * GT_STATES)], rate_of_time[GT_ROOM(GT_STATES)];
     int order[GT_ROOM(GT_STATES)];
