@@ -11,7 +11,7 @@ demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
 
 test: lint
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile
 
 bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
