@@ -123,7 +123,7 @@ class Running:
 
 def export(model: Model | Dae, path: Path, version: Literal[2, 3] = 3, **options: Any) -> Exported:
     """Export a model, whose file name is `path`."""
-    keep = {k: options.pop(k) for k in ("given", "find", "states") if k in options}
+    keep = {k: options.pop(k) for k in ("given", "states") if k in options}
     dae = model if isinstance(model, Dae) else translate(model, events=True, **keep)
     export_fmu(dae, path, fmi="2.0" if version == 2 else "3.0", **options)
     return Exported(path, dae, version)
