@@ -297,19 +297,19 @@ def _terminals(builder: _Builder) -> dict[str, dict[str, int]]:
 class Dependencies:
     """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
 
-    rates, outputs, samples: boolean rows over (states, inputs, parameters).
+    rates, outputs, samples: boolean rows over (time, states, inputs, parameters).
     """
 
     def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
         arrays = formulas.arrays
         held, inputs = len(formulas.held), len(formulas.inputs)
-        sizes = [arrays["x"].numel(), inputs + held, arrays["p"].numel()]
+        sizes = [1, arrays["x"].numel(), inputs + held, arrays["p"].numel()]
         z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
         place = 0
         for block in formulas.blocks:
             z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
             place += len(block.names)
-        own = slice(sizes[0] + inputs, sizes[0] + inputs + held)
+        own = slice(1 + sizes[1] + inputs, 1 + sizes[1] + inputs + held)
         samples = self._rows(formulas, formulas.samples, z)
         for _ in range(held):  # what is held may depend on what is held
             samples |= samples[:, own] @ samples
@@ -322,16 +322,16 @@ class Dependencies:
 
     @staticmethod
     def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
-        """Dependence of a vector on (x, u, p), directly and through z."""
+        """Dependence of a vector on (t, x, u, p), directly and through z."""
         arrays = formulas.arrays
         function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
-        places = [list(arrays).index(n) for n in "xupz"]
+        places = [list(arrays).index(n) for n in "txupz"]
         patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
-        x, u, p, through = [
+        *direct, through = [
             found.reshape(expression.numel(), arrays[n].numel())
-            for n, found in zip("xupz", patterns, strict=True)
+            for n, found in zip("txupz", patterns, strict=True)
         ]
-        return np.hstack([x, u, p]) | through @ z
+        return np.hstack(direct) | through @ z
 
 
 def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
@@ -345,7 +345,7 @@ def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
         return depends.samples[entry.index - len(formulas.inputs)]
     row = np.zeros(depends.outputs.shape[1], dtype=bool)
     if entry.kind == "STATE":
-        row[entry.index] = True
+        row[1 + entry.index] = True
     return row
 
 
@@ -354,8 +354,8 @@ def _structure(
 ) -> dict[str, tuple[Unknown, ...]]:
     """Outputs, derivatives and initial unknowns, each with what it depends on."""
     formulas, found = builder.formulas, builder.places_of
-    count = len(formulas.states) + len(formulas.inputs)
-    names = (*formulas.states, *formulas.inputs, *formulas.parameters)
+    count = 1 + len(formulas.states) + len(formulas.inputs)
+    names = ("time", *formulas.states, *formulas.inputs, *formulas.parameters)
     references = np.array([found[n] for n in names], dtype=int)
     solved = {formulas.states[k] for k in formulas.initial_states}
     first = np.array([n not in solved for n in names], dtype=bool)
