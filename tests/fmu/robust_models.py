@@ -80,6 +80,8 @@ MAKERS = {
     "lags": lambda: (Lags(), {}),
     # three equal sides and one that fits: a parallelogram, singular where it is flat
     "parallelogram": lambda: (FourBar(1.0, 0.3, 1.0, 0.3), {}),
+    # next to it: the crank turns round, and the loop is almost straight twice a turn
+    "nearly_flat": lambda: (FourBar(1.0, 0.3, 1.001, 0.302), {}),
     "robot": lambda: (GantryTau(prototypes.L1), {}),
     "inverse": lambda: (GantryTau(prototypes.L1), {"given": ["tool.r"]}),
     "six_link": lambda: (SixLinkGantryTau(prototypes.D1), {}),

@@ -66,8 +66,7 @@ static gt_status gt_initialize(gt_instance *it) {
     if (status == GT_OK) status = gt_refresh(it);
     if (status != GT_OK) return status;
     it->now.initialized = 1;
-    it->now.kept_time = it->now.time;
-    memcpy(it->now.kept_sides, it->now.sides, sizeof it->now.sides);
+    gt_keep_point(it);
     memset(it->now.side_rates, 0, sizeof it->now.side_rates);
     memset(it->now.ticks, 0, sizeof it->now.ticks);
     status = gt_check_clocks(it);

@@ -1,6 +1,8 @@
 /* Co-Simulation: from one communication point to the next, with control of the error and events on the way. */
 
+#ifndef GT_MOST_STEPS
 #define GT_MOST_STEPS 20000
+#endif
 #define GT_MOST_EVENTS 1000
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
@@ -69,6 +71,11 @@ static gt_status gt_too_short(gt_instance *it, double h) {
                   GT_NAME, h, it->now.time, gt_x_names[gt_fastest(it)]);
 }
 
+/* The unknowns of a trial that was rejected may be so far on that a shorter one would find another solution from there. */
+static void gt_step_back(gt_instance *it) {
+    memcpy(it->now.z, it->now.solved_z, sizeof it->now.z);
+}
+
 /* Integrate to `end`, or to an event before; *event tells which. */
 static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event) {
     double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
@@ -90,6 +97,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
         if (!(norm <= 1)) {
             h = size * (norm < INFINITY ? fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER)) : 0.25);
             rejected = 1;
+            gt_step_back(it);
             if (!(h > shortest)) return gt_too_short(it, h);
             continue;
         }
@@ -98,6 +106,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
             it->now.time = t;
             h = 0.25 * size;
             rejected = 1;
+            gt_step_back(it);
             if (!(h > shortest)) return gt_too_short(it, h);
             continue;
         }
@@ -148,7 +157,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
             status = gt_integrate(it, next < end - GT_ON_TIME * size ? next : end, &count, &event);
         if (!event && it->now.time >= end) break;
     }
-    if (status != GT_OK && !it->now.stale) memcpy(it->now.z, it->now.solved_z, sizeof it->now.z); /* not those of a trial */
+    if (status != GT_OK && !it->now.stale) gt_step_back(it);
     it->time = it->now.time;
     *reached = it->now.time;
     if (status == GT_DISCARD) status = gt_too_short(it, it->now.size);
