@@ -287,7 +287,7 @@ static void by_bytes(slot *s) {
                         : CALL(fmi3SerializeFMUState, s->saved, (fmi3Byte *)bytes, told)) told = size;
     else if (told != size) stop("Serialize", "takes a wrong size");
     else {
-        const int damage = chance(50);
+        const int damage = chance(50) && !s->corrupt; /* the same bit twice would be no damage */
         if (damage) bytes[chance(20) ? below(40) : below((unsigned)size)] ^= (char)(1 << below(8));
         if ((s->version == 2 ? CALL(fmi2DeSerializeFMUstate, bytes, size, &s->saved)
                              : CALL(fmi3DeserializeFMUState, (fmi3Byte *)bytes, size, &s->saved)) < GT_DISCARD)
