@@ -213,3 +213,16 @@ def test_too_many_events_are_an_error():
     assert instance.step(0.0, 1.0) == ERROR
     told(instance, "more than 1000 events in one communication step")
     instance.free()
+
+
+@VERSIONS
+def test_what_follows_from_others_is_not_set(version):
+    """An output, a derivative, a state while stepping: a pose cannot be forced upon the mechanism."""
+    references, instance = fresh("parallelogram", version)
+    assert instance.start() == OK
+    before = instance.get(*references.values())
+    for name in ("rocker.phi", "der(crank.w)", "crank.phi"):
+        assert instance.set(references[name], 0.5) == ERROR
+        told(instance, f"{name} cannot be set: it is ")
+    assert instance.get(*references.values()) == before
+    instance.free()
