@@ -50,6 +50,20 @@ class Settled(Model):
         yield der(self.x) == 0
 
 
+class Undetermined(Model):
+    """At rest at x = 1; with b = 1 and u = 0 by a double root, which does not say how it moves with u."""
+
+    b = Parameter(0.0, description="from a line to a parabola")
+    u = Input(description="input", start=1.0)
+    x = Real(description="state")
+
+    def equations(self):
+        yield der(self.x) == self.u - (1 - self.b) * self.x - self.b * (self.x - 1) ** 2
+
+    def initial_equations(self):
+        yield der(self.x) == 0
+
+
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
 def version(request):
     return request.param
@@ -276,3 +290,18 @@ def test_initial_equations_that_are_not_linear_and_hold_for_implicit_unknowns(tm
         run["u"], run["b"] = u, b
         assert run[["x", "z"]] == pytest.approx([x, z], rel=1e-12)
         assert columns(run, unknown, known) == pytest.approx(np.array(wanted), rel=1e-12, abs=1e-14)
+
+
+def test_initial_equations_that_do_not_say_how_a_state_moves_are_an_error(tmp_path):
+    fmu = export(Undetermined(), tmp_path / "undetermined.fmu")
+    x, u = ([fmu.references[n]] for n in "xu")
+    with fmu.new() as run:
+        run.enter()
+        assert columns(run, x, u) == pytest.approx(1.0, rel=1e-14)
+        run["b"], run["u"] = 1.0, 0.0
+        assert run["x"] == 1.0
+        n, found = c_size_t(1), reals([0.0])
+        arguments = (integers(x), n, integers(u), n, reals([1.0]), n, found, n)
+        for name in ("GetDirectionalDerivative", "GetAdjointDerivative"):
+            assert run.instance(name, *arguments) == ERROR
+            assert "the initial equations do not determine x at time = 0 s" in run.instance.message
