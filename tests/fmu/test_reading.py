@@ -56,6 +56,23 @@ def test_the_variables_of_fmi_2(path):
     assert [fmu.variable(name).start for name in ("k", "on", "file")] == [3, True, "a.txt"]
 
 
+@pytest.mark.parametrize("said", [True, False])
+def test_derivatives_of_fmi_3_have_names_of_their_own(path, said):
+    words = "".join(
+        f' provides{kind}="{str(said).lower()}"'
+        for kind in ("DirectionalDerivatives", "AdjointDerivatives", "PerElementDependencies")
+    )
+    fmu = read_fmu(lag3(path, FMI3.replace("<CoSimulation", f"<CoSimulation{words}")))
+    names = ("providesDirectionalDerivatives", "providesDirectionalDerivative", "providesAdjointDerivatives")
+    for name in (*names, "providesPerElementDependencies"):
+        assert fmu.interface("co-simulation").capabilities[name] is said
+        assert fmu.interface("model-exchange").capabilities[name] is False
+    two = FMI2.replace("<CoSimulation", '<CoSimulation providesDirectionalDerivative="true"')
+    found = read_fmu(lag2(path, two)).interface("co-simulation").capabilities
+    assert found["providesDirectionalDerivative"] is True
+    assert "providesDirectionalDerivatives" not in found
+
+
 def test_an_fmu_of_fmi_3_is_described(path):
     fmu = read_fmu(lag3(path))
     assert (fmu.fmi, fmu.token, fmu.indicators) == ("3.0", "{lag-3}", 1)

@@ -44,7 +44,10 @@ class FmuVariable:
 
 @dataclass(frozen=True)
 class FmuInterface:
-    """A way to run an FMU: kind, the identifier in the names of its binaries, and its capabilities by name."""
+    """A way to run an FMU: kind, the identifier in the names of its binaries, and its capabilities by name.
+
+    Directional derivatives of FMI 3 stand under its name and under that of FMI 2, so that one name is there for both.
+    """
 
     kind: str  # model-exchange, co-simulation or scheduled-execution
     identifier: str

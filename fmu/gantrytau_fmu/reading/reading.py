@@ -37,6 +37,7 @@ __all__ = [
 BUILD = "sources/buildDescription.xml"
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 _SHOWN = 3  # problems of a model description that a message lists
+_DIRECTIONAL = "providesDirectionalDerivatives"  # of FMI 3
 _KINDS = {
     "modelExchange": "model-exchange",
     "coSimulation": "co-simulation",
@@ -177,7 +178,7 @@ def _consistent(path: Path) -> Iterator[None]:
 def describe(files: FmuFiles, model: Any) -> FmuDescription:
     """FMPy's description as a record; model: its ModelDescription."""
     with _consistent(files.path):
-        interfaces = tuple(_interfaces(model))
+        interfaces = tuple(_interfaces(files, model))
         sources = {
             f"sources/{name}"
             for configuration in model.buildConfigurations
@@ -217,7 +218,9 @@ def describe(files: FmuFiles, model: Any) -> FmuDescription:
         )
 
 
-def _interfaces(model: Any) -> Iterator[FmuInterface]:
+def _interfaces(files: FmuFiles, model: Any) -> Iterator[FmuInterface]:
+    """The interfaces; FMPy knows directional derivatives under the name of FMI 2 only, FMI 3 has a plural."""
+    root = ElementTree.fromstring(files.description)
     for attribute, kind in _KINDS.items():
         interface = getattr(model, attribute)
         if interface is not None:
@@ -226,6 +229,10 @@ def _interfaces(model: Any) -> Iterator[FmuInterface]:
                 for field in type(interface).__attrs_attrs__
                 if field.name != "modelIdentifier"
             }
+            element = root.find(attribute[0].upper() + attribute[1:])
+            if files.fmi == "3.0" and element is not None:
+                said = element.get(_DIRECTIONAL, "").strip() in ("true", "1")
+                capabilities |= {_DIRECTIONAL: said, _DIRECTIONAL.removesuffix("s"): said}
             yield FmuInterface(kind, interface.modelIdentifier, capabilities)
 
 
