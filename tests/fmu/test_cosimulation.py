@@ -273,7 +273,17 @@ def test_wrong_connections_are_refused(halves, wires, words):
         (dict(iterations=0), r"found iterations=0"),
         (dict(start={"a.q": 1.0}), r"a has no variable 'q'"),
         (dict(start={"a.k": np.nan}), r"start a\.k: found nan, expected 1 finite number"),
-        (dict(start={"a.x": 1.0}), r"start a\.x is a continuous output that is calculated"),
+        (
+            dict(start={"a.x": 1.0}),
+            r"start a\.x is a continuous output that is calculated, expected .*, of which this FMU has none",
+        ),
+        (
+            dict(start={"a.k.start": 1.0}),
+            r"start a\.k\.start: found no such variable; in an FMU write start=\{'a\.k': 1\.0\}",
+        ),
+        (dict(start={"a.q.start": 1.0}), r"start a\.q\.start: a has no variable 'q\.start'"),
+        (dict(inputs={"a.qq": 1.0}), r"inputs a\.qq: a has no variable 'qq'; its inputs are f\."),
+        (dict(inputs={"a.ff": 1.0}), r"inputs a\.ff: a has no variable 'ff'; did you mean 'f'\?"),
         (dict(inputs={"a.k": 1.0}), r"inputs a\.k is a parameter, expected an input"),
         (dict(inputs={"b.u": 1.0}), r"b\.u is driven by a\.x and by inputs"),
         (dict(outputs=["a.y"]), r"a has no variable 'y'"),
@@ -298,6 +308,10 @@ def test_wrong_settings_are_refused(halves, policy, words):
         (([1.0, 0.0], [0.0, 1.0]), r"rise strictly"),
         (lambda t: np.nan, r"inputs a\.f at t = 0 s: found nan"),
         ("much", r"inputs a\.f: found 'much', expected a number"),
+        (
+            lambda t: 1 / (t - 0.45),
+            r"inputs a\.f: the function failed at t = 0\.45 s with ZeroDivisionError: .*; expected a value at every",
+        ),
     ],
 )
 def test_wrong_signals_are_refused(halves, samples, words):

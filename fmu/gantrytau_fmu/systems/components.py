@@ -11,6 +11,7 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.result import split_element
 
 KINDS = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean", "String": "text"}
+SETTABLE = ("parameter", "structuralParameter", "input", "output", "local")
 INTEGERS = re.compile(r"U?Int\d+|Integer|Enumeration")
 
 
@@ -19,7 +20,8 @@ class Scalar:
     """A scalar variable, or one element of an array of FMI 3.
 
     kind: "real", "integer", "boolean", "text", or the type's name if it can only be left alone; type: as FMI names
-    it; place: in the array of that reference, which has `size` elements; start: as in the file, None without.
+    it; place: in the array of that reference, which has `size` elements; start: as in the file, None without;
+    min, max: limits, None without.
     """
 
     name: str
@@ -34,6 +36,16 @@ class Scalar:
     unit: str = ""
     description: str = ""
     start: str | None = None
+    min: float | None = None
+    max: float | None = None
+
+    @property
+    def has_start(self) -> bool:
+        """Whether its value can be chosen before initialisation."""
+        calculated = self.initial == "calculated" or (
+            self.causality in ("output", "local") and not self.start
+        )
+        return self.variability != "constant" and self.causality in SETTABLE and not calculated
 
 
 @dataclass(frozen=True)
@@ -62,8 +74,11 @@ class Component:
     stop: float | None = None
     step: float | None = None
 
-    def expand(self, name: str) -> tuple[str, ...]:
-        """The scalars that a name stands for: itself, or the elements of a vector in their order; ModelError if none."""
+    def expand(self, name: str, causality: str = "") -> tuple[str, ...]:
+        """The scalars that a name stands for: itself, or the elements of a vector in their order; ModelError if none.
+
+        causality: what the message proposes, if only such variables are of use.
+        """
         if name in self.scalars:
             return (name,)
         found = []
@@ -72,7 +87,7 @@ class Component:
             if element and element[0] == name:
                 found.append((element[1], scalar))
         if not found:
-            raise ModelError(f"{self.name} has no variable '{name}'{did_you_mean(name, self._choice())}")
+            raise ModelError(f"{self.name} has no variable '{name}'{self._proposed(name, causality)}")
         return tuple(scalar for _, scalar in sorted(found))
 
     def of(self, *causalities: str) -> tuple[str, ...]:
@@ -91,9 +106,14 @@ class Component:
             "local",
         )
 
-    def _choice(self) -> list[str]:
-        elements = [split_element(name) for name in self.scalars]
-        return list(dict.fromkeys([*self.scalars, *(element[0] for element in elements if element)]))
+    def _proposed(self, name: str, causality: str) -> str:
+        """The end of a message on an unknown name: what it may have meant, or the names that there are."""
+        scalars = [scalar for scalar, known in self.scalars.items() if causality in ("", known.causality)]
+        if not scalars:
+            return f"; it has no {causality or 'variable'}"
+        vectors = [element[0] for scalar in scalars if (element := split_element(scalar))]
+        proposed = did_you_mean(name, dict.fromkeys([*scalars, *vectors]))
+        return proposed.replace("; there is", f"; its {causality}s are") if causality else proposed
 
 
 def numeric(scalar: Scalar) -> bool:
@@ -169,7 +189,12 @@ def _scalars(variable: Any) -> list[Scalar]:
     shape = tuple(int(size) for size in variable.shape or ()) if variable.dimensions else ()
     places = list(product(*(range(size) for size in shape)))
     starts = (variable.start or "").split() if shape else [variable.start]
-    unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
+    declared = variable.declaredType
+    unit = variable.unit or (declared.unit if declared else None) or ""
+    least, greatest = (
+        _number(own if own is not None or declared is None else getattr(declared, side, None))
+        for side, own in (("min", variable.min), ("max", variable.max))
+    )
     return [
         Scalar(
             name=variable.name + (f"[{','.join(map(str, index))}]" if shape else ""),
@@ -184,6 +209,8 @@ def _scalars(variable: Any) -> list[Scalar]:
             unit=unit,
             description=variable.description or "",
             start=starts[place] if place < len(starts) else (starts[0] if starts else None),
+            min=least,
+            max=greatest,
         )
         for place, index in enumerate(places)
     ]

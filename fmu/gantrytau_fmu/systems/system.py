@@ -10,7 +10,7 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.units import BASE, dimension
 from gantrytau_fmu.systems.components import Component, Scalar, numeric
 
-SETTABLE = ("parameter", "structuralParameter", "input", "output", "local")
+SHOWN = 6  # names that a message lists
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI
 
 Place = tuple[str, str]  # component and scalar
@@ -79,8 +79,11 @@ def build_system(
     return System(components, tuple(links), drives, _starts(components, start))
 
 
-def locate(components: Mapping[str, Component], name: str) -> list[Place]:
-    """The scalars that a dotted name stands for; ModelError for an unknown component or variable."""
+def locate(components: Mapping[str, Component], name: str, causality: str = "") -> list[Place]:
+    """The scalars that a dotted name stands for; ModelError for an unknown component or variable.
+
+    causality: of the variables that its message proposes, "" for all.
+    """
     if not isinstance(name, str):
         raise ModelError(f"found {name!r}, expected a name as 'component.variable'")
     owners = [owner for owner in components if name.startswith(f"{owner}.")]
@@ -90,7 +93,7 @@ def locate(components: Mapping[str, Component], name: str) -> list[Place]:
             f"'{name}' begins with no component of the system{did_you_mean(name.partition('.')[0], choice)}"
         )
     owner = max(owners, key=len)
-    return [(owner, scalar) for scalar in components[owner].expand(name[len(owner) + 1 :])]
+    return [(owner, scalar) for scalar in components[owner].expand(name[len(owner) + 1 :], causality)]
 
 
 def _links(components: Mapping[str, Component], connection: Connection | tuple[str, str]) -> list[Link]:
@@ -167,7 +170,7 @@ def _starts(
 ) -> dict[str, dict[str, float | str]]:
     found: dict[str, dict[str, float | str]] = {name: {} for name in components}
     for name, value in start.items():
-        places = locate(components, name)
+        places = _places_to_start(components, name, value)
         scalars = [components[owner].scalars[scalar] for owner, scalar in places]
         if len(scalars) == 1 and scalars[0].kind == "text":
             if not isinstance(value, str):
@@ -176,24 +179,60 @@ def _starts(
         else:
             values = _numbers(f"start {name}", value, len(places))
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
+            if not known.has_start:
+                raise ModelError(_calculated(components[owner], known))
             _check_start(f"{owner}.{scalar}", known, number)
             found[owner][scalar] = number
     return found
 
 
-def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
-    calculated = scalar.initial == "calculated" or (
-        scalar.causality in ("output", "local") and not scalar.start
-    )
-    if scalar.variability == "constant" or scalar.causality not in SETTABLE or calculated:
+def _places_to_start(components: Mapping[str, Component], name: str, value: Any) -> list[Place]:
+    """The scalars that a name of `start` stands for; ModelError with the name and what to write instead."""
+    try:
+        return locate(components, name)
+    except ModelError as error:
+        short = name.removesuffix(".start") if isinstance(name, str) else name
+        if short == name:
+            raise ModelError(f"start {name}: {error}") from error
+        try:
+            locate(components, short)
+        except ModelError:
+            raise ModelError(f"start {name}: {error}") from error
         raise ModelError(
-            f"start {path} is a {scalar.variability} {scalar.causality} that is calculated, expected a parameter, an "
-            "input or a variable with a start value"
-        )
+            f"start {name}: found no such variable; in an FMU write start={{{short!r}: {value!r}}}"
+        ) from None
+
+
+def _calculated(component: Component, scalar: Scalar) -> str:
+    """That a variable cannot be set, and which can."""
+    free = [
+        name
+        for name, known in component.scalars.items()
+        if known.has_start and known.causality in ("output", "local") and numeric(known)
+    ]
+    more = ", ..." if len(free) > SHOWN else ""
+    words = f"such as {', '.join(free[:SHOWN])}{more}" if free else "of which this FMU has none"
+    return (
+        f"start {component.name}.{scalar.name} is a {scalar.variability} {scalar.causality} that is calculated, "
+        f"expected a parameter, an input, or a state or other variable with a start value, {words}"
+    )
+
+
+def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
     if not (numeric(scalar) or scalar.kind == "text") or scalar.causality == "structuralParameter":
         raise ModelError(f"start {path}: a {scalar.causality} of type {scalar.type} cannot be set here")
-    if scalar.kind == "integer" and value != round(float(value)):
+    if isinstance(value, str):
+        return
+    if scalar.kind == "integer" and value != round(value):
         raise ModelError(f"start {path}: found {value!r}, expected a whole number")
+    low, high = scalar.min, scalar.max
+    if (low is not None and value < low) or (high is not None and value > high):
+        sides = (("at least", low), ("at most", high))
+        limits = " and ".join(f"{words} {side:.9g}" for words, side in sides if side is not None)
+        unit = f" {scalar.unit}" if scalar.unit not in ("", "1") else ""
+        raise ModelError(
+            f"start {path}: found {value:.9g}, expected {limits}{unit}, the limits of its FMU; choose a value within them"
+        )
 
 
 def _numbers(words: str, value: Any, count: int) -> list[float]:
@@ -211,7 +250,10 @@ def _drives(
 ) -> dict[Place, Drive]:
     found: dict[Place, Drive] = {}
     for name, value in inputs.items():
-        places = locate(components, name)
+        try:
+            places = locate(components, name, "input")
+        except ModelError as error:
+            raise ModelError(f"inputs {name}: {error}") from error
         for owner, scalar in places:
             causality = components[owner].scalars[scalar].causality
             if causality != "input" or not numeric(components[owner].scalars[scalar]):
@@ -240,7 +282,14 @@ def _functions(name: str, function: Callable[[float], Any], count: int, begin: f
 
 
 def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
-    return _numbers(f"inputs {name} at t = {t:.6g} s", function(t), count)
+    try:
+        value = function(t)
+    except Exception as error:  # whatever a function of the user raises
+        raise ModelError(
+            f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
+            "at every time of the simulation"
+        ) from error
+    return _numbers(f"inputs {name} at t = {t:.6g} s", value, count)
 
 
 def _samples(name: str, times: Any, values: Any, count: int, span: tuple[float, float]) -> list[Drive]:
