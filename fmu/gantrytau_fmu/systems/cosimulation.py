@@ -69,9 +69,10 @@ def cosimulate(
         takes longer than `timeout`, s.
     progress: called with the time reached; by default a bar on the terminal when it takes long.
 
-    An input shows the output that drives it at that point. Raises ModelError for a system that does not fit,
-    InitializationError if the components cannot begin, SolveError with `.time` and the partial `.result` when a
-    component fails, gives values that are not finite, or on Ctrl-C.
+    An input shows the output that drives it at that point. A component takes a sample when a step begins, so at a sampling
+    instant its outputs still have their values from before it, where the result of `simulate` has the new ones.
+    Raises ModelError for a system that does not fit, InitializationError if the components cannot begin, SolveError with
+    `.time` and the partial `.result` when a component fails, gives values that are not finite, or on Ctrl-C.
     """
     with ExitStack() as stack:
         folder = Path(
