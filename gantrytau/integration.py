@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.conditioning import CLOSE, Look
+from gantrytau.approach import Approach, approach, doubtful
+from gantrytau.conditioning import Look
 from gantrytau.coordinates import Coordinates, Point
 from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
@@ -17,11 +18,7 @@ from gantrytau.sampling import instants
 from gantrytau.signals import Samples, Signal
 
 CHUNK = 10  # output intervals between two projections onto the constraints
-STRAIGHT = 1.3  # sum of the distances on both sides of a singular pose, relative to a step of the distance
 LEAST_STEPS = 500  # of the mesh on which singular poses are looked for, however few points are asked for
-HALVINGS = 14  # of the last step, to come near to where the integration stops
-WITHIN = 0.5  # relative distance of a singular pose above which none lies within one output interval
-FALLEN = 0.05  # relative distance of a singular pose from which its fall is extrapolated
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
     "ERR_FAIL": "the steps became too small",
@@ -58,7 +55,7 @@ class Run:
         self.held = np.full((self.mesh.size, len(coordinates.held)), np.nan)  # from each place on
         self.held[0] = [coordinates.dae.start[n] for n in coordinates.held]
         self.done = 0
-        self.before = np.zeros(0)  # distance from a singular pose at the output point before the last
+        self.seen = -1  # the last interval of the mesh that was looked at closely
         self.integrators: dict[int, ca.Function] = {}
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -79,7 +76,7 @@ class Run:
                 try:
                     self._advance(count)
                 except RuntimeError as error:
-                    if count == 1 or isinstance(error, SolveError):
+                    if count == 1:
                         raise self._stopped(error) from error
                     size = 1
                     continue
@@ -149,7 +146,10 @@ class Run:
             raise RuntimeError("the solution is not finite")
         reached = slice(here + 1, here + count + 1)
         inputs = np.array([self._inputs(k) for k in range(here + 1, here + count + 1)])
-        self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
+        try:
+            self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
+        except SolveError as error:  # perhaps only for want of shorter stretches
+            raise RuntimeError(str(error)) from error
         self.z[reached] = self.coordinates.settle(self.x[reached], z, self.mesh[reached], inputs)
         self.done = here + count
         self._watch(here, here + count)
@@ -162,29 +162,18 @@ class Run:
         """SolveError if a singular pose lies between two places of the mesh; `done` is then the last before it."""
         if not self.coordinates.conditioning.needed:
             return
+        first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         inputs = np.array([self._inputs(k) for k in range(first, last + 1)])
         places = slice(first, last + 1)
         look = self._look(self.x[places], self.z[places], self.mesh[places], inputs)
-        distances = np.concatenate([self.before, look.distance])
-        self.before = look.distance[-2:-1]
-        shift = distances.size - look.distance.size
-        for k in range(last - first):
-            here, there = look.distance[k], look.distance[k + 1]
-            within = min(here, there) < WITHIN
-            crossed = within and look.side[k] * look.side[k + 1] < 0
-            # a distance that falls straight to zero within the interval may have risen again behind it
-            falling = distances[k + shift - 1] - here if k + shift else 0.0
-            if crossed or look.near[k + 1] or (here < WITHIN and here - falling < CLOSE):
-                self.done = first + k
-                point, distance, zero = self._approach(crossed)
-                rising = look.distance[k + 2] - there if k + 2 < look.distance.size else 0.0
-                if crossed and (min(here, there) < FALLEN or here + there < STRAIGHT * max(falling, rising)):
-                    # the distance falls straight to zero between the two and rises again
-                    t, h = self.mesh[first + k], self.mesh[first + k + 1] - self.mesh[first + k]
-                    raise self._singular_pose(point, float(t + h * here / (here + there)))
-                if look.near[k + 1] or distance < 5 * CLOSE:
-                    raise self._singular_pose(point, zero)
-                self.done = last  # it is passed at a distance, or only the choice of coordinates fails there
+        for k in first + np.flatnonzero(doubtful(self.mesh[places], look)):
+            if k <= self.seen:
+                continue
+            self.done = self.seen = int(k)
+            found = self._approach()
+            if found.singular or (not found.arrived and self._weakest(found.point)):
+                raise self._singular_pose(found.point, found.zero)
+        self.done = last  # passed at a distance, or only the choice of coordinates fails there
 
     def _opened(self, name: str) -> SolveError:
         t = float(self.mesh[self.done])
@@ -221,9 +210,10 @@ class Run:
         return self.coordinates.weakest(point, (self.x[0], self.z[0], float(self.mesh[0]), self._inputs(0)))
 
     def _stopped(self, error: Exception) -> SolveError:
-        point, _, zero = self._approach()
+        found = self._approach()
+        point = found.point
         if self._weakest(point):
-            return self._singular_pose(point, zero)
+            return self._singular_pose(point, found.zero)
         reason = next(
             (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
         )
@@ -235,34 +225,23 @@ class Run:
             equations=[],
         )
 
-    def _approach(self, crossed: bool = False) -> tuple[Point, float, float]:
-        """The last point that can be reached behind the last output point, by halved steps.
+    def _approach(self) -> Approach:
+        """Walk from the last point of the mesh to the next, or to a singular pose before it."""
+        k = self.done
+        point = self.x[k], self.z[k], float(self.mesh[k]), self._inputs(k)
+        end = float(self.mesh[min(k + 1, self.mesh.size - 1)])
 
-        Its distance from a singular pose, and the time at which that distance would be zero. crossed: only
-        points on this side of where the determinant of the dependent coordinates changes its sign.
-        """
-        t, x, z = float(self.mesh[self.done]), self.x[self.done], self.z[self.done]
-        inputs = self._inputs(self.done)
-        step = longest = float(self.mesh[min(self.done + 1, self.mesh.size - 1)]) - t
+        def look(at: Point) -> Look:
+            x, z, t, w = at
+            return self._look(x[None], z[None], np.array([t]), w[None])
+
+        return approach(point, end, self._step, look)
+
+    def _step(self, point: Point, step: float) -> Point:
+        """The point a step later, in s."""
+        x, z, t, inputs = point
         if 1 not in self.integrators:
             self.integrators[1] = self.coordinates.integrator(1, self.tolerance)
-        look = self._look(x[None], z[None], np.array([t]), inputs[None])
-        seen = [(t, float(look.distance[0]))]
-        for _ in range(HALVINGS):
-            step /= 2
-            try:
-                near, far, there = self._step(x, z, t, step, inputs)
-            except (RuntimeError, SolveError):
-                continue
-            new = self._look(near[None], far[None], np.array([t + step]), there[None])
-            if new.near[0] or (crossed and new.side[0] != look.side[0]):
-                continue
-            t, x, z, inputs, look = t + step, near, far, there, new
-            seen.append((t, float(look.distance[0])))
-        return (x, z, t, inputs), seen[-1][1], _zero(seen, longest)
-
-    def _step(self, x: np.ndarray, z: np.ndarray, t: float, step: float, inputs: np.ndarray):
-        """States, algebraics and sampled inputs a step later."""
         half = len(self.samples)
         found = self._integrate(
             1,
@@ -275,21 +254,11 @@ class Run:
         near = np.array(found["xf"]).ravel()[: x.size]
         if not np.all(np.isfinite(near)):
             raise RuntimeError("the solution is not finite")
-        projected = self.coordinates.project(near[None], np.array([t + step]), there[None])[0]
-        return projected, np.array(found["zf"]).ravel(), there
+        when, w, far = np.array([t + step]), there[None], np.array(found["zf"]).reshape(1, -1)
+        near = self.coordinates.project(near[None], when, w)
+        return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
     def _integrate(self, count: int, **arguments: Any) -> dict[str, ca.DM]:
         """One call of an integrator, which else writes its complaints to the screen."""
         with contextlib.redirect_stderr(io.StringIO()):
             return self.integrators[count](**arguments)
-
-
-def _zero(seen: list[tuple[float, float]], longest: float) -> float:
-    """When a distance that falls to zero along a straight line is zero; the last time if it is not soon."""
-    t, distance = seen[-1]
-    if len(seen) > 1:
-        before, larger = seen[-2]
-        wait = distance * (t - before) / max(larger - distance, 1e-300)
-        if 0 <= wait < longest:
-            return t + wait
-    return t
