@@ -20,8 +20,9 @@ def test_a_component_in_its_own_process_gives_the_same(build):
     file = build("decay", LINES, advance="v[1] *= exp(-h); v[1] += h * v[0];")
     files, wires = {"a": file, "b": file}, [("a.y", "b.u")]
     for order in ("gauss-seidel", "iterate"):
-        here = cosimulate(files, wires, stop=1.0, step=0.1, order=order)
-        there = cosimulate(files, wires, stop=1.0, step=0.1, order=order, isolate=["b"])
+        policy = dict(stop=1.0, step=0.1, order=order, inputs={"a.u": 0.0})
+        here = cosimulate(files, wires, **policy)
+        there = cosimulate(files, wires, **policy, isolate=["b"])
         assert np.array_equal(here["b.y"], there["b.y"])
 
 
@@ -44,7 +45,8 @@ def test_a_hang_is_ended(build):
 def test_a_failure_in_the_process_has_its_words(build):
     file = build("fails", LINES, advance="return 3;")
     with pytest.raises(
-        SolveError, match=r"a: step: status 'error' at t = 0 s; its log says: the spring broke"
+        SolveError,
+        match=r"a: step: status 'error' at t = 0 s; its log says: the spring broke; mend what fails\.fmu",
     ):
         cosimulate({"a": file}, stop=1.0, step=0.1, isolate=["a"])
 
@@ -53,3 +55,12 @@ def test_a_crash_before_the_start_is_no_failed_step(build):
     file = build("early", LINES, derive="*(volatile int *)0 = 1;")
     with pytest.raises(InitializationError, match=r"a: the process of .*early\.fmu crashed"):
         cosimulate({"a": file}, stop=1.0, step=0.1, isolate=["a"])
+
+
+def test_a_fatal_status_names_the_file_and_proposes_isolation(build):
+    quiet = build("dies", LINES, advance="if (t > 0.25) return 4; v[1] = t + h;")
+    with pytest.raises(
+        SolveError,
+        match=r"a: step: status 'fatal' at t = 0\.3 s.*; dies\.fmu cannot go on .*: run it with isolate=True, and",
+    ):
+        cosimulate({"a": quiet}, stop=1.0, step=0.1)

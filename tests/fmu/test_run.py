@@ -2,19 +2,23 @@
 
 import csv
 import json
+import shutil
+import signal
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from gantrytau import ModelError
+from gantrytau import Model, ModelError, Output, Parameter, Real, SolveError, der
 from gantrytau.cli import app
+from gantrytau.progress import Progress
+from gantrytau_fmu import export_fmu
 from gantrytau_fmu.systems.single import run_fmu
 from gantrytau_fmu.systems.ssp_writing import write_ssp
 
 from .small_fmus import Builder, variable
 
-FAULT, MISUSE = 1, 2
+FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +103,124 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
     assert len(table.read_text().splitlines()) == 7
 
 
-def test_wrong_calls_are_told(lag, tmp_path):
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "q=1"], "--set q: lag.fmu has no variable 'q'; there is u, k, y."),
+        (["--set", "k.start=1"], "--set k.start: found no such variable; in an FMU write --set k=1\n"),
+        (
+            ["--set", "y=1"],
+            "--set y is a continuous output that is calculated, expected a parameter, an input",
+        ),
+        (["--input", "uu=1"], "--input uu: lag.fmu has no variable 'uu'; did you mean 'u'?"),
+        (["--input", "force=1"], "--input force: lag.fmu has no variable 'force'; its inputs are u."),
+        (
+            ["--input", "k=1"],
+            "--input k is a parameter, expected an input that is a number; parameters are set with --set",
+        ),
+        (
+            ["--step", "0"],
+            "--step 0: expected more than 0 and at most the 1 s that are simulated; choose such a step",
+        ),
+        (["--stop", "-1"], "--stop -1: expected a time after the beginning at 0 s; choose a later one"),
+        (["--tolerance", "2"], "--tolerance 2.0: expected a number between 0 and 1, as 1e-8"),
+        (
+            ["--order", "jakobi"],
+            "--order jakobi: expected gauss-seidel, jacobi or iterate; did you mean 'jacobi'?",
+        ),
+        (["--order", "jakobi", "--me"], "--order jakobi: expected gauss-seidel, jacobi or iterate"),
+        (["--order", "jacobi"], "--order jacobi: found one FMU, expected a system (.ssp); leave it out"),
+        (["--me", "--isolate"], "--me --isolate: Model Exchange runs in this process, expected one of them"),
+    ],
+)
+def test_wrong_calls_are_told_in_the_words_of_the_command(lag, arguments, words):
+    found = run(lag, *([] if "--stop" in arguments else ["--stop", 1]), *arguments)
+    assert found.exit_code == MISUSE
+    assert words in found.output
+
+
+def test_files_that_cannot_be_run(lag, tmp_path):
     assert run(tmp_path / "no.fmu", "--stop", 1).exit_code == MISUSE
-    unknown = run(lag, "--stop", 1, "--set", "q=1")
-    assert unknown.exit_code == FAULT
-    assert "has no variable 'q'" in unknown.output
+    (tmp_path / "page.fmu").write_text("<html>")
+    for name, kind in (("page.fmu", "FMU"), ("page.ssp", "SSP")):
+        (tmp_path / name).write_text("<html>")
+        page = run(tmp_path / name, "--stop", 1)
+        assert page.exit_code == FAULT
+        assert (
+            f"{name}: found the beginning b'<h', expected b'PK': this is no ZIP archive, so no {kind}; check"
+            in page.output
+        )
+    path = write_ssp(tmp_path / "one.ssp", {"a": lag}, [], stop=1.0, step=0.1)
+    assert "--order seidel: expected" in run(path, "--order", "seidel").output
+    assert run(lag).exit_code == FAULT
+    assert "expected one in s, as --stop 1.0" in run(lag).output
+
+
+def test_inputs_that_nothing_drives_are_a_note(lag, tmp_path):
+    found = run(lag, "--stop", 1)
+    assert (
+        found.stderr
+        == "Note: nothing drives 1 input, which keeps its value: u = 0; give it with --input or --set\n"
+    )
+    printed = run(lag, "--stop", 1, "--json")
+    assert printed.stderr == ""
+    assert json.loads(printed.stdout)["warnings"] == [found.stderr.removeprefix("Note: ").strip()]
+    assert run(lag, "--stop", 1, "--input", "u=0").stderr == ""
+    path = write_ssp(tmp_path / "two.ssp", {"a": lag, "b": lag}, [("a.y", "b.u")], stop=1.0, step=0.1)
+    assert "Note: nothing drives 1 input, which keeps its value: a.u = 0; give" in run(path).stderr
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory):
+    """x'' = -x from 1, exported with Model Exchange."""
+
+    class Swing(Model):
+        x = Output(unit="m", start=1.0, fixed=True)
+        v = Real(unit="m/s", start=0.0, fixed=True)
+        stiffness = Parameter(1.0, unit="1/s2")
+
+        def equations(self):
+            yield self.v == der(self.x)
+            yield der(self.v) == -self.stiffness * self.x
+
+    if not any(map(shutil.which, ("cc", "gcc", "clang"))):
+        pytest.skip("no C compiler")
+    return export_fmu(Swing(), tmp_path_factory.mktemp("swing") / "swing.fmu")
+
+
+def test_an_interrupted_integration_saves_what_there_is(swing, tmp_path, monkeypatch):
+    class Pressing(Progress):
+        def at(self, t):
+            if t > 0.45:
+                signal.raise_signal(signal.SIGINT)
+
+    table = tmp_path / "x.csv"
+    whole = run(swing, "--me", "--stop", 1, "--step", 0.1, "--output", table)
+    assert whole.exit_code == 0, whole.output
+    assert len(table.read_text().splitlines()) == 12
+    monkeypatch.setattr("gantrytau_fmu.systems.exchange.Progress", Pressing)
+    found = run(swing, "--me", "--stop", 1, "--step", 0.1, "--output", table, "--json")
+    assert found.exit_code == INTERRUPTED, found.output
+    said = json.loads(found.stdout)
+    assert said["error"].startswith("swing.fmu: the integration was interrupted at t = 0.5 s")
+    assert said["files"] == [str(table)]
+    rows = list(csv.DictReader(table.open()))
+    assert float(rows[-1]["time [s]"]) == pytest.approx(0.5)
+    assert float(rows[-1]["x [m]"]) == pytest.approx(np.cos(0.5), abs=1e-3)  # CVode at its relative 1e-5
+    lost = run(swing, "--me", "--stop", 1, "--step", 0.1)
+    assert "with --output its result would have been saved" in lost.output
+
+
+def test_an_integration_that_fails_keeps_what_there_is(swing, monkeypatch):
+    class Failing(Progress):
+        def at(self, t):
+            if t > 0.45:
+                raise RuntimeError("the integrator gave up")
+
+    monkeypatch.setattr("gantrytau_fmu.systems.exchange.Progress", Failing)
+    with pytest.raises(
+        SolveError,
+        match=r"swing\.fmu: the integration failed after t = 0\.\d+ s: the integrator gave up; try",
+    ) as caught:
+        run_fmu(swing, stop=1.0, step=0.1, model_exchange=True)
+    assert caught.value.result.time[-1] == pytest.approx(caught.value.time)

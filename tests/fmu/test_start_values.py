@@ -1,12 +1,14 @@
 """Values that components begin with: limits, what cannot be set, inputs that nothing drives."""
 
 import re
+import warnings
 import zipfile
 
 import pytest
 
 from gantrytau import ModelError
 from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.systems.system import UnconnectedInputs
 
 from .small_fmus import Builder, variable
 
@@ -51,6 +53,33 @@ def test_start_values_outside_of_the_limits_are_refused(build, tmp_path, fmi, li
         cosimulate({"a": file}, stop=0.1, step=0.1, start={"a.k": value})
     with pytest.raises(ModelError, match=rf"start a\.k: {words}"):
         cosimulate({"a": file}, stop=0.1, step=0.1, start={"a.k": bad})
+
+
+def test_inputs_that_nothing_drives_are_told_once(build):
+    many = [variable(f"u[{k}]", "input", 0.5 * k, unit="N") for k in range(8)] + [variable("y", "output")]
+    files = {"a": build("many", many), "b": spring(build)}
+    with pytest.warns(UnconnectedInputs) as told:
+        found = cosimulate(files, stop=0.1, step=0.1, start={"a.u[0]": 7.0}, inputs={"a.u[2]": 1.0})
+    (words,) = [str(warning.message) for warning in told]
+    assert words == (
+        "nothing drives 6 inputs, which keep their values: a.u[1] = 0.5, a.u[3] = 1.5, a.u[4] = 2, a.u[5] = 2.5, "
+        "a.u[6] = 3 and 1 more; give them with inputs= or start="
+    )
+    assert told[0].filename == __file__  # it points to the call
+    assert found["a.u[7]"] == pytest.approx([3.5, 3.5])
+    with pytest.warns(
+        UnconnectedInputs, match=r"nothing drives 1 input, which keeps its value: a\.u\[1\] = 0\.5; give it"
+    ):
+        cosimulate(files, stop=0.1, step=0.1, inputs={f"a.u[{k}]": 0 for k in range(8) if k != 1})
+
+
+def test_a_component_by_itself_and_inputs_that_are_given_are_silent(build):
+    lines = [variable("u", "input", 0.5), variable("y", "output", 1.0)]
+    file = build("silent", lines)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cosimulate({"a": file}, stop=0.1, step=0.1)
+        cosimulate({"a": file, "b": file}, [("a.y", "b.u")], stop=0.1, step=0.1, start={"a.u": 0.5})
 
 
 def test_what_cannot_be_set_says_what_can(build):

@@ -23,6 +23,7 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.reading.safe_xml import check_xml
 
 DESCRIPTION = "modelDescription.xml"
+_MAGIC = b"PK"  # of every zip archive
 _AGAIN = "export or fetch the file again"
 MEMBERS = 5_000  # entries that an archive may have
 UNPACKED = 200_000_000  # bytes, of all members together
@@ -128,7 +129,7 @@ def open_archive(
     path = Path(path)
     if not path.is_file():
         raise ModelError(no_file(path))
-    with _opened(path) as archive:
+    with _opened(path, "SSP" if needs.endswith(".ssd") else "FMU") as archive:
         infos = archive.infolist()
         _check_directory(path, infos)
         _check_count(path, archive, len(infos))
@@ -177,8 +178,8 @@ class _Guarded(BufferedReader):
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """The file as zip archive; ModelError if it is none or too large to be one within the limits."""
+def _opened(path: Path, what: str) -> Iterator[zipfile.ZipFile]:
+    """The file as zip archive; ModelError if it is none or too large to be one within the limits. what: wanted."""
     try:
         file = _Guarded(FileIO(path))
     except OSError as error:
@@ -189,10 +190,20 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
             raise ModelError(f"{path}: found an empty file, expected a zip archive; {_AGAIN}")
         if size > UNPACKED + _DIRECTORY + MEMBERS * 128:
             raise ModelError(_too_large(path, size))
+        if not zipfile.is_zipfile(file) and not _MAGIC.startswith(head := _head(file)):
+            raise ModelError(
+                f"{path}: found the beginning {head!r}, expected {_MAGIC!r}: this is no ZIP archive, so no {what}; "
+                "check that it is the right file"
+            )
         with _translated(path, "directory"):
             archive = zipfile.ZipFile(file)
         with archive:
             yield archive
+
+
+def _head(file: BufferedReader) -> bytes:
+    file.seek(0)
+    return file.read(len(_MAGIC))
 
 
 @contextmanager

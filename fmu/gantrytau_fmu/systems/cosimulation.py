@@ -21,7 +21,14 @@ from gantrytau_fmu.systems.ordering import sequence_of
 from gantrytau_fmu.systems.recording import Recorder
 from gantrytau_fmu.systems.slaves import Slave
 from gantrytau_fmu.systems.ssp import Structure, read_ssp
-from gantrytau_fmu.systems.system import Connection, System, build_system, locate
+from gantrytau_fmu.systems.system import (
+    Connection,
+    System,
+    build_system,
+    locate,
+    unconnected,
+    warn_of,
+)
 
 FileName = str | os.PathLike[str]
 Wires = Sequence[Connection | tuple[str, str]]
@@ -60,7 +67,8 @@ def cosimulate(
         repeated from saved states until every input is the mean of the output that drives it at both ends of the step,
         within `agreement` (relative), in at most `iterations`; of second order, where no component samples.
     inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))
-        joined by straight lines; held over each step of the component at its value in the middle.
+        joined by straight lines; held over each step of the component at its value in the middle. What nothing drives
+        keeps its start value; a warning (`UnconnectedInputs`) lists such inputs of two or more components.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).
     steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
@@ -83,13 +91,16 @@ def cosimulate(
         structure = _structure(components, connections, folder)
         begin = structure.begin or 0.0 if begin is None else begin
         chosen_stop, chosen_step = _either(stop, structure.stop), _either(step, structure.step)
-        _check(begin, chosen_stop, chosen_step, order, tolerance, agreement, iterations)
+        check_times(begin, chosen_stop, chosen_step)
+        _check(order, tolerance, agreement, iterations)
         grid = make_grid(float(begin), float(chosen_stop), float(chosen_step))
         alone = isolate if isinstance(isolate, Sequence) else tuple(structure.components) if isolate else ()
         parts = _read(structure.components, folder, alone)
         wires = [*structure.connections, *connections] if structure.connections else connections
         values = {**_matching(parts, structure.start), **(start or {})}
         system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
+        if len(parts) > 1:
+            warn_of(unconnected(system), stacklevel=2)
         plan = _Plan(
             system, order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations
         )
@@ -293,21 +304,29 @@ def _either(value: float | None, default: float | None) -> Any:
     return default if value is None else value
 
 
-def _check(
-    begin: Any, stop: Any, step: Any, order: Any, tolerance: Any, agreement: Any, iterations: Any
-) -> None:
+def check_times(begin: Any, stop: Any, step: Any) -> None:
+    """ModelError unless these are times in s with begin < stop and 0 < step <= stop - begin."""
     for name, value in (("begin", begin), ("stop", stop), ("step", step)):
+        if value is None:
+            raise ModelError(f"cosimulate: found no {name}, expected a time in s, as {name}=0.1")
         if (
             isinstance(value, bool)
             or not isinstance(value, (int, float, np.number))
             or not np.isfinite(value)
         ):
             raise ModelError(f"cosimulate: found {name}={value!r}, expected a finite number in s")
-    if not stop > begin or not step > 0 or step > (stop - begin) * (1 + 1e-9):
+    if not stop > begin:
         raise ModelError(
-            f"cosimulate: found begin={begin:g}, stop={stop:g}, step={step:g}, expected begin < stop and "
-            "0 < step <= stop - begin, in s"
+            f"cosimulate: found stop={stop:g}, expected a time after the beginning at {begin:g} s; choose a later one"
         )
+    if not step > 0 or step > (stop - begin) * (1 + 1e-9):
+        raise ModelError(
+            f"cosimulate: found step={step:g}, expected more than 0 and at most the {stop - begin:g} s that are simulated; "
+            "choose such a step"
+        )
+
+
+def _check(order: Any, tolerance: Any, agreement: Any, iterations: Any) -> None:
     if order not in get_args(Order):
         raise ModelError(
             f"cosimulate: found order={order!r}, expected one of {', '.join(get_args(Order))}"

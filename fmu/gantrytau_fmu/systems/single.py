@@ -1,22 +1,22 @@
 """One FMU of any tool, simulated by itself: Co-Simulation, or Model Exchange with FMPy's CVode."""
 
 import os
+import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from gantrytau.errors import ModelError, SolveError
+from gantrytau.errors import GantryTauError, ModelError, SolveError
 from gantrytau.result import Result
 from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.components import Component, read_component
-from gantrytau_fmu.systems.cosimulation import cosimulate
-from gantrytau_fmu.systems.masters import Grid, make_grid
-from gantrytau_fmu.systems.system import System, build_system
+from gantrytau_fmu.systems.components import read_component
+from gantrytau_fmu.systems.cosimulation import check_times, cosimulate
+from gantrytau_fmu.systems.exchange import integrate
+from gantrytau_fmu.systems.masters import make_grid
+from gantrytau_fmu.systems.system import build_system, unconnected, warn_of
 
-NAME = "fmu"
 STEPS = 500  # where neither the caller nor the file says a step
 
 
@@ -36,86 +36,57 @@ def run_fmu(
 
     stop, step: s, by default those of the file's experiment, else a five-hundredth; start, inputs: as for
     `cosimulate`, names without prefix; model_exchange: integrate it with CVode, `step` being the distance of the
-    output times; isolate: run it in a process of its own. Raises what `cosimulate` raises.
+    output times; isolate: run it in a process of its own. Raises what `cosimulate` raises, and warns likewise of
+    inputs that nothing drives.
     """
     if model_exchange and isolate:
         raise ModelError(f"{path}: Model Exchange runs in this process, found isolate; leave one of them out")
     kind = "model-exchange" if model_exchange else "co-simulation"
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
-        place = unpack(path, Path(folder) / NAME)
-        component = read_component(NAME, Path(path).name, place, kind)
+    name = Path(path).name  # of the component, so that messages name the file
+    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder, _plain(name):
+        place = unpack(path, Path(folder) / "fmu")
+        component = read_component(name, name, place, kind)
         stop = component.stop if stop is None else stop
         if stop is None:
             raise ModelError(
                 f"{path}: found no stop time, in the file neither; expected one in s, as stop=1.0"
             )
-        step = component.step or stop / STEPS if step is None else step
-        step = min(step, stop)
-        starts = {f"{NAME}.{name}": value for name, value in (start or {}).items()}
-        signals = {f"{NAME}.{name}": value for name, value in (inputs or {}).items()}
+        if step is None:
+            check_times(0.0, stop, stop)
+            step = min(component.step or stop / STEPS, stop)
+        check_times(0.0, stop, step)
+        starts = {f"{name}.{variable}": value for variable, value in (start or {}).items()}
+        signals = {f"{name}.{variable}": value for variable, value in (inputs or {}).items()}
+        system = build_system({name: component}, (), starts, signals, (0.0, stop))
+        free = {free.removeprefix(f"{name}."): value for free, value in unconnected(system).items()}
+        warn_of(free, stacklevel=2)
         if model_exchange:
-            system = build_system({NAME: component}, (), starts, signals, (0.0, stop))
-            return _integrated(component, system, make_grid(0.0, stop, step), tolerance)
+            return integrate(component, system, make_grid(0.0, stop, step), tolerance)
     policy: dict[str, Any] = dict(stop=stop, step=step, start=starts, inputs=signals, tolerance=tolerance)
+    with _plain(name):
+        found = cosimulate({name: path}, **policy, isolate=[name] if isolate else (), progress=progress)
+    return _bare(found, name)
+
+
+@contextmanager
+def _plain(name: str) -> Iterator[None]:
+    """Messages and partial results in which variables have no prefix."""
     try:
-        found = cosimulate({NAME: path}, **policy, isolate=[NAME] if isolate else (), progress=progress)
-    except SolveError as error:
-        error.result = error.result and _bare(error.result, Path(path).stem)
+        yield
+    except GantryTauError as error:
+        error.args = (re.sub(rf"(?<![\w./\\]){re.escape(name)}\.(?=\S)", "", str(error)),)
+        if isinstance(error, SolveError) and error.result is not None:
+            error.result = _bare(error.result, name)
         raise
-    return _bare(found, Path(path).stem)
 
 
-def _bare(result: Result, title: str) -> Result:
+def _bare(result: Result, name: str) -> Result:
     """The result with names that do not begin with that of the component."""
-    names = {name.removeprefix(f"{NAME}."): name for name in result.names}
+    names = {full.removeprefix(f"{name}."): full for full in result.names}
     return Result(
         result.time,
-        {short: result[name] for short, name in names.items()},
-        units={short: result.unit(name) for short, name in names.items()},
-        descriptions={short: result.description(name) for short, name in names.items()},
-        title=title,
-    )
-
-
-def _integrated(component: Component, system: System, grid: Grid, tolerance: float | None) -> Result:
-    import fmpy
-
-    outputs = component.of("output", "input")
-    if any(component.scalars[name].size > 1 for name in outputs):
-        raise ModelError(f"{component.file}: arrays of FMI 3 are not supported with Model Exchange")
-    times = np.array([grid.time(k) for k in range(grid.count + 1)])
-    drives = {name: drive for (_, name), drive in system.drives.items()}
-    for name in component.of("input"):  # FMPy warns of inputs that are left to their start values
-        scalar = component.scalars[name]
-        if scalar.kind == "real" and name not in drives:
-            value = float(system.start[NAME].get(name, scalar.start or 0.0))
-            drives[name] = lambda t, value=value: value
-    table = np.zeros(times.size, dtype=[("time", float), *((name, float) for name in drives)])
-    table["time"] = times
-    for name, drive in drives.items():
-        table[name] = [drive(t) for t in times]
-    simulate: Callable[..., Any] = fmpy.simulate_fmu
-    try:
-        found = simulate(
-            component.folder,
-            start_time=grid.begin,
-            stop_time=grid.stop,
-            solver="CVode",
-            relative_tolerance=tolerance,
-            output_interval=grid.step,
-            start_values=dict(system.start[NAME]),
-            input=table if drives else None,
-            output=list(outputs),
-            fmi_type="ModelExchange",
-        )
-    except Exception as error:  # FMPy raises bare exceptions
-        raise SolveError(
-            f"{component.file}: the integration failed: {error}; try a smaller tolerance or Co-Simulation"
-        ) from error
-    return Result(
-        found["time"],
-        {name: found[name].astype(float) for name in outputs},
-        units={name: component.scalars[name].unit for name in outputs},
-        descriptions={name: component.scalars[name].description for name in outputs},
-        title=Path(component.file).stem,
+        {short: result[full] for short, full in names.items()},
+        units={short: result.unit(full) for short, full in names.items()},
+        descriptions={short: result.description(full) for short, full in names.items()},
+        title=Path(name).stem,
     )

@@ -8,6 +8,7 @@ import ctypes
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import InitializationError, ModelError, SolveError
@@ -191,10 +192,22 @@ class Slave:
             raise self._failure(f"{what}: {words}") from error
 
     def _failure(self, words: str) -> SolveError | InitializationError:
-        message = f"{self.component.name}: {words} at t = {self.time:.6g} s{self._said()}"
+        message = (
+            f"{self.component.name}: {words} at t = {self.time:.6g} s{self._said()}; {self._remedy(words)}"
+        )
         if self.running:
             return SolveError(message, time=self.time)
         return InitializationError(f"{message} (while it was initialised)")
+
+    def _remedy(self, words: str) -> str:
+        file = Path(self.component.file).name
+        if "'fatal'" in words:
+            return (
+                f"{file} cannot go on and may harm this process: run it with isolate=True, and ask its author"
+            )
+        if self.log:
+            return f"mend what {file} complains of, by other inputs, start values or a shorter step"
+        return f"{file} does not say why: try other inputs, start values or a shorter step, or ask its author"
 
     def _said(self) -> str:
         return f"; its log says: {' | '.join(self.log)}" if self.log else ""

@@ -38,12 +38,15 @@ def write_ssp(
     """
     path = Path(path)
     if path.suffix.lower() != ".ssp":
-        raise ModelError(f"{path}: found the suffix '{path.suffix}', expected .ssp")
+        raise ModelError(f"{path}: found the suffix '{path.suffix}', expected .ssp; call it {path.stem}.ssp")
     if path.is_dir():
-        raise ModelError(f"{path} is a folder, expected the name of a file in it")
+        raise ModelError(
+            f"{path} is a folder, expected the name of a file; name one in it, as {path / 'system.ssp'}"
+        )
     if not begin < stop or not 0 < step <= stop - begin:
         raise ModelError(
-            f"{path}: found begin={begin}, stop={stop}, step={step}; expected 0 < step <= stop - begin"
+            f"{path}: found begin={begin}, stop={stop}, step={step}; expected 0 < step <= stop - begin; "
+            "choose such times, in s"
         )
     files = {name: Path(file) for name, file in components.items()}
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
@@ -71,7 +74,7 @@ def _check(path: Path, system: System) -> None:
     for name, component in system.components.items():
         if not name.replace("_", "a").isalnum():
             raise ModelError(
-                f"{path}: component '{name}': expected a name of letters, digits and _ for other tools"
+                f"{path}: component '{name}': expected a name of letters, digits and _, as other tools need; rename it"
             )
         arrays = [
             scalar.name for scalar in component.scalars.values() if scalar.size > 1 and _shown(scalar, {})

@@ -1,5 +1,6 @@
 """A system of components: which output drives which input, what drives the rest, and whether all that fits."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +11,15 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.units import BASE, dimension
 from gantrytau_fmu.systems.components import Component, Scalar, numeric
 
-SHOWN = 6  # names that a message lists
+SHOWN, FEW = 6, 5  # names that a message lists, and with their values
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI
 
 Place = tuple[str, str]  # component and scalar
 Drive = Callable[[float], float]
+
+
+class UnconnectedInputs(UserWarning):
+    """Inputs of a system that nothing drives: they keep their start values."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,40 @@ def build_system(
             )
         taken[target] = by
     return System(components, tuple(links), drives, _starts(components, start))
+
+
+def unconnected(system: System) -> dict[str, str]:
+    """Inputs that are numbers and that nothing drives, whose start nobody chose, by dotted name: the values they keep."""
+    driven = {link.target for link in system.links} | set(system.drives)
+    return {
+        f"{owner}.{name}": _shown(component.scalars[name].start)
+        for owner, component in system.components.items()
+        for name in component.of("input")
+        if (owner, name) not in driven and name not in system.start[owner]
+    }
+
+
+def _shown(start: str | None) -> str:
+    """A start value of a file, shortly: "0.0" as 0, truth values as they are."""
+    try:
+        return f"{float(start or 0):g}"
+    except ValueError:
+        return str(start)
+
+
+def warn_of(inputs: Mapping[str, str], stacklevel: int) -> None:
+    """An UnconnectedInputs with the first of these names and values; nothing if there are none."""
+    if not inputs:
+        return
+    few = [f"{name} = {value}" for name, value in list(inputs.items())[:FEW]]
+    more = f" and {len(inputs) - FEW} more" if len(inputs) > FEW else ""
+    one = len(inputs) == 1
+    warnings.warn(
+        f"nothing drives {'1 input, which keeps its value' if one else f'{len(inputs)} inputs, which keep their values'}: "
+        f"{', '.join(few)}{more}; give {'it' if one else 'them'} with inputs= or start=",
+        UnconnectedInputs,
+        stacklevel=stacklevel + 1,
+    )
 
 
 def locate(components: Mapping[str, Component], name: str, causality: str = "") -> list[Place]:

@@ -9,6 +9,7 @@ import typer
 
 from gantrytau.commands.choice import source_of
 from gantrytau.commands.fmu.info import counted
+from gantrytau.commands.fmu.wording import speaking_of_options
 from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting
@@ -75,7 +76,7 @@ def export(
     Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
     inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
     """
-    with reporting(json, source_of(model)):
+    with reporting(json, source_of(model)), speaking_of_options():
         policy: dict[str, Any] = {
             "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
             "interfaces": INTERFACES.get(interface) or _unknown("--interface", interface, INTERFACES),

@@ -1,6 +1,8 @@
 """`gantrytau fmu run`: an FMU, or a system of them, over time."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -8,14 +10,16 @@ import typer
 
 from gantrytau.commands import pictures, saving
 from gantrytau.commands.fmu.info import present
+from gantrytau.commands.fmu.wording import in_options, speaking_of_options
 from gantrytau.commands.options import Json, Plotted, Saved, To, listed
-from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, fail, reporting
+from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, fail, note, reporting
 from gantrytau.commands.values import number, signal, split
-from gantrytau.errors import SolveError
+from gantrytau.errors import SolveError, did_you_mean
 
 if TYPE_CHECKING:
     from gantrytau.result import Result
 
+ORDERS = ("gauss-seidel", "jacobi", "iterate")
 SHOWN = 24  # variables in the table; files and JSON have all
 
 
@@ -53,8 +57,9 @@ def run(
         ),
     ] = None,
     order: Annotated[
-        str, typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.")
-    ] = "gauss-seidel",
+        str | None,
+        typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.", show_default="gauss-seidel"),
+    ] = None,
     tolerance: Annotated[
         float | None, typer.Option(help="Handed to the FMUs, or to CVode.", show_default=False)
     ] = None,
@@ -71,15 +76,18 @@ def run(
 
     Its binaries are code: trust them. Ctrl-C stops early; what was computed until then is saved to --output.
     """
-    with reporting(json):
+    with reporting(json), speaking_of_options():
         present(file)
+        _check(file, order, me, isolate)
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
         start = dict(_setting(text) for text in set_ or ())
         saving.rehearse(output)
         place = pictures.place(drawn, to)
         policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
+        told: list[str] = []
         try:
-            result = _result(file, policy, order=order, me=me, isolate=isolate)
+            with _noted(told, json):
+                result = _result(file, policy, order=order or ORDERS[0], me=me, isolate=isolate)
         except SolveError as error:
             _stop(error, output, json)
         files = saving.save(result, output)
@@ -90,11 +98,54 @@ def run(
             "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
             "final": {name: result.final(name) for name in result.names},
             "files": files,
+            "warnings": told,
         }
         if json:
             typer.echo(as_json(summary))
         else:
             _show(summary, result)
+
+
+def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
+    """CommandError for options that do not go together."""
+    if order is not None and order not in ORDERS:
+        near = did_you_mean(order, ORDERS)
+        raise CommandError(
+            f"--order {order}: expected {', '.join(ORDERS[:-1])} or {ORDERS[-1]}{near if 'did you' in near else ''}"
+        )
+    if _is_system(file):
+        if me:
+            raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")
+        return
+    if order is not None:
+        raise CommandError(f"--order {order}: found one FMU, expected a system (.ssp); leave it out")
+    if me and isolate:
+        raise CommandError(
+            "--me --isolate: Model Exchange runs in this process, expected one of them; leave the other out"
+        )
+
+
+def _is_system(file: Path) -> bool:
+    return file.suffix.lower() == ".ssp"
+
+
+@contextmanager
+def _noted(told: list[str], json: bool) -> Iterator[None]:
+    """Inputs that nothing drives become a line that is printed at once, or with the JSON."""
+    from gantrytau_fmu.systems.system import UnconnectedInputs
+
+    def hear(message: Warning | str, kind: type[Warning], *place: Any, **more: Any) -> None:
+        if not issubclass(kind, UnconnectedInputs):
+            show(message, kind, *place, **more)
+            return
+        told.append(in_options(str(message)))
+        if not json:
+            note(f"Note: {told[-1]}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UnconnectedInputs)
+        show, warnings.showwarning = warnings.showwarning, hear
+        yield
 
 
 def _setting(text: str) -> tuple[str, Any]:
@@ -103,14 +154,12 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
-    if file.suffix.lower() != ".ssp":
+    if not _is_system(file):
         from gantrytau_fmu.systems.single import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
     from gantrytau_fmu.systems.cosimulation import cosimulate
 
-    if me:
-        raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")
     chosen: Any = order
     return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)
 
@@ -118,7 +167,7 @@ def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isol
 def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     """Save what was found until it stopped, say so, and leave."""
     pressed = isinstance(error.__context__, KeyboardInterrupt)
-    message = str(error).partition(";")[0] if pressed else str(error)
+    message = str(error).partition(";")[0] if pressed else in_options(str(error))
     files: list[str] = []
     if output is not None and error.result is not None:
         files = saving.save(error.result, output)

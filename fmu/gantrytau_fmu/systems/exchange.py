@@ -1,0 +1,109 @@
+"""Model Exchange of one FMU, integrated by FMPy's CVode."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau.errors import ModelError, SolveError
+from gantrytau.interruption import on_interrupt
+from gantrytau.progress import Progress
+from gantrytau.result import Result
+from gantrytau_fmu.systems.components import Component
+from gantrytau_fmu.systems.masters import Grid
+from gantrytau_fmu.systems.system import System
+
+
+def integrate(component: Component, system: System, grid: Grid, tolerance: float | None) -> Result:
+    """Integrate the only component of a system over the grid; its inputs and outputs by their own names.
+
+    Raises ModelError for arrays of FMI 3, SolveError with `.time` and the partial `.result` where the integration
+    fails or is interrupted by Ctrl-C.
+    """
+    import fmpy
+
+    outputs = component.of("output", "input")
+    if any(component.scalars[name].size > 1 for name in outputs):
+        raise ModelError(
+            f"{component.file}: arrays of FMI 3 are not supported with Model Exchange; run its Co-Simulation"
+        )
+    table = _inputs(component, system, grid)
+    pressed: list[bool] = []
+    reached: list[Any] = []  # FMPy's recorder, once there is one
+    simulate: Callable[..., Any] = fmpy.simulate_fmu
+    with Progress(grid.begin, grid.stop) as bar, on_interrupt(lambda: pressed.append(True)):
+
+        def go_on(time: float, recorder: Any) -> bool:
+            reached[:] = [recorder]
+            bar.at(time)
+            if pressed:
+                recorder.sample(time, force=True)  # what was reached; FMPy would do so with the next step
+            return not pressed
+
+        try:
+            found = simulate(
+                component.folder,
+                start_time=grid.begin,
+                stop_time=grid.stop,
+                solver="CVode",
+                relative_tolerance=tolerance,
+                output_interval=grid.step,
+                start_values=dict(system.start[component.name]),
+                input=table if len(table.dtype) > 1 else None,
+                output=list(outputs),
+                fmi_type="ModelExchange",
+                step_finished=go_on,
+            )
+        except Exception as error:  # FMPy raises bare exceptions
+            raise _failure(component, outputs, reached, error) from error
+    result = _result(component, outputs, found)
+    if not pressed:
+        return result
+    stopped = SolveError(
+        f"{component.file}: the integration was interrupted at t = {result.time[-1]:.4g} s; "
+        ".result holds what was computed",
+        time=float(result.time[-1]),
+        result=result,
+    )
+    stopped.__context__ = KeyboardInterrupt()  # the signal was only noted: FMPy would take it for a failure
+    raise stopped
+
+
+def _failure(
+    component: Component, outputs: tuple[str, ...], reached: list[Any], error: Exception
+) -> SolveError:
+    partial = _result(component, outputs, reached[0].result()) if reached else None
+    time = float(partial.time[-1]) if partial is not None else None
+    when = f" after t = {time:.6g} s" if time is not None else ""
+    return SolveError(
+        f"{component.file}: the integration failed{when}: {error}; try a smaller tolerance or Co-Simulation",
+        time=time,
+        result=partial,
+    )
+
+
+def _inputs(component: Component, system: System, grid: Grid) -> np.ndarray:
+    """The inputs at the points of the grid, as FMPy takes them: those that nothing drives, too, or it warns of them."""
+    times = np.array([grid.time(k) for k in range(grid.count + 1)])
+    columns = {name: [drive(t) for t in times] for (_, name), drive in system.drives.items()}
+    for name in component.of("input"):
+        scalar = component.scalars[name]
+        if scalar.kind == "real" and name not in columns:
+            value = float(system.start[component.name].get(name, scalar.start or 0.0))
+            columns[name] = [value] * times.size
+    table = np.zeros(times.size, dtype=[("time", float), *((name, float) for name in columns)])
+    table["time"] = times
+    for name, values in columns.items():
+        table[name] = values
+    return table
+
+
+def _result(component: Component, outputs: tuple[str, ...], found: Any) -> Result:
+    return Result(
+        found["time"],
+        {name: found[name].astype(float) for name in outputs},
+        units={name: component.scalars[name].unit for name in outputs},
+        descriptions={name: component.scalars[name].description for name in outputs},
+        title=Path(component.file).stem,
+    )
