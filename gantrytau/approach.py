@@ -15,7 +15,7 @@ from gantrytau.conditioning import CLOSE, Look
 from gantrytau.coordinates import Point
 from gantrytau.errors import SolveError
 
-FORESIGHT = 2.0  # intervals over which a fall of the distance is led on: it may become steeper
+FORESIGHT = 1.5  # intervals over which a fall of the distance is led on: it may become steeper
 SHARE = (
     0.5  # of the way to where the distance would be zero, or to where nothing was found, taken in one step
 )
