@@ -1,6 +1,7 @@
 """Figures of results: variables over time, one axis for each unit."""
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gantrytau.errors import ModelError
@@ -18,6 +19,8 @@ def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] 
     """The figure of the named variables of a result over time, saved to `file` if one is named."""
     import matplotlib.pyplot as plt
 
+    if file is not None:
+        check_suffix(file)
     lines = _lines(result, names)
     axes_of_unit: dict[str, list[str]] = {}
     for name in lines:
@@ -42,6 +45,19 @@ def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] 
     if file is not None or not has_windows(plt.get_backend()):
         plt.close(figure)  # there is no window: the figure belongs to its caller alone
     return figure
+
+
+def check_suffix(file: str | os.PathLike[str]) -> None:
+    """ModelError unless a file has the suffix of a format in which Matplotlib draws."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    suffix, formats = Path(file).suffix, sorted(FigureCanvasBase.get_supported_filetypes())
+    if suffix.removeprefix(".").lower() not in formats:
+        known = ", ".join(f".{name}" for name in formats)
+        raise ModelError(
+            f"plot: found the file '{file}' with the suffix '{suffix}', expected one of {known}; name the file "
+            f"{Path(file).stem}.png, for example"
+        )
 
 
 def has_windows(backend: str) -> bool:

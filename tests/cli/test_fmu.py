@@ -227,13 +227,14 @@ def test_a_fault_in_an_fmu_gives_the_exit_code(run, tmp_path):
     found = run("fmu", "check", file)
     assert found.exit_code == FAULT
     lines = found.stdout.splitlines()
-    assert lines[0] == "error: u: min 20 is above max 10"
+    assert lines[0] == f"{file}: error: u: min 20 is above max 10"
     assert lines[-1] == f"{file}: 2 errors, 1 remark"  # the start value is below min, too; no binary
     printed = run("fmu", "check", file, "--json")
     assert printed.exit_code == FAULT
     content = json.loads(printed.stdout)
     assert content["error"] == f"{file}: u: min 20 is above max 10"
-    assert content["findings"][0] == {"severity": "error", "message": "u: min 20 is above max 10"}
+    first = {"severity": "error", "message": "u: min 20 is above max 10", "path": str(file)}
+    assert content["findings"][0] == first
 
 
 def test_remarks_alone_are_no_fault(run, answer, tmp_path):
@@ -254,6 +255,22 @@ def test_a_file_that_is_not_there(fails, tmp_path, command):
     lag2(tmp_path / "lag.fmu")
     message = fails(MISUSE, "fmu", command, tmp_path / "lug.fmu")
     assert "lug.fmu: found no such file, expected an archive; did you mean 'lag.fmu'?" in message
+
+
+def test_info_says_how_to_see_all(run, tmp_path):
+    name, place = '<ScalarVariable name="u"', FMI2.index("</ModelVariables>")
+    many = "".join(
+        f'<ScalarVariable name="n{k}" valueReference="{20 + k}" causality="input"><Real start="0"/></ScalarVariable>'
+        for k in range(14)
+    )
+    assert name in FMI2
+    file = lag2(tmp_path / "lag.fmu", FMI2[:place] + many + FMI2[place:])
+    short, whole = run("fmu", "info", file).stdout, run("fmu", "info", file, "--all").stdout
+    assert short.endswith("\n\n--all lists all of them\n")
+    assert "  ... and 3 more" in short
+    assert "n13" not in short
+    assert "n13" in whole
+    assert "more" not in whole
 
 
 def test_info_refuses_what_is_unsafe(fails, tmp_path):

@@ -18,8 +18,10 @@ def path(tmp_path):
 
 
 def told(path, **options):
-    """The findings as lines."""
-    return [str(finding) for finding in check_fmu(path, **options)]
+    """The findings as lines, without the file that each names first."""
+    lines = [str(finding) for finding in check_fmu(path, **options)]
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
 
 
 @pytest.mark.parametrize("make", [lag2, lag3])

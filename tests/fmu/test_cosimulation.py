@@ -249,8 +249,8 @@ def test_vectors_connect_element_by_element(build):
 @pytest.mark.parametrize(
     ("wires", "words"),
     [
-        ([("a.y", "b.u")], r"a has no variable 'y'"),
-        ([("a.x", "c.u")], r"'c\.u' begins with no component of the system"),
+        ([("a.y", "b.u")], r"connection a\.y -> b\.u: a has no variable 'y'; its outputs are x, v\."),
+        ([("a.x", "c.u")], r"connection .*: 'c\.u' begins with no component of the system"),
         ([("b.u", "a.x")], r"found input -> output, .*turn them round"),
         ([("a.x", "b.x")], r"found output -> output, expected an output and the input it drives"),
         ([("a.x", "b.u"), ("b.x", "b.u")], r"b\.u is driven by a\.x and by b\.x, expected one of them"),
@@ -271,7 +271,6 @@ def test_wrong_connections_are_refused(halves, wires, words):
             r"found step=0, expected more than 0 and at most the 1 s that are simulated; choose",
         ),
         (dict(step=1.5), r"found step=1\.5, expected more than 0 and at most the 1 s"),
-        (dict(stop=np.nan), r"found stop=nan, expected a finite number in s"),
         (dict(step=None), r"found no step, expected a time in s, as step=0\.1"),
         (dict(order="seidel"), r"found order='seidel', .*did you mean 'gauss-seidel'"),
         (dict(tolerance=2.0), r"found tolerance=2\.0, expected a number between 0 and 1"),
@@ -288,7 +287,6 @@ def test_wrong_connections_are_refused(halves, wires, words):
         ),
         (dict(start={"a.q.start": 1.0}), r"start a\.q\.start: a has no variable 'q\.start'"),
         (dict(inputs={"a.qq": 1.0}), r"inputs a\.qq: a has no variable 'qq'; its inputs are f\."),
-        (dict(inputs={"a.ff": 1.0}), r"inputs a\.ff: a has no variable 'ff'; did you mean 'f'\?"),
         (dict(inputs={"a.k": 1.0}), r"inputs a\.k is a parameter, expected an input"),
         (dict(inputs={"b.u": 1.0}), r"b\.u is driven by a\.x and by inputs"),
         (dict(outputs=["a.y"]), r"a has no variable 'y'"),

@@ -20,9 +20,8 @@ def test_a_component_in_its_own_process_gives_the_same(build):
     file = build("decay", LINES, advance="v[1] *= exp(-h); v[1] += h * v[0];")
     files, wires = {"a": file, "b": file}, [("a.y", "b.u")]
     for order in ("gauss-seidel", "iterate"):
-        policy = dict(stop=1.0, step=0.1, order=order, inputs={"a.u": 0.0})
-        here = cosimulate(files, wires, **policy)
-        there = cosimulate(files, wires, **policy, isolate=["b"])
+        here = cosimulate(files, wires, stop=1.0, step=0.1, order=order, inputs={"a.u": 0.0})
+        there = cosimulate(files, wires, stop=1.0, step=0.1, order=order, inputs={"a.u": 0.0}, isolate=["b"])
         assert np.array_equal(here["b.y"], there["b.y"])
 
 

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -33,13 +33,18 @@ _OURS = (  # of FMPy: said by us with names, and without its mistakes
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a check found: an "error", a "warning" (it may work elsewhere) or a "note"."""
+    """Something that a check found: an "error", a "warning" (it may work elsewhere) or a "note"; path: of what file."""
 
     severity: Severity
     message: str
+    path: str = field(default="", compare=False)
 
     def __str__(self) -> str:
-        return f"{self.severity}: {self.message}"
+        return (
+            f"{self.path}: {self.severity}: {self.message}"
+            if self.path
+            else f"{self.severity}: {self.message}"
+        )
 
 
 def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float = TIMEOUT) -> list[Finding]:
@@ -50,10 +55,17 @@ def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float
     run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
     no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
     """
+    path = Path(path)
+    found = _found(path, run, timeout)
+    order = ("error", "warning", "note")
+    found.sort(key=lambda finding: order.index(finding.severity))
+    return [replace(finding, path=str(path)) for finding in found]
+
+
+def _found(path: Path, run: bool, timeout: float) -> list[Finding]:
     from gantrytau_fmu.reading.consistency import inconsistencies
     from gantrytau_fmu.reading.reading import describe, model_of, read_files, schema_problems
 
-    path = Path(path)
     try:
         files = read_files(path)
         if problems := schema_problems(files):
@@ -69,8 +81,7 @@ def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float
             findings.append(Finding("error", problem))
     if run:
         findings += _tried(path, native().name in fmu.platforms, timeout)
-    order = ("error", "warning", "note")
-    return sorted(findings, key=lambda finding: order.index(finding.severity))
+    return findings
 
 
 def _validated(packed: Any, names: Iterable[str]) -> list[str]:

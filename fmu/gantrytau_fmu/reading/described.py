@@ -146,7 +146,11 @@ class FmuDescription:
 
     def __str__(self) -> str:
         """What it is, how it runs, and the first of its inputs, outputs and parameters."""
-        return "\n".join([*_headlines(self), *_tables(self)])
+        return self.table()
+
+    def table(self, shown: int | None = SHOWN) -> str:
+        """The same with the first `shown` variables of each kind, None: all of them."""
+        return "\n".join([*_headlines(self), *_tables(self, shown)])
 
     @cached_property
     def _by_name(self) -> dict[str, FmuVariable]:
@@ -189,20 +193,20 @@ def _headlines(fmu: FmuDescription) -> list[str]:
     return lines
 
 
-def _tables(fmu: FmuDescription) -> list[str]:
+def _tables(fmu: FmuDescription, shown: int | None) -> list[str]:
     """The first inputs, outputs and parameters with unit, start value and description."""
     lines: list[str] = []
     for title, names in (("inputs", fmu.inputs), ("outputs", fmu.outputs), ("parameters", fmu.parameters)):
         if not names:
             continue
         lines += ["", title]
-        rows = [_row(fmu.variable(name)) for name in names[:SHOWN]]
+        rows = [_row(fmu.variable(name)) for name in names[:shown]]
         widths = [max(len(row[column]) for row in rows) for column in range(3)]
         for row in rows:
             cells = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
             lines.append("  ".join(["", *cells, row[3]]).rstrip())
-        if len(names) > SHOWN:
-            lines.append(f"  ... and {len(names) - SHOWN} more")
+        if shown is not None and len(names) > shown:
+            lines.append(f"  ... and {len(names) - shown} more")
     return lines
 
 

@@ -126,10 +126,11 @@ def read_component(
     file: str | Path,
     folder: Path,
     kind: Literal["co-simulation", "model-exchange"] = "co-simulation",
+    loadable: bool = True,
 ) -> Component:
     """The FMU unpacked in `folder` as a component; ModelError for one that does not have the wanted interface.
 
-    name: in the system; file: as the user named it, for messages.
+    name: in the system; file: as the user named it, for messages; loadable: whether it needs a binary for this platform.
     """
     description = _description(file, folder)
     interface = description.coSimulation if kind == "co-simulation" else description.modelExchange
@@ -151,7 +152,7 @@ def read_component(
         version=version,
         token=description.guid,
         identifier=interface.modelIdentifier,
-        library=_library(name, file, folder, version, interface.modelIdentifier),
+        library=_library(name, file, folder, version, interface.modelIdentifier) if loadable else "",
         scalars=scalars,
         feedthrough=_feedthrough(description, scalars),
         units={unit.name: _base(unit.baseUnit) for unit in description.unitDefinitions if unit.baseUnit},

@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -20,7 +20,7 @@ from gantrytau_fmu.systems.masters import Grid, Master, Order, Part, make_grid, 
 from gantrytau_fmu.systems.ordering import sequence_of
 from gantrytau_fmu.systems.recording import Recorder
 from gantrytau_fmu.systems.slaves import Slave
-from gantrytau_fmu.systems.ssp import Structure, read_ssp
+from gantrytau_fmu.systems.ssp import Structure, matching, read_ssp
 from gantrytau_fmu.systems.system import (
     Connection,
     System,
@@ -97,7 +97,7 @@ def cosimulate(
         alone = isolate if isinstance(isolate, Sequence) else tuple(structure.components) if isolate else ()
         parts = _read(structure.components, folder, alone)
         wires = [*structure.connections, *connections] if structure.connections else connections
-        values = {**_matching(parts, structure.start), **(start or {})}
+        values = {**matching(parts, structure.start), **(start or {})}
         system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
         if len(parts) > 1:
             warn_of(unconnected(system), stacklevel=2)
@@ -217,16 +217,6 @@ def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> di
         place = unpack(file, folder / f"fmu{count}")
         found[name] = read_component(name, file, place)
     _check_alone(found, isolate)
-    return found
-
-
-def _matching(components: Mapping[str, Component], start: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of an SSP that belong to a variable; the standard has the others ignored."""
-    found = {}
-    for name, value in start.items():
-        with suppress(ModelError):
-            locate(components, name)
-            found[name] = value
     return found
 
 

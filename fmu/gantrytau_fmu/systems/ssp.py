@@ -7,6 +7,7 @@ a connection are says nothing of its direction, the kinds of the connectors do. 
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn
@@ -14,7 +15,8 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.systems.system import Connection
+from gantrytau_fmu.systems.components import Component
+from gantrytau_fmu.systems.system import Connection, locate
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
@@ -77,6 +79,16 @@ def read_ssp(path: str | os.PathLike[str], folder: Path) -> Structure:
     return Structure(
         reader.components, reader.connections(), reader.start, begin, stop, reader.step(experiment)
     )
+
+
+def matching(components: Mapping[str, Component], start: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of an SSP that belong to a variable; the standard has the others ignored."""
+    found = {}
+    for name, value in start.items():
+        with suppress(ModelError):
+            locate(components, name)
+            found[name] = value
+    return found
 
 
 class _Reader:

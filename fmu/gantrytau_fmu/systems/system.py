@@ -141,7 +141,11 @@ def _links(components: Mapping[str, Component], connection: Connection | tuple[s
             raise ModelError(f"connection {connection!r}: expected an output and an input, ('a.y', 'b.u')")
         connection = Connection(*connection)
     words = f"connection {connection.source} -> {connection.target}"
-    sources, targets = (locate(components, name) for name in (connection.source, connection.target))
+    try:
+        sources = locate(components, connection.source, "output")
+        targets = locate(components, connection.target, "input")
+    except ModelError as error:
+        raise ModelError(f"{words}: {error}") from error
     if len(sources) != len(targets):
         raise ModelError(
             f"{words}: found {len(sources)} and {len(targets)} elements, expected equally many; "

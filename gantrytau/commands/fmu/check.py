@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands.fmu.info import FmuFile, counted, present
+from gantrytau.commands.fmu.info import FmuFile, counted, is_system, present
 from gantrytau.commands.options import Json
 from gantrytau.commands.reporting import FAULT, as_json, busy, reporting
 
@@ -26,18 +26,20 @@ def check(
 ) -> None:
     """Check an FMU of any tool: the archive, the official schemas, FMPy's validation, and what they leave out.
 
-    Exit code 1 if there are errors; warnings and notes alone give 0.
+    Of a system (.ssp) each FMU is checked, and how they are connected. Exit code 1 if there are errors; warnings and
+    notes alone give 0.
     """
     from gantrytau_fmu.reading.checking import check_fmu
+    from gantrytau_fmu.systems.overview import check_system
 
     with reporting(json):
         present(file)
         with busy(f"checking {file.name}"):
-            findings = check_fmu(file, run=run, timeout=timeout)
+            findings = (check_system if is_system(file) else check_fmu)(file, run=run, timeout=timeout)
         errors = [finding for finding in findings if finding.severity == "error"]
         if json:
             found = {"file": str(file), "findings": [asdict(finding) for finding in findings]}
-            first = {"error": f"{file}: {errors[0].message}"} if errors else {}
+            first = {"error": f"{errors[0].path}: {errors[0].message}"} if errors else {}
             typer.echo(as_json({**first, **found}))
         else:
             for finding in findings:

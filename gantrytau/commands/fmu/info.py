@@ -1,27 +1,61 @@
 """`gantrytau fmu info`: what an FMU is, without loading anything of it."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gantrytau.commands.options import Json
 from gantrytau.commands.reporting import CommandError, as_json, reporting
 
-FmuFile = Annotated[Path, typer.Argument(metavar="FILE", help="An FMU, as robot.fmu.", show_default=False)]
+if TYPE_CHECKING:
+    from gantrytau_fmu.reading.described import FmuDescription
+    from gantrytau_fmu.systems.overview import SystemDescription
+
+FmuFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE", help="An FMU, as robot.fmu, or a system of FMUs (.ssp).", show_default=False
+    ),
+]
 
 
-def info(file: FmuFile, json: Json = False) -> None:
-    """Describe an FMU of any tool: version, interfaces, platforms, inputs, outputs, parameters.
+def info(
+    file: FmuFile,
+    every: Annotated[
+        bool, typer.Option("--all", help="List all variables, not only the first of a kind.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Describe an FMU of any tool: version, interfaces, platforms, inputs, outputs, parameters. Or a system (.ssp).
 
     Only its files are read, and only if they are harmless: its binaries are not loaded.
     """
-    from gantrytau_fmu.reading.reading import read_fmu
-
     with reporting(json):
         present(file)
-        found = read_fmu(file)
-        typer.echo(as_json(found.as_dict()) if json else str(found))
+        found = _read(file)
+        if json:
+            typer.echo(as_json(found.as_dict()))
+            return
+        words = found.table(None) if every else str(found)
+        typer.echo(words)
+        if "\n  ... and " in words:
+            typer.echo("\n--all lists all of them")
+
+
+def _read(file: Path) -> "FmuDescription | SystemDescription":
+    if is_system(file):
+        from gantrytau_fmu.systems.overview import read_system
+
+        return read_system(file)
+    from gantrytau_fmu.reading.reading import read_fmu
+
+    return read_fmu(file)
+
+
+def is_system(file: Path) -> bool:
+    """Whether a file is a system of FMUs, by its name."""
+    return file.suffix.lower() == ".ssp"
 
 
 def present(file: Path) -> None:

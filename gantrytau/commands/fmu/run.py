@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gantrytau.commands import pictures, saving
-from gantrytau.commands.fmu.info import present
+from gantrytau.commands.fmu.info import is_system, present
 from gantrytau.commands.fmu.wording import in_options, speaking_of_options
 from gantrytau.commands.options import Json, Plotted, Saved, To, listed
 from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, fail, note, reporting
@@ -113,7 +113,7 @@ def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
         raise CommandError(
             f"--order {order}: expected {', '.join(ORDERS[:-1])} or {ORDERS[-1]}{near if 'did you' in near else ''}"
         )
-    if _is_system(file):
+    if is_system(file):
         if me:
             raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")
         return
@@ -123,10 +123,6 @@ def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
         raise CommandError(
             "--me --isolate: Model Exchange runs in this process, expected one of them; leave the other out"
         )
-
-
-def _is_system(file: Path) -> bool:
-    return file.suffix.lower() == ".ssp"
 
 
 @contextmanager
@@ -154,7 +150,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
-    if not _is_system(file):
+    if not is_system(file):
         from gantrytau_fmu.systems.single import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
