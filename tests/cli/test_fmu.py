@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from gantrytau.commands.fmu.export import PLATFORMS
 from gantrytau.errors import ModelError
+from gantrytau_fmu import Experiment
+from gantrytau_fmu.building.platforms import PLATFORMS as KNOWN
 from gantrytau_fmu.building.platforms import native
 from tests.fmu.tiny_fmus import FMI2, lag2, pack, running3
 
@@ -105,6 +108,8 @@ def test_options_arrive(run, asked, cart, tmp_path):
         "x",
     ]
     arguments += ["--find", "f,v", "--find", "der(v)", "--states", "v", "--tolerance", "1e-7", "--no-sources"]
+    arguments += ["--stop", "2", "--step", "0.5", "--description", "a cart", "--author", "A. Author"]
+    arguments += ["--copyright", "2026 A. Author", "--license", "MIT", "--model-version", "1.2"]
     found = run("fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu", *arguments)
     assert found.exit_code == 0, found.output
     ((model, policy),) = asked
@@ -119,7 +124,26 @@ def test_options_arrive(run, asked, cart, tmp_path):
         "states": ("v",),
         "tolerance": 1e-7,
         "sources": False,
+        "description": "a cart",
+        "author": "A. Author",
+        "copyright": "2026 A. Author",
+        "license": "MIT",
+        "version": "1.2",
+        "experiment": Experiment(stop=2.0, step=0.5, tolerance=1e-7),
     }
+
+
+def test_a_short_experiment_has_a_short_step(run, asked, cart, tmp_path):
+    run("fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu", "--stop", "0.001")
+    ((_, policy),) = asked
+    assert policy["experiment"] == Experiment(stop=0.001, step=0.001)
+
+
+def test_the_help_lists_the_platforms(run):
+    assert set(PLATFORMS) == set(KNOWN)
+    words = run("fmu", "export", "--help").stdout
+    for name in KNOWN:
+        assert name in "".join(words.split()).replace("│", "")
 
 
 def test_defaults_arrive(run, asked, cart, tmp_path):
@@ -135,6 +159,12 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
         "states": None,
         "tolerance": 1e-6,
         "sources": True,
+        "description": "",
+        "author": "",
+        "copyright": "",
+        "license": "",
+        "version": "",
+        "experiment": None,
     }
 
 
@@ -149,6 +179,10 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
             ["--to", "no/where/cart.fmu"],
             "--to no/where/cart.fmu: the folder 'no/where' does not exist; create it",
         ),
+        (["--stop", "0"], "--stop 0: expected a time above 0, in s"),
+        (["--stop", "nan"], "--stop nan: expected a time above 0, in s"),
+        (["--step", "0"], "--step 0: expected more than 0 and at most the 1 s until the stop"),
+        (["--step", "3", "--stop", "2"], "--step 3: expected more than 0 and at most the 2 s until the stop"),
         (["--set", "n=1"], "--set n: Cart has no 'n'"),
     ],
 )

@@ -1,9 +1,10 @@
 """`gantrytau fmu export`: a model as an FMU."""
 
+import math
 import time
 import warnings
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,11 +16,19 @@ from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings,
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting
 from gantrytau.errors import ModelError, did_you_mean
 
+if TYPE_CHECKING:
+    from gantrytau_fmu import Experiment
+
 INTERFACES = {
     "both": ("model-exchange", "co-simulation"),
     "me": ("model-exchange",),
     "cs": ("co-simulation",),
 }
+PLATFORMS = tuple(
+    f"{processor}-{system}"
+    for system in ("linux", "windows", "darwin")
+    for processor in ("x86_64", "aarch64")
+)
 VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
 SOLVERS = ("dopri5", "rodas4")
 
@@ -34,7 +43,7 @@ def export(
         list[str] | None,
         typer.Option(
             metavar="NAMES",
-            help="'native' for this machine, 'all', or names as x86_64-windows, separated by commas; others than "
+            help=f"'native' for this machine, 'all', or {', '.join(PLATFORMS)}, separated by commas; others than "
             "this machine need the extra 'cross'.",
             show_default="native",
         ),
@@ -64,6 +73,31 @@ def export(
         ),
     ] = None,
     tolerance: Annotated[float, typer.Option(help="Relative, of Co-Simulation.")] = 1e-6,
+    stop: Annotated[
+        float | None, typer.Option(help="Default experiment: its end, in s.", show_default="1.0")
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(help="Default experiment: step of Co-Simulation, in s.", show_default="0.004"),
+    ] = None,
+    description: Annotated[
+        str, typer.Option(metavar="TEXT", help="What the file says of the model.", show_default="the model's")
+    ] = "",
+    author: Annotated[
+        str, typer.Option(metavar="TEXT", help="Who wrote the model.", show_default=False)
+    ] = "",
+    copyright_: Annotated[
+        str, typer.Option("--copyright", metavar="TEXT", help="Whose the model is.", show_default=False)
+    ] = "",
+    license_: Annotated[
+        str,
+        typer.Option(
+            "--license", metavar="TEXT", help="Licence of the model, as BSD-3-Clause.", show_default=False
+        ),
+    ] = "",
+    model_version: Annotated[
+        str, typer.Option(metavar="TEXT", help="Version of the model.", show_default=False)
+    ] = "",
     no_sources: Annotated[
         bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")
     ] = False,
@@ -87,6 +121,12 @@ def export(
             "find": listed(find),
             "states": listed(states) or None,
             "sources": not no_sources,
+            "description": description,
+            "author": author,
+            "copyright": copyright_,
+            "license": license_,
+            "version": model_version,
+            "experiment": _experiment(stop, step, tolerance),
         }
         chosen = build(model, prototype, set_ or ())
         file = to or Path(f"{chosen.name}.fmu")
@@ -94,6 +134,21 @@ def export(
         begin = time.perf_counter()
         told = _exported(chosen, file, policy)
         _show(chosen, file, time.perf_counter() - begin, told, json)
+
+
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> "Experiment | None":
+    """The default experiment, None if nothing is said of it; CommandError for times that are none."""
+    if stop is None and step is None:
+        return None
+    from gantrytau_fmu import Experiment
+
+    if stop is not None and not 0 < stop < math.inf:
+        raise CommandError(f"--stop {stop:g}: expected a time above 0, in s")
+    stop = Experiment.stop if stop is None else stop
+    if step is not None and not 0 < step <= stop:
+        raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
+    step = min(Experiment.step, stop) if step is None else step
+    return Experiment(stop=stop, step=step, tolerance=tolerance)
 
 
 def _unknown(option: str, found: str, expected: Any) -> Any:
