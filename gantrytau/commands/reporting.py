@@ -19,6 +19,7 @@ FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
 INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
 
+USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
 
 
@@ -27,16 +28,24 @@ class CommandError(GantryTauError):
 
 
 class Commands(TyperGroup):
-    """All commands; an output that takes no more, as a full disk, ends them with a message instead of a traceback."""
+    """All commands; an output that takes no more, as a full disk, ends them with a message instead of a traceback.
+
+    Arguments and options that do not exist or are missing are told as JSON where `--json` is among them.
+    """
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command, and see to it that all it printed has arrived."""
+        json = "--json" in [*getattr(ctx, "_protected_args", ()), *ctx.args]
         try:
             try:
                 return super().invoke(ctx)
             finally:
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
+        except USAGE_ERROR as error:
+            if not json:
+                raise
+            fail(error.format_message(), MISUSE, json)
         except OSError as error:
             if error.filename is not None or error.errno not in FULL:
                 raise

@@ -1,0 +1,28 @@
+"""Commands, arguments and options that do not exist, or are missing."""
+
+import json
+
+import pytest
+
+MISUSE = 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fmu", "run"], "Missing argument"),
+        (["fmu", "rum"], "rum"),
+        (["fmu", "info", "a.fmu", "--every"], "--every"),
+        (["simulate", "Pendulum", "--stop", "x"], "--stop"),
+        (["simulat"], "simulat"),
+    ],
+)
+def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
+    printed, spoken = run(*arguments, "--json"), run(*arguments)
+    assert (printed.exit_code, spoken.exit_code) == (MISUSE, MISUSE)
+    said = json.loads(printed.stdout)
+    assert list(said) == ["error"]
+    assert words in said["error"]
+    assert printed.stderr == ""
+    assert spoken.stdout == ""
+    assert words in spoken.stderr
