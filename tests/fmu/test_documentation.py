@@ -3,6 +3,7 @@
 import io
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.metadata import version
 from pathlib import Path
 
 import fmpy
@@ -101,6 +102,32 @@ def test_the_page_tells_inputs_outputs_parameters_and_states(fmi):
     ):
         assert words in page.words
     assert "States: 2; event indicators: 0." in page.words
+
+
+def test_the_page_names_the_version_of_the_tool_and_what_is_marked():
+    page = Page(documentation(oscillator(), "3.0"))
+    assert page.row("Made with")[1] == f"gantrytau {version('gantrytau')}, 2026-01-02T03:04:05Z"
+    assert page.row("spring.c")[4].endswith("set before the start")
+    assert (
+        "all but those that are marked “set before the start” may be changed at any time later" in page.words
+    )
+    other = Page(documentation(oscillator(tool="no such tool"), "3.0"))
+    assert other.row("Made with")[1] == "no such tool, 2026-01-02T03:04:05Z"
+
+
+def test_the_example_sets_a_parameter_and_an_input(monkeypatch):
+    calls = []
+    monkeypatch.setattr(fmpy, "simulate_fmu", lambda *arguments, **more: calls.append((arguments, more)))
+    for told in (oscillator(), interface()):
+        page = Page(documentation(told, "3.0")).words
+        exec(page[page.index("from fmpy") : page.index("Licence\n")])
+    (names, policy), (_, least) = calls
+    given = policy.pop("input")
+    assert names == ("Mechanics_Box.fmu",)
+    assert policy == dict(start_time=0.5, stop_time=4, output_interval=0.002, start_values={"m": 2.5})
+    assert given.dtype.names == ("time", "f")
+    assert [tuple(row) for row in given] == [(0.5, 0.1), (4.0, 0.1)]
+    assert least == dict(stop_time=1, output_interval=0.004)
 
 
 def test_the_page_has_no_scripts_and_its_links_lead_somewhere():

@@ -4,7 +4,9 @@ FMI 3.0.2, section 2.5.1.1; FMI 2.0.4, section 2.3: index.html is the entry, lic
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from html import escape
+from importlib.metadata import PackageNotFoundError, version
 from itertools import groupby
 
 from gantrytau_fmu.describing.checks import initial_of, limit
@@ -24,6 +26,7 @@ SOLVERS = {
     "dopri5": "DOPRI5, the explicit Runge-Kutta method 5(4) of Dormand and Prince with adaptive steps",
     "rodas4": "Rodas4, a linearly implicit (Rosenbrock) method of order 4 with adaptive steps, for stiff models",
 }
+FIXED = "set before the start"  # of parameters that are fixed afterwards
 KINDS = {"model-exchange": "Model Exchange", "co-simulation": "Co-Simulation"}
 
 
@@ -85,10 +88,17 @@ def _facts(interface: Interface, fmi: str) -> str:
         "Version": interface.version,
         "Author": interface.author,
         "Copyright": interface.copyright,
-        "Made with": " ".join(filter(None, (interface.tool, interface.generated))),
+        "Made with": ", ".join(filter(None, (_tool(interface.tool), interface.generated))),
         "Token": interface.token,
     }
     return _table((), ((_text(name), _text(value)) for name, value in rows.items() if value))
+
+
+def _tool(name: str) -> str:
+    """The tool with its version, if it is installed here."""
+    with suppress(PackageNotFoundError, ValueError):
+        return f"{name} {version(name)}"
+    return name
 
 
 def _needs() -> str:
@@ -182,9 +192,7 @@ def _limits(variable: Variable) -> str:
 
 
 def _note(variable: Variable) -> str:
-    fixed = (
-        "set before the start" if (variable.causality, variable.variability) == ("parameter", "fixed") else ""
-    )
+    fixed = FIXED if (variable.causality, variable.variability) == ("parameter", "fixed") else ""
     return "; ".join(filter(None, (_text(variable.description), fixed)))
 
 
@@ -216,14 +224,43 @@ def _use(interface: Interface, fmi: str) -> str:
         f"Default experiment: {told.start:g} s to {told.stop:g} s"
         + (f", step {told.step:g} s." if "co-simulation" in interface.interfaces else "."),
         "Parameters are set before initialisation"
-        + ("; those not marked may be changed later too." if adjustable else "."),
+        + (
+            f"; all but those that are marked &ldquo;{FIXED}&rdquo; may be changed at any time later, too."
+            if adjustable
+            else "."
+        ),
         "A call that fails logs why and names the variable, in the categories <code>logStatusError</code> and "
         "<code>logStatusWarning</code>; <code>logEvents</code> and <code>logCalls</code> tell more.",
     ]
-    step = f", output_interval={told.step:g}" if "co-simulation" in interface.interfaces else ""
-    script = f"from fmpy import simulate_fmu\nresult = simulate_fmu({file!r}, stop_time={told.stop:g}{step})"
     items = "".join(f"<li>{item}\n" for item in listed)
-    return f"<h2>How to use it</h2>\n<ul>\n{items}</ul>\n<pre>{escape(script, quote=False)}</pre>"
+    return f"<h2>How to use it</h2>\n<ul>\n{items}</ul>\n<pre>{escape(_script(interface), quote=False)}</pre>"
+
+
+def _script(interface: Interface) -> str:
+    """A run in FMPy, with the first parameter set and the first input given, which is held over the run."""
+    told = interface.experiment
+    known = next((v for v in interface.variables if v.causality == "input" and v.type == "real"), None)
+    chosen = next(
+        (v for v in interface.variables if v.causality == "parameter" and v.start is not None), None
+    )
+    lines = ["from fmpy import simulate_fmu"]
+    arguments = [f"{f'{interface.identifier}.fmu'!r}", f"stop_time={told.stop:g}"]
+    if told.start:
+        arguments.insert(1, f"start_time={told.start:g}")
+    if "co-simulation" in interface.interfaces:
+        arguments.append(f"output_interval={told.step:g}")
+    if chosen:
+        arguments.append(f"start_values={{{chosen.name!r}: {chosen.start!r}}}")
+    if known:
+        value = float(known.start or 0)
+        lines += [
+            "import numpy as np",
+            f"given = np.array([({told.start:g}, {value!r}), ({told.stop:g}, {value!r})],  # times in s and values",
+            f"                 dtype=[('time', float), ({known.name!r}, float)])",
+        ]
+        arguments.append("input=given")
+    call = ",\n                      ".join(arguments)
+    return "\n".join([*lines, f"result = simulate_fmu({call})"])
 
 
 def _license(interface: Interface) -> str:
