@@ -24,7 +24,7 @@ from gantrytau_fmu.interface import Experiment, Interface, Interfaces
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
 RUNTIME = (
-    "functions.c instance.c linear.c solve.c values.c initialize.c events.c derivatives.c state.c {solver}.c "
+    "functions.c instance.c linear.c solve.c passages.c values.c initialize.c events.c derivatives.c state.c {solver}.c "
     "step.c calls.c component.c fmi2.c fmi3.c"
 )
 INCLUDED = ("functions.c", "component.c")  # by others
@@ -92,6 +92,7 @@ def export_fmu(
         generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         terminals=contents.terminals,
         solver=solver,
+        watches=bool(contents.formulas.roots or contents.formulas.blocks),
     )
     texts = source_files(code.text, solver)
     binaries = _compiled(texts, targets, identifier, code.operations)

@@ -63,7 +63,8 @@ class Interface:
 
     token: GUID or instantiation token; identifier: model identifier, a C name; outputs, derivatives,
     initial_unknowns: the model structure; indicators: references of event indicators; terminals: groups of
-    variables that belong together, by the name of the component, references by member name.
+    variables that belong together, by the name of the component, references by member name; watches: singular poses
+    are looked for at the end of each step, also of an importer's integrator.
     """
 
     name: str
@@ -85,3 +86,4 @@ class Interface:
     tool: str = "gantrytau"
     terminals: dict[str, dict[str, int]] = field(default_factory=dict)
     solver: str = "dopri5"
+    watches: bool = False

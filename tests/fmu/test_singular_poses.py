@@ -166,7 +166,7 @@ def test_a_robot_that_is_pushed_out_of_reach_stops_with_an_error(version):
         status = instance.step(k * 0.01, 0.01)
         k += 1
     assert status == ERROR
-    told(instance, "tool.v[", "limit of reach")
+    told(instance, "carts[", "out of reach")
     status, place = instance.get(*(references[f"tool.r[{i}]"] for i in range(3)))
     assert status == OK  # the last pose within reach
     assert np.isfinite(place).all()

@@ -10,8 +10,9 @@ import numpy as np
 from gantrytau import Dae
 from gantrytau.flat_model import FlatVariable
 from gantrytau.symbols import split_derivative
+from gantrytau_fmu.code.arrays import column, numbers_of
 from gantrytau_fmu.code.expressions import Graph
-from gantrytau_fmu.code.formulas import Formulas, column, formulas_of, numbers_of
+from gantrytau_fmu.code.formulas import Formulas, formulas_of
 from gantrytau_fmu.code.model_code import Entry, output_places
 from gantrytau_fmu.interface import Unknown, Variable
 
@@ -209,10 +210,10 @@ def _inputs(builder: _Builder) -> None:
 
 def _states(builder: _Builder, outputs: Sequence[str]) -> None:
     formulas, shown = builder.formulas, set(outputs)
-    starts = np.array(builder.dae.table.number(formulas.starts)) if formulas.states else []
+    starts = numbers_of(builder.dae, formulas.arrays)["x"]
     references = []
     for place, name in enumerate(formulas.states):
-        solved = place in formulas.initial_states
+        solved = place in formulas.starts.solved
         more: dict[str, Any] = {} if solved else dict(start=float(starts[place]))
         references.append(
             builder.add(
@@ -357,7 +358,7 @@ def _structure(
     count = 1 + len(formulas.states) + len(formulas.inputs)
     names = ("time", *formulas.states, *formulas.inputs, *formulas.parameters)
     references = np.array([found[n] for n in names], dtype=int)
-    solved = {formulas.states[k] for k in formulas.initial_states}
+    solved = {formulas.states[k] for k in formulas.starts.solved}
     first = np.array([n not in solved for n in names], dtype=bool)
     shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
     rows = {found[n]: _row(builder, depends, n) for n in shown}

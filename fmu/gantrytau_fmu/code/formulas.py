@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
 from gantrytau import Dae
-from gantrytau.errors import ModelError
 from gantrytau.symbols import split_derivative
 from gantrytau.system import System
+from gantrytau_fmu.code.arrays import column
+from gantrytau_fmu.code.starts import Starts, starts_of
 
 HOLD = 0.01  # s, time in which the speed left at the instant of locking dies away
 
@@ -35,7 +35,7 @@ class Formulas:
     """Expressions in the symbols of `arrays`, by name of the array.
 
     outputs: expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
-    breakaway force by turns; initial: residuals that determine `initial_states`; starts: of the states in parameters.
+    breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends.
     """
 
     dae: Dae
@@ -51,9 +51,8 @@ class Formulas:
     outputs: Mapping[str, ca.SX]
     frictions: tuple[str, ...]
     friction: ca.SX
-    initial: ca.SX
-    initial_states: tuple[int, ...]
-    starts: ca.SX
+    roots: Mapping[str, ca.SX]
+    starts: Starts
     parameters: tuple[str, ...]
 
     @property
@@ -69,13 +68,7 @@ class Formulas:
     @property
     def start_parameters(self) -> frozenset[str]:
         """Parameters on which start values or sampling periods depend: they act during initialisation only."""
-        return frozenset(s.name() for s in ca.symvar(column([self.starts, self.periods])))
-
-
-def column(parts: Sequence[ca.SX]) -> ca.SX:
-    """Vectors below each other; no vectors give an empty one."""
-    parts = [p for p in parts if p.numel()]
-    return ca.SX(ca.vertcat(*parts)) if parts else ca.SX(0, 1)
+        return self.starts.parameters | {s.name() for s in ca.symvar(self.periods)}
 
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
@@ -110,7 +103,8 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     }
     periods, clocks = _clocks(system, sampled)
     inputs = (*dae.inputs, *differentiated)
-    rows, chosen = _initial(dae, system, column(initial), arrays, blocks)
+    starts = starts_of(dae, system, column(initial), column([b.residual for b in blocks]), arrays)
+    roots = _roots(system)
     return Formulas(
         dae=dae,
         arrays=arrays,
@@ -125,9 +119,8 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
         outputs=dict(zip(outputs, wanted, strict=True)),
         frictions=tuple(f.force for f in frictions),
         friction=column([e for v, law in zip(speeds, laws, strict=True) for e in (v, law[2])]),
-        initial=rows,
-        initial_states=chosen,
-        starts=_starts(dae, set(chosen)),
+        roots=roots,
+        starts=starts,
         parameters=system.parameters,
     )
 
@@ -182,6 +175,19 @@ def _block(names: Sequence[str], unknowns: ca.SX, residual: ca.SX, frictions: bo
     return ImplicitBlock(tuple(names), unknowns, residual, linear, frictions)
 
 
+def _roots(system: System) -> dict[str, ca.SX]:
+    """Of blocks in closed form: square roots, and determinants of those with several unknowns, relative to nothing."""
+    found = {}
+    for block in system.dae.blocks:
+        if block.root is not None:
+            found[block.tears[0].name()] = ca.sqrt(block.root.radicand)
+        elif block.kind == "spheres" and block.solution is not None:
+            found[block.tears[0].name()] = ca.det(
+                ca.jacobian(ca.vertcat(*block.residuals), ca.vertcat(*block.tears))
+            )
+    return dict(zip(found, system.resolve(list(found.values())), strict=True)) if found else {}
+
+
 def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:
     """Different periods, and which of them each sampled variable follows."""
     periods: list[ca.SX] = []
@@ -193,62 +199,3 @@ def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:
             periods.append(expression)
         clocks.append(texts.index(str(expression)))
     return column(periods), tuple(clocks)
-
-
-def _starts(dae: Dae, solved: set[int]) -> ca.SX:
-    """Start values of the states: as declared where the declared value held, numbers else."""
-    declared = {n: s for v in dae.flat.variables if v.start for n, s in zip(v.elements, v.start, strict=True)}
-    found = []
-    for place, (name, spoken) in enumerate(zip(dae.choice.states, dae.states, strict=True)):
-        number = dae.start[name]
-        start = declared.get(spoken)
-        if start is not None and not start.is_constant() and place not in solved:
-            start = dae.table.reduce(start)
-            if abs(float(dae.table.number(start)[0]) - number) <= 1e-12 * (1 + abs(number)):
-                found.append(start)
-                continue
-        found.append(ca.SX(number))
-    return column(found)
-
-
-def numbers_of(dae: Dae, arrays: Mapping[str, ca.SX]) -> dict[str, np.ndarray]:
-    """Values of all arrays where the model starts, modes locked."""
-    values = {**dae.start, **dae.table.values, dae.flat.time.name(): dae.start.get(dae.flat.time.name(), 0.0)}
-    return {
-        n: np.zeros(a.numel()) if n == "m" else np.array([values.get(s.name(), 0.0) for s in a.elements()])
-        for n, a in arrays.items()
-    }
-
-
-def _initial(
-    dae: Dae, system: System, rows: ca.SX, arrays: Mapping[str, ca.SX], blocks: Sequence[ImplicitBlock]
-) -> tuple[ca.SX, tuple[int, ...]]:
-    """The initial equations that determine states, and which: those that may move and move them best."""
-    if not rows.numel():
-        return rows, ()
-    from scipy.linalg import qr
-
-    residual = column([b.residual for b in blocks])
-    at = list(numbers_of(dae, arrays).values())
-
-    def number(expression: ca.SX) -> np.ndarray:
-        return np.array(ca.Function("at", list(arrays.values()), [ca.densify(expression)])(*at))
-
-    x, z = arrays["x"], arrays["z"]
-    slopes = number(ca.jacobian(rows, x))
-    if z.numel():
-        slopes -= number(ca.jacobian(rows, z)) @ np.linalg.solve(
-            number(ca.jacobian(residual, z)), number(ca.jacobian(residual, x))
-        )
-    fixed = set(dae.settings["fixed"])
-    may_move = [k for k, n in enumerate(dae.choice.states) if n not in fixed]
-    rank = np.linalg.matrix_rank(slopes[:, may_move], tol=1e-9 * max(1.0, np.abs(slopes).max(initial=0.0)))
-    columns = qr(slopes[:, may_move], mode="r", pivoting=True)[-1]
-    chosen = tuple(sorted(may_move[k] for k in columns[:rank]))
-    kept = qr(slopes[:, list(chosen)].T, mode="r", pivoting=True)[-1] if rank else ()
-    if rank < rows.numel():
-        raise ModelError(
-            f"export_fmu: {dae.name}: found {rows.numel()} initial equations, of which only {rank} determine states "
-            "that are not fixed; remove those that repeat others or that contradict fixed starts"
-        )
-    return rows[sorted(int(k) for k in kept[:rank])], chosen

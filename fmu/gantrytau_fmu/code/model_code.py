@@ -4,11 +4,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
+from gantrytau_fmu.code.arrays import column, numbers_of
 from gantrytau_fmu.code.c_functions import CFunction, c_function
 from gantrytau_fmu.code.expressions import Graph
-from gantrytau_fmu.code.formulas import Formulas, column, numbers_of
+from gantrytau_fmu.code.formulas import Formulas
 from gantrytau_fmu.code.operations import number_text
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
@@ -112,14 +112,17 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[CFunction]:
     named = {
         "gt_rates": formulas.rates,
         "gt_outputs": wanted,
-        "gt_starts": formulas.starts,
-        "gt_initial": formulas.initial,
+        "gt_starts": formulas.starts.values,
+        "gt_initial": formulas.starts.equations,
         "gt_friction": formulas.friction,
+        "gt_roots": column(list(formulas.roots.values())),
         "gt_periods": formulas.periods,
         "gt_samples": formulas.samples,
         "gt_forward": _along(everything, point, way),
         "gt_by_parameters": _along(everything, s["p"], s["dp"]),
-        "gt_initial_slopes": _along(formulas.initial, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])),
+        "gt_initial_slopes": _along(
+            formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])
+        ),
     }
     for k, block in enumerate(formulas.blocks):
         named[f"gt_residual_{k}"] = block.residual
@@ -159,7 +162,8 @@ def _sizes(
         GT_MODES=len(formulas.frictions),
         GT_INDICATORS=len(formulas.frictions),
         GT_CLOCKS=formulas.periods.numel(),
-        GT_INITIAL=formulas.initial.numel(),
+        GT_INITIAL=formulas.starts.equations.numel(),
+        GT_ROOTS=len(formulas.roots),
         GT_ARRAYS=len(ARRAYS),
         GT_HOISTED=hoisted,
         GT_WORK=max((p.work for p in pieces), default=0),
@@ -170,7 +174,6 @@ def _tables(
     formulas: Formulas, variables: Sequence[Entry], constants: Sequence[float], nominals: Sequence[float]
 ) -> list[str]:
     at = numbers_of(formulas.dae, formulas.arrays)
-    starts = np.array(formulas.dae.table.number(formulas.starts)) if formulas.starts.numel() else np.zeros(0)
     held = [formulas.clocks.index(k) for k in range(formulas.periods.numel())]
     lines = [
         "static const gt_variable gt_variables[] = {",
@@ -181,16 +184,17 @@ def _tables(
         *(f"  {_quoted(v.name)}," for v in variables),
         "};",
         _numbers("gt_constants", constants),
-        _numbers("gt_start_x", starts),
+        _numbers("gt_start_x", at["x"]),
         _numbers("gt_start_u", at["u"]),
         _numbers("gt_start_z", at["z"]),
         _numbers("gt_start_p", at["p"]),
         _numbers("gt_x_nominals", nominals),
-        _integers("gt_initial_states", formulas.initial_states),
+        _integers("gt_initial_states", formulas.starts.solved),
         _integers("gt_friction_unknowns", [formulas.z_names.index(n) for n in formulas.frictions]),
         _integers("gt_held_clocks", formulas.clocks),
         _texts("gt_x_names", formulas.states),
         _texts("gt_z_names", formulas.z_names),
+        _texts("gt_root_names", formulas.roots),
         _texts("gt_held_names", formulas.held),
         _texts("gt_clock_names", [formulas.held[k] for k in held]),
         "typedef struct {",

@@ -28,7 +28,7 @@ def interface_types(interface: Interface, compiled: Sequence[str]) -> str:
         "canSerializeFMUstate": True,
         "providesDirectionalDerivative": True,
     }
-    exchange = {**common, "completedIntegratorStepNotNeeded": True}
+    exchange = {**common, "completedIntegratorStepNotNeeded": not interface.watches}
     simulation = {
         **common,
         "canHandleVariableCommunicationStepSize": True,

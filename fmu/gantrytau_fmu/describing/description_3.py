@@ -32,7 +32,7 @@ def interface_types(interface: Interface, compiled: Sequence[str]) -> str:
     simulation = {**common, "canHandleVariableCommunicationStepSize": True, "hasEventMode": False}
     text = ""
     if "model-exchange" in interface.interfaces:
-        text += element("ModelExchange", {**common, "needsCompletedIntegratorStep": False})
+        text += element("ModelExchange", {**common, "needsCompletedIntegratorStep": interface.watches})
     if "co-simulation" in interface.interfaces:
         text += element("CoSimulation", simulation)
     return text

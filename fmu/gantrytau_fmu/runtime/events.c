@@ -6,7 +6,7 @@
 
 #define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
 #define GT_MARGIN 1e-9       /* of the breakaway force */
-#define GT_ON_TIME 1e-9      /* of a period: instants that close are the same */
+#define GT_ON_TIME 1e-6      /* of a period: instants that close are the same, also where masters add up their steps */
 
 /* Speed and breakaway force of each friction, (2, GT_MODES), rows first. */
 static gt_status gt_laws(gt_instance *it, double *laws) {
@@ -38,6 +38,7 @@ static gt_status gt_get_indicators(gt_instance *it, double *indicators) {
 static void gt_set_mode(gt_instance *it, int i, double mode, double speed) {
     static const char *const words[] = {"slides backward", "is locked", "slides forward"};
     it->now.m[i] = mode;
+    it->last_event = gt_z_names[gt_friction_unknowns[i]];
     it->now.rest[i] = GT_REST + fmax(0, -mode * speed);
     it->now.stale = it->outputs_stale = 1;
     gt_say(it, GT_OK, GT_LOG_EVENTS, "%s: %s %s from time = %.9g s on", GT_NAME, gt_z_names[gt_friction_unknowns[i]],
@@ -97,6 +98,57 @@ static gt_status gt_friction_events(gt_instance *it, int *changed) {
     return status;
 }
 
+/* How far locked frictions are from breaking away, and its rates: a difference over a millionth of `span`. */
+static gt_status gt_spares(gt_instance *it, double span, double *spares, double *rates) {
+    double slopes[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_MODES)];
+    gt_status status = gt_get_indicators(it, spares);
+    const gt_state kept = it->now;
+    int i;
+    if (status == GT_OK) status = gt_get_rates(it, slopes);
+    if (status != GT_OK) return status;
+    for (i = 0; i < GT_STATES; i++) it->now.x[i] += 1e-6 * span * slopes[i];
+    it->now.time += 1e-6 * span;
+    it->now.stale = 1;
+    status = gt_get_indicators(it, moved);
+    for (i = 0; i < GT_MODES && status == GT_OK; i++) rates[i] = (moved[i] - spares[i]) / (it->now.time - kept.time);
+    it->now = kept;
+    it->outputs_stale = it->factors_stale = 1;
+    gt_point_at(it, &it->now.time, it->now.x);
+    return status;
+}
+
+/* The least of the cubic that has these values and rates at both ends of a step, at seven places between. */
+static double gt_least_between(double step, double first, double rate, double last, double last_rate) {
+    double least = INFINITY;
+    int k;
+    for (k = 1; k < 8; k++) {
+        const double s = k / 8., r = 1 - s;
+        least = fmin(least, r * r * (1 + 2 * s) * first + s * s * (1 + 2 * r) * last + step * s * r * (r * rate - s * last_rate));
+    }
+    return least;
+}
+
+/* Whether a locked friction may have broken away between two points a step apart: its spare force comes down
+ * between them, or goes from one to the other but not at the rates that it has there. The step is too long to know. */
+static int gt_may_have_slipped(const gt_instance *it, double step, const double *spares, const double *rates,
+                               const double *later, const double *later_rates) {
+    int i;
+    for (i = 0; i < GT_MODES; i++) {
+        const double led = 0.5 * step * (rates[i] + later_rates[i]), smaller = fmin(spares[i], later[i]);
+        if (it->now.m[i] != 0) continue;
+        if (fabs(later[i] - spares[i] - led) > 0.1 * smaller + 1e-4 * fabs(led)) return 1;
+        if (gt_least_between(step, spares[i], rates[i], later[i], later_rates[i]) < 0.5 * smaller) return 1;
+    }
+    return 0;
+}
+
+static int gt_sticks(const gt_instance *it) {
+    int i;
+    for (i = 0; i < GT_MODES; i++)
+        if (it->now.m[i] == 0) return 1;
+    return 0;
+}
+
 static double gt_next_tick(const gt_instance *it, int clock, const double *periods) {
     return it->now.start + it->now.ticks[clock] * periods[clock];
 }
@@ -112,12 +164,19 @@ static gt_status gt_check_clocks(gt_instance *it) {
     return GT_OK;
 }
 
-/* The earliest sampling instant to come; INFINITY if there is none. */
-static double gt_next_sample(gt_instance *it) {
+static double gt_on_time(double time, double period) {
+    return GT_ON_TIME * period + 4.5e-16 * fabs(time);
+}
+
+/* The earliest sampling instant to come that is before `end`; INFINITY if there is none. */
+static double gt_next_sample(gt_instance *it, double end) {
     double periods[GT_ROOM(GT_CLOCKS)], next = INFINITY;
     int i;
     if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
-    for (i = 0; i < GT_CLOCKS; i++) next = fmin(next, gt_next_tick(it, i, periods));
+    for (i = 0; i < GT_CLOCKS; i++) {
+        const double tick = gt_next_tick(it, i, periods);
+        if (tick < next && tick + gt_on_time(tick, periods[i]) < end) next = tick;
+    }
     return next;
 }
 
@@ -131,7 +190,7 @@ static gt_status gt_sample(gt_instance *it, int *sampled) {
     gt_parameters(it);
     gt_periods(it->a, periods, it->w);
     for (i = 0; i < GT_CLOCKS; i++) {
-        due[i] = gt_next_tick(it, i, periods) <= it->now.time + GT_ON_TIME * periods[i];
+        due[i] = gt_next_tick(it, i, periods) <= it->now.time + gt_on_time(it->now.time, periods[i]);
         *sampled |= due[i];
     }
     if (!*sampled) return GT_OK;
@@ -145,7 +204,11 @@ static gt_status gt_sample(gt_instance *it, int *sampled) {
     for (i = 0; i < GT_HELD_COUNT; i++)
         if (due[gt_held_clocks[i]]) it->now.u[GT_INPUTS + i] = held[i];
     for (i = 0; i < GT_CLOCKS; i++)
-        if (due[i]) it->now.ticks[i] = floor((it->now.time - it->now.start) / periods[i] + GT_ON_TIME) + 1;
+        if (due[i]) {
+            const double gone = it->now.time + gt_on_time(it->now.time, periods[i]) - it->now.start;
+            it->now.ticks[i] = fmax(it->now.ticks[i], floor(gone / periods[i])) + 1;
+            it->last_event = gt_clock_names[i];
+        }
     it->now.stale = it->outputs_stale = 1;
     return GT_OK;
 }
@@ -157,7 +220,7 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     if (status == GT_OK) status = gt_friction_events(it, &changed);
     if (status != GT_OK) return status;
     info->again = sampled || changed;
-    info->next = gt_next_sample(it);
+    info->next = gt_next_sample(it, INFINITY);
     info->next_defined = GT_CLOCKS > 0;
     return GT_OK;
 }

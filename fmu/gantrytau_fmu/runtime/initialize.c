@@ -68,10 +68,13 @@ static gt_status gt_initialize(gt_instance *it) {
     it->now.initialized = 1;
     gt_keep_point(it);
     memset(it->now.side_rates, 0, sizeof it->now.side_rates);
+    if (GT_ROOTS && !it->cosimulation) gt_root_rates(it, 1e-3, it->now.root_rates);
     memset(it->now.ticks, 0, sizeof it->now.ticks);
     status = gt_check_clocks(it);
     if (status == GT_OK) status = gt_begin_modes(it);
     if (status == GT_OK && !it->cosimulation) return gt_get_rates(it, rates); /* samples are taken in the first event mode */
+    memcpy(it->now.first_held, it->now.u + GT_INPUTS, GT_HELD_COUNT * sizeof(double));
+    it->now.first = 1;
     if (status == GT_OK) status = gt_update(it, &info);
     if (status == GT_OK) status = gt_get_rates(it, rates);
     return status;

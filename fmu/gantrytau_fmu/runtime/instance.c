@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define GT_ROOM(n) ((n) + 1) /* ISO C knows no arrays of length zero */
+#define GT_SIDES (GT_BLOCKS + GT_ROOTS) /* what shows singular poses: determinants, and roots in closed forms */
 #define GT_SLOPES (GT_STATES + GT_ALGEBRAICS + GT_OUTPUTS)
 #define GT_LARGEST_BLOCK_ROOM GT_ROOM(GT_LARGEST_BLOCK)
 
@@ -23,11 +24,13 @@ typedef struct {
     /* the last point where the equations were solved, from which others are reached */
     double solved_time, solved_x[GT_ROOM(GT_STATES)], solved_u[GT_ROOM(GT_KNOWN)], solved_z[GT_ROOM(GT_ALGEBRAICS)];
     double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
-    /* determinants of the blocks where they were solved last, where the last step ended, and their rates on it */
-    double sides[GT_ROOM(GT_BLOCKS)], kept_time, kept_sides[GT_ROOM(GT_BLOCKS)], side_rates[GT_ROOM(GT_BLOCKS)];
-    double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)]; /* there, in Model Exchange */
+    /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
+    double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
+    double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)]; /* there, in Model Exchange */
+    double first_held[GT_ROOM(GT_HELD_COUNT)]; /* held variables before the first samples */
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
+    int first;     /* no step was taken yet: the first samples are taken again with the inputs it begins with */
     int ready;     /* the experiment is set up */
     int unsettled; /* the last event iteration asked for another one */
 } gt_state;
@@ -54,6 +57,7 @@ struct gt_instance {
     double k[7][GT_ROOM(GT_STATES)], trial[GT_ROOM(GT_STATES)], next[GT_ROOM(GT_STATES)];
     double jacobian[GT_ROOM(GT_STATES * GT_STATES)], rate_of_time[GT_ROOM(GT_STATES)];
     int order[GT_ROOM(GT_STATES)];
+    const char *last_event; /* name of the variable */
     double rows[GT_ROOM(GT_STATES)];
 };
 
@@ -74,6 +78,7 @@ static gt_status gt_say(gt_instance *it, gt_status status, gt_category category,
 static gt_status gt_initial_equations(gt_instance *it);
 static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
+static int gt_other_side(const gt_instance *it);
 
 /* Where the functions of the model find their arguments; the order is that of ARRAYS in code/model_code.py. */
 static void gt_point_at(gt_instance *it, const double *time, const double *x) {

@@ -10,10 +10,6 @@
 #define GT_SINGULAR 1e-7   /* relative to the largest coefficient: below, rounding moves a solution by its own root */
 #define GT_FAR 0.1         /* size of a first step, relative to 1 + |z|, from which on the way is followed */
 #define GT_STEPS_ON_THE_WAY 64
-#define GT_STRIDE (1. / 32)        /* of the way of a step that is looked at again */
-#define GT_SHORTEST_STRIDE 1e-5    /* rounding moves solutions next to a singular pose by its root */
-#define GT_CLOSE 1e-4              /* determinants that are so much smaller than at the ends of the way are zero */
-#define GT_APART 1e-6              /* relative: solutions that differ more are not the same */
 
 static double gt_norm(int n, const double *values) {
     double sum = 0;
@@ -44,8 +40,11 @@ static gt_status gt_block_fails(gt_instance *it, const gt_block *block, int quie
         strcat(names, name);
     }
     return gt_say(it, GT_ERROR, GT_LOG_ERROR,
-                  "%s: the equations for %s %s at time = %.9g s; the pose may be singular or out of reach: keep away from it, "
-                  "or check states, inputs and parameters", GT_NAME, names, why, *it->a[0]);
+                  "%s: the equations for %s %s at time = %.9g s; %s", GT_NAME, names, why, *it->a[0],
+                  block->frictions ? "frictions that stick at once may leave their forces open: keep one on each moving part, or take "
+                                     "smooth friction"
+                                   : "the pose may be singular or out of reach: keep away from it, or check states, inputs and "
+                                     "parameters");
 }
 
 static int gt_factor_block(gt_instance *it, const gt_block *block) {
@@ -198,128 +197,6 @@ static gt_status gt_refresh(gt_instance *it) {
     memcpy(it->now.solved_x, it->now.x, sizeof it->now.x);
     memcpy(it->now.solved_u, it->now.u, sizeof it->now.u);
     memcpy(it->now.solved_z, it->now.z, sizeof it->now.z);
-    return GT_OK;
-}
-
-/* A block that is on the other side of a singular pose than where the last step ended, or -1. */
-static int gt_other_side(const gt_instance *it) {
-    int i;
-    for (i = 0; i < GT_BLOCKS; i++)
-        if (!gt_blocks[i].frictions && it->now.kept_sides[i] * it->now.sides[i] < 0) return i;
-    return -1;
-}
-
-/* Two ways to assemble a mechanism may cross in a singular pose: a determinant that was about to change its sign, and
- * did not, may have come over to the other way. The block of one that would change after `gone`, or -1. */
-static int gt_turns(const double *sides, const double *rates, double gone) {
-    int i;
-    for (i = 0; i < GT_BLOCKS; i++)
-        if (!gt_blocks[i].frictions && (sides[i] + rates[i] * gone) * sides[i] < 0) return i;
-    return -1;
-}
-
-static int gt_turned(const gt_instance *it) {
-    return gt_turns(it->now.kept_sides, it->now.side_rates, it->now.time - it->now.kept_time) >= 0;
-}
-
-/* The present point is where the last step ended. */
-static void gt_keep_point(gt_instance *it) {
-    it->now.kept_time = it->now.time;
-    memcpy(it->now.kept_sides, it->now.sides, sizeof it->now.sides);
-    if (it->cosimulation) return;
-    memcpy(it->now.kept_x, it->now.x, sizeof it->now.x);
-    memcpy(it->now.kept_u, it->now.u, sizeof it->now.u);
-    memcpy(it->now.kept_z, it->now.z, sizeof it->now.z);
-}
-
-static void gt_keep_sides(gt_instance *it) {
-    const double gone = it->now.time - it->now.kept_time;
-    int i;
-    for (i = 0; i < GT_BLOCKS && gone != 0; i++) it->now.side_rates[i] = (it->now.sides[i] - it->now.kept_sides[i]) / gone;
-    gt_keep_point(it);
-}
-
-/* Whether a determinant comes near to zero, or is not where its rate led. */
-static int gt_surprises(const gt_instance *it) {
-    const double gone = it->now.time - it->now.kept_time;
-    int i;
-    for (i = 0; i < GT_BLOCKS; i++) {
-        const double kept = it->now.kept_sides[i], expected = kept + it->now.side_rates[i] * gone;
-        if (gt_blocks[i].frictions) continue;
-        if (expected * kept < 0.1 * kept * kept || fabs(it->now.sides[i] - expected) > 0.5 * fabs(kept)) return 1;
-    }
-    return 0;
-}
-
-/* The block, outside frictions, of which another solution is present than z; or -1. */
-static int gt_other_solution(const gt_instance *it, const double *z) {
-    int i, j;
-    for (i = 0; i < GT_BLOCKS; i++)
-        for (j = gt_blocks[i].first; j < gt_blocks[i].first + gt_blocks[i].count; j++)
-            if (!gt_blocks[i].frictions && fabs(it->now.z[j] - z[j]) > GT_APART * (1 + fabs(z[j]))) return i;
-    return -1;
-}
-
-/* Walk from where the last step ended to the present point, with steps that shorten where a determinant is about to
- * change its sign: the block that passes a singular pose on the way, or has another solution at its end, or -1. Where
- * the way, which is not quite that of the motion, leaves what can be reached, it says nothing. */
-static int gt_crosses(gt_instance *it) {
-    const double *const there[3] = {it->a[0], it->a[1], it->a[2]};
-    double x[GT_ROOM(GT_STATES)], u[GT_ROOM(GT_KNOWN)], time, rates[GT_ROOM(GT_BLOCKS)];
-    double z[GT_ROOM(GT_ALGEBRAICS)], sides[GT_ROOM(GT_BLOCKS)], z_there[GT_ROOM(GT_ALGEBRAICS)], sides_there[GT_ROOM(GT_BLOCKS)];
-    double share = 0, size = GT_STRIDE, beyond = 0;
-    int passed = -1, i;
-    memcpy(z_there, it->now.z, sizeof z_there);
-    memcpy(sides_there, it->now.sides, sizeof sides_there);
-    memcpy(z, it->now.kept_z, sizeof z);
-    memcpy(sides, it->now.kept_sides, sizeof sides);
-    for (i = 0; i < GT_BLOCKS; i++) rates[i] = it->now.side_rates[i] * (it->now.time - it->now.kept_time);
-    it->a[0] = &time;
-    it->a[1] = x;
-    it->a[2] = u;
-    while (share < 1 && size > GT_SHORTEST_STRIDE) {
-        const double next = fmin(share + size, 1);
-        int solved, turns = -1;
-        gt_between(1, next, &it->now.kept_time, there[0], &time);
-        gt_between(GT_STATES, next, it->now.kept_x, there[1], x);
-        gt_between(GT_KNOWN, next, it->now.kept_u, there[2], u);
-        memcpy(it->now.z, z, sizeof z);
-        solved = gt_solve_blocks(it, 1, 0) == GT_OK;
-        if (solved) turns = gt_other_side(it);
-        if (solved && turns < 0) turns = gt_turns(sides, rates, next - share);
-        if (turns >= 0) {
-            passed = turns;
-            beyond = fmax(beyond, next);
-            if (fabs(sides[turns]) < GT_CLOSE * fmax(fabs(it->now.kept_sides[turns]), fabs(sides_there[turns]))) break;
-        }
-        if (!solved || turns >= 0) {
-            size /= 4;
-            continue;
-        }
-        if (next >= beyond) passed = -1;
-        for (i = 0; i < GT_BLOCKS; i++) rates[i] = (it->now.sides[i] - sides[i]) / (next - share);
-        memcpy(z, it->now.z, sizeof z);
-        memcpy(sides, it->now.sides, sizeof sides);
-        size = fmin(GT_STRIDE, 2 * size);
-        share = next;
-    }
-    if (share == 1) passed = gt_other_solution(it, z_there);
-    memcpy(it->a, there, sizeof there);
-    memcpy(it->now.z, z_there, sizeof z_there);
-    memcpy(it->now.sides, sides_there, sizeof sides_there);
-    it->factors_stale = 1;
-    return passed;
-}
-
-static gt_status gt_completed(gt_instance *it) {
-    const gt_status status = gt_refresh(it);
-    int passed = -1;
-    if (status != GT_OK) return status;
-    if (GT_BLOCKS) passed = gt_other_side(it);
-    /* the integrators of Co-Simulation watch it themselves, and try shorter steps */
-    if (GT_BLOCKS && passed < 0 && !it->cosimulation && gt_surprises(it)) passed = gt_crosses(it);
-    if (passed >= 0) return gt_block_fails(it, gt_blocks + passed, 0, "have passed a singular pose");
-    gt_keep_sides(it);
     return GT_OK;
 }
 

@@ -5,6 +5,7 @@
 #endif
 #define GT_MOST_EVENTS 1000
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
+#define GT_LEAST_LOOK 1e-4     /* of a communication step: shorter slips may be missed */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
 
 static double gt_error_norm(const gt_instance *it, const double *x, const double *next, const double *error) {
@@ -23,7 +24,7 @@ static gt_status gt_move(gt_instance *it, double time, const double *x) {
     it->now.time = time;
     memcpy(it->now.x, x, GT_STATES * sizeof(double));
     it->now.stale = it->outputs_stale = 1;
-    if (GT_BLOCKS == 0 && GT_MODES == 0) return GT_OK;
+    if (GT_SIDES == 0 && GT_MODES == 0) return GT_OK;
     return gt_completed(it);
 }
 
@@ -76,45 +77,63 @@ static void gt_step_back(gt_instance *it) {
     memcpy(it->now.z, it->now.solved_z, sizeof it->now.z);
 }
 
+/* The next size after a step that was too long; an error where that is no step any more. turned: what would have
+ * turned at a singular pose, or -1. */
+static gt_status gt_shorten(gt_instance *it, double *h, double size, double shortest, int turned) {
+    *h = size;
+    gt_step_back(it);
+    if (size > shortest) return GT_OK;
+    return turned >= 0 ? gt_side_fails(it, turned, "become singular") : gt_too_short(it, size);
+}
+
 /* Integrate to `end`, or to an event before; *event tells which. */
 static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event) {
     double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
-    const double shortest = GT_SHORTEST * fmax(fabs(end), end - it->now.time);
-    double h = it->now.size > 0 ? it->now.size : end - it->now.time;
+    double spares[GT_ROOM(GT_MODES)], spare_rates[GT_ROOM(GT_MODES)], later[GT_ROOM(GT_MODES)], later_rates[GT_ROOM(GT_MODES)];
+    const double span = end - it->now.time, shortest = fmax(GT_SHORTEST * span, 4.5e-16 * fabs(end));
+    double h = it->now.size > 0 ? it->now.size : span;
     gt_status status = gt_prepare(it);
     int rejected = 0;
     *event = 0;
+    if (GT_MODES && status == GT_OK) status = gt_spares(it, span, spares, spare_rates);
     while (status == GT_OK && end - it->now.time > shortest) {
         const double t = it->now.time, rest = end - t;
         const int last = h >= rest * (1 - 1e-9);
         double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, norm;
+        int turned = -1;
         if (++*count > GT_MOST_STEPS)
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d steps of the integrator in one communication step, at time = %.9g s, "
                           "where the fastest state is %s; take a shorter step, or the solver for stiff models",
                           GT_NAME, GT_MOST_STEPS, t, gt_x_names[gt_fastest(it)]);
         memcpy(x, it->now.x, GT_STATES * sizeof(double));
         norm = gt_try_step(it, t, size, x, it->next, error) == GT_OK ? gt_error_norm(it, x, it->next, error) : INFINITY;
-        if (!(norm <= 1)) {
-            h = size * (norm < INFINITY ? fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER)) : 0.25);
-            rejected = 1;
-            gt_step_back(it);
-            if (!(h > shortest)) return gt_too_short(it, h);
-            continue;
-        }
-        it->now.time = last ? end : t + size;
-        if (GT_BLOCKS && gt_turned(it)) {
+        if (norm <= 1 && GT_SIDES) {
+            it->now.time = last ? end : t + size;
+            turned = gt_turned(it);
             it->now.time = t;
-            h = 0.25 * size;
+        }
+        if (!(norm <= 1) || turned >= 0) {
+            const double share = turned >= 0 || !(norm < INFINITY) ? 0.25 : fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER));
             rejected = 1;
-            gt_step_back(it);
-            if (!(h > shortest)) return gt_too_short(it, h);
+            status = gt_shorten(it, &h, share * size, shortest, turned);
             continue;
         }
-        status = gt_move(it, it->now.time, it->next);
+        status = gt_move(it, last ? end : t + size, it->next);
         if (status == GT_OK && gt_crossed(it)) {
             status = gt_locate(it, t, size, x);
             *event = 1;
             return status;
+        }
+        if (GT_MODES && status == GT_OK && gt_sticks(it)) {
+            status = gt_spares(it, size, later, later_rates);
+            if (status == GT_OK && size > GT_LEAST_LOOK * span && gt_may_have_slipped(it, size, spares, spare_rates, later, later_rates)) {
+                status = gt_move(it, t, x);
+                rejected = 1;
+                h = 0.5 * size;
+                continue;
+            }
+            memcpy(spares, later, sizeof spares);
+            memcpy(spare_rates, later_rates, sizeof spare_rates);
         }
         {
             const double grown = norm < 1e-4 ? 5 : 0.9 * pow(norm, -1. / GT_ORDER), growth = fmin(rejected ? 1 : 5, grown);
@@ -138,8 +157,9 @@ static gt_status gt_handle_events(gt_instance *it, int *events) {
         again = info.again;
         *events += again;
         if (*events > GT_MOST_EVENTS)
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, at time = %.9g s; take a shorter "
-                          "step, or smooth friction", GT_NAME, GT_MOST_EVENTS, it->now.time);
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, the last of %s at time = %.9g s; take "
+                          "a shorter step, a longer sampling period, or smooth friction", GT_NAME, GT_MOST_EVENTS, it->last_event,
+                          it->now.time);
     }
     return GT_OK;
 }
@@ -148,13 +168,21 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
     const double end = time + size;
     int count = 0, events = 0, event = 0;
     gt_status status = GT_OK;
+    if (!(size > 4.5e-16 * fabs(end)))
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found a step of %g s at time = %.9g s, expected one that a number of that size can "
+                      "tell", GT_NAME, size, time);
     it->now.time = time;
+    if (GT_CLOCKS && it->now.first) {
+        memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_HELD_COUNT * sizeof(double));
+        memset(it->now.ticks, 0, sizeof it->now.ticks);
+        it->now.stale = it->outputs_stale = 1;
+    }
+    it->now.first = 0;
     while (status == GT_OK) {
         double next;
         if (GT_CLOCKS || GT_MODES) status = gt_handle_events(it, &events);
-        next = GT_CLOCKS ? gt_next_sample(it) : INFINITY;
-        if (status == GT_OK)
-            status = gt_integrate(it, next < end - GT_ON_TIME * size ? next : end, &count, &event);
+        next = GT_CLOCKS ? gt_next_sample(it, end) : INFINITY;
+        if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);
         if (!event && it->now.time >= end) break;
     }
     if (status != GT_OK && !it->now.stale) gt_step_back(it);
