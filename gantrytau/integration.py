@@ -149,7 +149,7 @@ class Run:
         try:
             self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
         except SolveError as error:  # perhaps only for want of shorter stretches
-            raise RuntimeError(str(error)) from error
+            raise RuntimeError("the constraints cannot be met any more") from error
         self.z[reached] = self.coordinates.settle(self.x[reached], z, self.mesh[reached], inputs)
         self.done = here + count
         self._watch(here, here + count)

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from gantrytau import SolveError, Start, simulate, translate
 from gantrytau.approach import approach, doubtful
 from gantrytau.conditioning import Look
+from gantrytau.coordinates import Coordinates
 from gantrytau_models import FourBar
 
 POINTS = (51, 101, 251, 252, 333, 1001, 2001)
@@ -166,6 +167,23 @@ def test_a_walk_that_cannot_go_on_is_no_singular_pose():
     assert not found.arrived
     assert not found.singular
     assert found.point[2] == pytest.approx(0.3, abs=2e-4)  # the shortest steps are 1/16384 of the way
+
+
+def test_constraints_that_are_lost_end_the_motion_where_it_happens(monkeypatch):
+    project = Coordinates.project
+
+    def until(self, x, t, w):
+        if t.max() > 0.1234:
+            raise SolveError("lost")
+        return project(self, x, t, w)
+
+    monkeypatch.setattr(Coordinates, "project", until)
+    with pytest.raises(
+        SolveError, match=r"stopped at t = 0\.1234 s: the constraints cannot be met"
+    ) as caught:
+        simulate(FourBar(), stop=1.0)
+    assert caught.value.time == pytest.approx(0.1234, abs=1e-6)  # 2 ms in shortest steps
+    assert caught.value.result.time[-1] == pytest.approx(0.122)  # the point before
 
 
 def test_doubt_is_raised_from_both_sides_and_on_uneven_times():
