@@ -19,7 +19,7 @@ COMMANDS = ROOT / "gantrytau" / "commands"  # the two are the composition root
 
 
 def imports(tree: ast.AST, inside_function: bool = False) -> Iterator[tuple[str, bool]]:
-    """The packages that a module imports, and whether it does so inside a function."""
+    """The packages that a module imports, and whether it does so inside a function, or for type checkers only."""
     for node in ast.iter_child_nodes(tree):
         names = []
         if isinstance(node, ast.Import):
@@ -27,7 +27,8 @@ def imports(tree: ast.AST, inside_function: bool = False) -> Iterator[tuple[str,
         elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
             names = [node.module]
         yield from ((name.split(".")[0], inside_function) for name in names)
-        yield from imports(node, inside_function or isinstance(node, ast.FunctionDef))
+        for_types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        yield from imports(node, inside_function or for_types or isinstance(node, ast.FunctionDef))
 
 
 def offences(package: str, file: Path) -> list[str]:
