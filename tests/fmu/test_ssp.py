@@ -231,15 +231,20 @@ def test_archives_that_are_no_systems_are_refused(tmp_path, files):
 
 def test_wrong_places_and_systems_are_not_written(tmp_path, build, files):
     for path, words in [
-        (tmp_path / "a.zip", r"found the suffix '\.zip', expected \.ssp"),
+        (tmp_path / "a.zip", r"found the suffix '\.zip', expected \.ssp; call it a\.ssp"),
         (tmp_path / "no" / "a.ssp", r"the folder '.*no' does not exist"),
     ]:
         with pytest.raises(ModelError, match=words):
             write_ssp(path, files, WIRES, stop=1.0, step=0.1)
-    with pytest.raises(ModelError, match=r"expected 0 < step <= stop - begin"):
+    with pytest.raises(ModelError, match=r"expected 0 < step <= stop - begin; choose such times, in s"):
         write_ssp(tmp_path / "a.ssp", files, WIRES, stop=1.0, step=0.0)
     with pytest.raises(ModelError, match=r"a has no variable 'q'"):
         write_ssp(tmp_path / "a.ssp", files, [("a.q", "b.u")], stop=1.0, step=0.1)
-    with pytest.raises(ModelError, match=r"component 'a b': expected a name of letters"):
+    with pytest.raises(ModelError, match=r"component 'a b': expected a name of letters.*; rename it"):
         write_ssp(tmp_path / "a.ssp", {"a b": files["a"]}, [], stop=1.0, step=0.1)
     assert not list(tmp_path.iterdir())
+    (tmp_path / "folder.ssp").mkdir()
+    with pytest.raises(
+        ModelError, match=r"is a folder, expected the name of a file; name one in it, as .*system\.ssp"
+    ):
+        write_ssp(tmp_path / "folder.ssp", files, WIRES, stop=1.0, step=0.1)

@@ -274,7 +274,7 @@ def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
         limits = " and ".join(f"{words} {side:.9g}" for words, side in sides if side is not None)
         unit = f" {scalar.unit}" if scalar.unit not in ("", "1") else ""
         raise ModelError(
-            f"start {path}: found {value:.9g}, expected {limits}{unit}, the limits of its FMU; choose a value within them"
+            f"start {path}: found {value:.9g}, expected {limits}{unit}, as its FMU says; choose such a value"
         )
 
 

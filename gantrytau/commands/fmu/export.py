@@ -4,7 +4,7 @@ import math
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -15,9 +15,6 @@ from gantrytau.commands.models import Chosen, build
 from gantrytau.commands.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.reporting import CommandError, as_json, busy, note, reporting
 from gantrytau.errors import ModelError, did_you_mean
-
-if TYPE_CHECKING:
-    from gantrytau_fmu import Experiment
 
 INTERFACES = {
     "both": ("model-exchange", "co-simulation"),
@@ -136,8 +133,8 @@ def export(
         _show(chosen, file, time.perf_counter() - begin, told, json)
 
 
-def _experiment(stop: float | None, step: float | None, tolerance: float) -> "Experiment | None":
-    """The default experiment, None if nothing is said of it; CommandError for times that are none."""
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> Any:
+    """The default experiment (`Experiment`), None if nothing is said of it; CommandError for times that are none."""
     if stop is None and step is None:
         return None
     from gantrytau_fmu import Experiment

@@ -1,16 +1,12 @@
 """`gantrytau fmu info`: what an FMU is, without loading anything of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from gantrytau.commands.options import Json
 from gantrytau.commands.reporting import CommandError, as_json, reporting
-
-if TYPE_CHECKING:
-    from gantrytau_fmu.reading.described import FmuDescription
-    from gantrytau_fmu.systems.overview import SystemDescription
 
 FmuFile = Annotated[
     Path,
@@ -43,7 +39,8 @@ def info(
             typer.echo("\n--all lists all of them")
 
 
-def _read(file: Path) -> "FmuDescription | SystemDescription":
+def _read(file: Path) -> Any:
+    """The description of an FMU, or of a system."""
     if is_system(file):
         from gantrytau_fmu.systems.overview import read_system
 
