@@ -287,7 +287,7 @@ def test_wrong_connections_are_refused(halves, wires, words):
         ),
         (dict(start={"a.q.start": 1.0}), r"start a\.q\.start: a has no variable 'q\.start'"),
         (dict(inputs={"a.qq": 1.0}), r"inputs a\.qq: a has no variable 'qq'; its inputs are f\."),
-        (dict(inputs={"a.k": 1.0}), r"inputs a\.k is a parameter, expected an input"),
+        (dict(inputs={"a.k": 1.0}), r"inputs a\.k: found a parameter, expected an input"),
         (dict(inputs={"b.u": 1.0}), r"b\.u is driven by a\.x and by inputs"),
         (dict(outputs=["a.y"]), r"a has no variable 'y'"),
         (dict(outputs="a.x"), r"outputs: found 'a\.x', expected names in a list"),

@@ -116,7 +116,7 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
         (["--input", "force=1"], "--input force: lag.fmu has no variable 'force'; its inputs are u."),
         (
             ["--input", "k=1"],
-            "--input k is a parameter, expected an input that is a number; parameters are set with --set",
+            "--input k: found a parameter, expected an input that is a number; parameters are set with --set",
         ),
         (
             ["--step", "0"],

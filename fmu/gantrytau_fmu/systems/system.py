@@ -301,7 +301,7 @@ def _drives(
             causality = components[owner].scalars[scalar].causality
             if causality != "input" or not numeric(components[owner].scalars[scalar]):
                 raise ModelError(
-                    f"inputs {name} is a {causality}, expected an input that is a number; "
+                    f"inputs {name}: found {_article(causality)}, expected an input that is a number; "
                     "parameters are set with start="
                 )
         if callable(value):
@@ -312,6 +312,10 @@ def _drives(
             drives = [_constant(number) for number in _numbers(f"inputs {name}", value, len(places))]
         found.update(zip(places, drives, strict=True))
     return found
+
+
+def _article(word: str) -> str:
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
 
 
 def _constant(number: float) -> Drive:
