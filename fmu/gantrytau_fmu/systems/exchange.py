@@ -50,7 +50,7 @@ def integrate(component: Component, system: System, grid: Grid, tolerance: float
                 relative_tolerance=tolerance,
                 output_interval=grid.step,
                 start_values=dict(system.start[component.name]),
-                input=table if len(table.dtype) > 1 else None,
+                input=table if len(table.dtype.names or ()) > 1 else None,
                 output=list(outputs),
                 fmi_type="ModelExchange",
                 step_finished=go_on,
