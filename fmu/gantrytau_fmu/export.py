@@ -57,8 +57,10 @@ def export_fmu(
     fmi: version of the standard; interfaces: "model-exchange", "co-simulation" or both; solver, tolerance: of
     Co-Simulation, explicit or for stiff models; platforms: "native", "all" or names such as "x86_64-windows" (all but
     "native" need the extra `cross`); given: known variables instead of the declared inputs, and parameters to be kept
-    that else shape the equations; find: the outputs (all variables that are not parameters); states: preferred states;
-    sources: put the C sources into the file. Derivatives of given variables that the model needs become inputs, too.
+    that else shape the equations; derivatives of given variables that the model needs become inputs, too; find: the
+    outputs, else those that the model declares, with all other variables as local ones, else, where none is declared,
+    all variables; states: preferred states; sources: put the C sources into the file; description: else the first line
+    of the class's docstring.
     Without a compiler a source FMU is written, with a warning. An existing file is replaced when the new one is
     complete. Raises ModelError for wrong arguments, unwritable paths and failed compilations, and what `translate`
     raises. FMI 2.0.4 and 3.0.2.
@@ -68,7 +70,7 @@ def export_fmu(
     targets = chosen(platforms)
     check_target(path)
     dae = _translated(model, given, find, states)
-    contents = contents_of(dae, _outputs(dae, find))
+    contents = contents_of(dae, *_shown(dae, find))
     name = dae.name
     identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
     token = _token(contents, fmi, solver, tolerance)
@@ -84,7 +86,7 @@ def export_fmu(
         indicators=contents.indicators,
         interfaces=wanted_interfaces,
         experiment=experiment or Experiment(tolerance=tolerance),
-        description=description or contents.description,
+        description=description or _first_words(model) or contents.description,
         author=author,
         copyright=copyright,
         license=license,
@@ -138,18 +140,34 @@ def _translated(
     return translate(model, given=given, find=find, states=states, events=True)
 
 
-def _outputs(dae: Dae, find: Sequence[str]) -> tuple[str, ...]:
-    """Scalar names of the outputs; those that are inputs or parameters are known anyway."""
+def _first_words(model: Model | Dae) -> str:
+    """The first line of the class's own words."""
+    words = type(model).__dict__.get("__doc__") if isinstance(model, Model) else None
+    return (words or "").strip().partition("\n")[0].rstrip(".")
+
+
+def _shown(dae: Dae, find: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Scalar names of the outputs and of local variables."""
     if isinstance(find, str):
         raise ModelError(f"export_fmu: found find='{find}', expected a list of names; write ['{find}']")
-    names = [n for name in find for n in dae.expand(name)] if find else list(dae.variables)
-    parameters = set(dae.parameters)
-    for name in names:
-        if name in parameters:
-            raise ModelError(
-                f"export_fmu: find: {name} is a parameter, expected variables; parameters are in the FMU anyway"
-            )
-    return tuple(dict.fromkeys(n for n in names if n not in set(dae.inputs) and not n.startswith("wanted ")))
+    if find:
+        return tuple(dict.fromkeys(_found(dae, name) for given in find for name in dae.expand(given))), ()
+    known = set(dae.inputs)
+    names = [n for n in dict.fromkeys(dae.variables) if n not in known and not n.startswith("wanted ")]
+    own = {n for v in dae.flat.variables if v.kind == "output" and not v.owner for n in v.elements}
+    outputs = tuple(n for n in names if n in own)
+    return (outputs, tuple(n for n in names if n not in own)) if outputs else (tuple(names), ())
+
+
+def _found(dae: Dae, name: str) -> str:
+    """A name that can be an output."""
+    kind = "a parameter" if name in set(dae.parameters) else "an input" if name in set(dae.inputs) else ""
+    if kind:
+        raise ModelError(
+            f"export_fmu: find: {name} is {kind} of this FMU, expected variables that it computes; leave it out, "
+            f"{kind.split()[1]}s are in the FMU anyway"
+        )
+    return name
 
 
 def _token(contents: Contents, fmi: str, solver: str, tolerance: float) -> str:

@@ -10,6 +10,7 @@ from fmpy import read_model_description
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
+from gantrytau.errors import ModelError
 from gantrytau_fmu import export_fmu
 from gantrytau_fmu.interface import Experiment
 from gantrytau_models import Pendulum
@@ -49,11 +50,12 @@ class Described(Model):
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
 def fmu(request, tmp_path_factory) -> Exported:
-    words = dict(description="A <test> & more", author="A. Author", copyright="(c) A. Author")
+    words: dict[str, Any] = dict(description="A <test> & more", author="A. Author", copyright="(c) A. Author")
     words |= dict(license="MIT", version="1.2")
     experiment = Experiment(start=0.5, stop=4.0, tolerance=1e-7, step=0.002)
     path = tmp_path_factory.mktemp("described") / "described.fmu"
     dae = translate(Described())
+    words |= dict(find=["motor.w", "phi", "energy", "clock", "both"])
     export_fmu(dae, path, fmi="2.0" if request.param == 2 else "3.0", experiment=experiment, **words)  # pyright: ignore[reportArgumentType]
     return Exported(path, dae, request.param)
 
@@ -225,3 +227,20 @@ def test_choices_of_the_caller(tmp_path):
         assert b"Rodas4" in archive.read("documentation/index.html")
     assert "sources/rodas4.c" in names
     assert "sources/dopri5.c" not in names
+
+
+def test_declared_outputs_are_the_outputs_and_all_else_is_local(tmp_path):
+    told: Any = read_model_description(export_fmu(Described(), tmp_path / "default.fmu"))
+    kinds = {v.name: v.causality for v in told.modelVariables}
+    assert [n for n, kind in kinds.items() if kind == "output"] == ["clock", "both"]
+    assert [kinds[n] for n in ("motor.w", "phi", "energy", "der(phi)")] == ["local"] * 4
+    assert told.description == "Declarations of every kind"
+
+
+@pytest.mark.parametrize(("name", "kind"), [("motor.u", "an input"), ("T", "a parameter")])
+def test_what_is_known_is_no_output(tmp_path, name, kind):
+    with pytest.raises(
+        ModelError, match=f"export_fmu: find: {name} is {kind} of this FMU, expected variables"
+    ):
+        export_fmu(Described(), tmp_path / "wrong.fmu", find=[name])
+    assert not list(tmp_path.iterdir())

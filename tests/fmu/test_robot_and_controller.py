@@ -23,7 +23,8 @@ REACH = 0.05  # m, along each axis of the world at once
 def system(tmp_path_factory):
     folder = tmp_path_factory.mktemp("system")
     parts = {"robot": MeasuredGantryTau(prototypes.L1), "controller": TrackingController(prototypes.L1)}
-    return {name: export_fmu(model, folder / f"{name}.fmu") for name, model in parts.items()}
+    find = {"robot": ["tool.r", "q", "v"], "controller": []}
+    return {name: export_fmu(model, folder / f"{name}.fmu", find=find[name]) for name, model in parts.items()}
 
 
 @pytest.fixture(scope="module")

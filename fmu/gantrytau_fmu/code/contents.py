@@ -93,6 +93,10 @@ class _Builder:
         self.places_of.setdefault(name, reference)
         return reference
 
+    def causality(self, name: str) -> str:
+        """Output or local."""
+        return "output" if name in self.outputs else "local"
+
     def limits(self, declaration: FlatVariable, place: int) -> dict[str, float]:
         """min, max and nominal as numbers, where they are declared and finite."""
         found = {}
@@ -121,9 +125,9 @@ def _per_second(unit: str, order: int) -> str:
     return f"{above}/({joined})" if rest else f"{above}/{joined}"
 
 
-def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
-    """What an FMU of a translated model holds; outputs: scalar names of what it shows."""
-    formulas = formulas_of(dae, _evaluated(dae, outputs))
+def contents_of(dae: Dae, outputs: Sequence[str], others: Sequence[str] = ()) -> Contents:
+    """What an FMU of a translated model holds; scalar names of its outputs, and of what else can be read from it."""
+    formulas = formulas_of(dae, _evaluated(dae, [*outputs, *others]))
     graph, places, wanted = output_places(formulas)
     builder = _Builder(dae, formulas, places, frozenset(outputs))
     builder.add(
@@ -131,8 +135,8 @@ def contents_of(dae: Dae, outputs: Sequence[str]) -> Contents:
     )
     _parameters(builder)
     _inputs(builder)
-    _states(builder, outputs)
-    _outputs(builder, outputs)
+    _states(builder)
+    _outputs(builder, [*outputs, *others])
     indicators = _frictions(builder)
     structure = _structure(builder, Dependencies(formulas, wanted), outputs)
     return Contents(
@@ -208,8 +212,8 @@ def _inputs(builder: _Builder) -> None:
         )
 
 
-def _states(builder: _Builder, outputs: Sequence[str]) -> None:
-    formulas, shown = builder.formulas, set(outputs)
+def _states(builder: _Builder) -> None:
+    formulas = builder.formulas
     starts = numbers_of(builder.dae, formulas.arrays)["x"]
     references = []
     for place, name in enumerate(formulas.states):
@@ -222,7 +226,7 @@ def _states(builder: _Builder, outputs: Sequence[str]) -> None:
                 place,
                 fixed=solved,
                 limited=True,
-                causality="output" if name in shown else "local",
+                causality=builder.causality(name),
                 variability="continuous",
                 initial="calculated" if solved else "exact",
                 **more,
@@ -236,7 +240,7 @@ def _states(builder: _Builder, outputs: Sequence[str]) -> None:
                 rate,
                 "DERIVATIVE",
                 place,
-                causality="output" if own and rate in shown else "local",
+                causality=builder.causality(rate) if own else "local",
                 variability="continuous",
                 initial="calculated",
                 derivative=references[place],
@@ -244,23 +248,25 @@ def _states(builder: _Builder, outputs: Sequence[str]) -> None:
         )
 
 
-def _outputs(builder: _Builder, outputs: Sequence[str]) -> None:
+def _outputs(builder: _Builder, names: Sequence[str]) -> None:
+    """What is computed, shown as output or not."""
     formulas, dae = builder.formulas, builder.dae
     for place, name in enumerate(formulas.held):
-        causality = "output" if name in set(outputs) else "local"
-        more: dict[str, Any] = dict(causality=causality, variability="discrete", initial="calculated")
+        more: dict[str, Any] = dict(
+            causality=builder.causality(name), variability="discrete", initial="calculated"
+        )
         builder.add(name, "HELD", len(formulas.inputs) + place, **more)
-    for name in outputs:
+    for name in names:
         if name in builder.places_of:
             continue
         expression = dae.expression(name)
         if expression.is_constant():
-            _constant(builder, name, float(expression), "output")
+            _constant(builder, name, float(expression), builder.causality(name))
             continue
         leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
         held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
         variability = "discrete" if held else "continuous"
-        more = dict(causality="output", variability=variability, initial="calculated")
+        more = dict(causality=builder.causality(name), variability=variability, initial="calculated")
         builder.add(name, "OUTPUT", builder.places[name], limited=True, **more)
         builder.places_of[name] = len(builder.variables) - 1
 
