@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Input, Model, Parameter, Real, connect, der, sampled, sin, time
 from gantrytau.mechanics import translational
+from gantrytau_fmu import cosimulate
 from tests.fmu.exported import export
 from tests.fmu.raw_calls import ERROR, OK
 
@@ -151,3 +152,11 @@ def test_slips_that_begin_and_end_within_a_step_are_found(tmp_path, solver):
             ends.append(run["mass.s"])
     # as long as a tenth of a slip, which steps of 1 ms resolve; a slip that is missed moves it by 8e-4 m
     assert ends == pytest.approx([6.6783e-4] * len(ends), abs=5e-9)
+
+
+@pytest.mark.parametrize("step", [0.002, 0.004, 0.001])
+def test_a_sampled_component_gets_functions_of_time_at_the_beginning_of_its_step(fmus, step):
+    found = cosimulate({"a": fmus[Sampler, 3].path}, stop=0.1, step=step, inputs={"a.u": lambda t: 5 + t})
+    # at an instant the result has what was held until then
+    latest = np.maximum(np.ceil(found.time / 0.004 - 1e-9) - 1, 0) * 0.004
+    assert found["a.y"] == pytest.approx(5 + latest, abs=1e-12)

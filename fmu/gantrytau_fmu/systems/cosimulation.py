@@ -67,7 +67,8 @@ def cosimulate(
         repeated from saved states until every input is the mean of the output that drives it at both ends of the step,
         within `agreement` (relative), in at most `iterations`; of second order, where no component samples.
     inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))
-        joined by straight lines; held over each step of the component at its value in the middle. What nothing drives
+        joined by straight lines; held over each step of the component at its value in the middle, for components that
+        sample at its beginning. What nothing drives
         keeps its start value; a warning (`UnconnectedInputs`) lists such inputs of two or more components.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).
     steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.

@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError
-from gantrytau_fmu.systems.ordering import is_sampled
+from gantrytau_fmu.systems.ordering import is_sampled, takes_samples
 from gantrytau_fmu.systems.system import Drive, System
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
@@ -175,14 +175,19 @@ class Master:
         """Step a component over the points from first to last; what others give stays, functions of time go on.
 
         A function of time is held over a step, or a part of one, at its value in the middle: the mean to second order.
+        A sampled component gets its value at the beginning, where it samples.
         """
         begin, parts, found = self.grid.time(first), self.paces[name].parts, []
         size = self.grid.size(first, last) / parts
         for part in range(parts):
             time = begin + part * size
-            values = self.inputs(name, time + size / 2)
+            values = self.inputs(name, time + self._share(name) * size)
             found = self.parts[name].step(time, size, self.known[name], values, self.wanted[name])
         return found
+
+    def _share(self, name: str) -> float:
+        """Where in a step a function of time is evaluated."""
+        return 0.0 if takes_samples(self.system.components[name]) else 0.5
 
     def _interval(self, name: str, k: int) -> tuple[int, int] | None:
         """First and last point of the step that a component takes at k, None if it takes none."""
@@ -247,7 +252,7 @@ class Master:
         pieces = self.paces[name].parts
         for piece in range(pieces):
             time = begin + piece * size / pieces
-            values = mean + self._external(name, time + size / pieces / 2)
+            values = mean + self._external(name, time + self._share(name) * size / pieces)
             part.step(time, size / pieces, self.known[name], values, self.wanted[name])
         part.set(self.known[name], after + self._external(name, self.grid.time(k + 1)))
         self.values[name] = part.get(self.wanted[name])

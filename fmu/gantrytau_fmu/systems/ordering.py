@@ -13,6 +13,7 @@ In each group a component comes after those that drive it; a loop is cut where t
 from collections.abc import Collection, Sequence
 
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau_fmu.systems.components import Component
 from gantrytau_fmu.systems.system import Link, System
 
 
@@ -27,9 +28,13 @@ def sequence_of(system: System, given: Sequence[str] | None = None) -> tuple[str
 
 def is_sampled(system: System, name: str) -> bool:
     """Whether a component is driven and has real variables that change at events only."""
-    component = system.components[name]
     driven = any(link.target[0] == name for link in system.links)
-    return driven and any(component.sampled(scalar) for scalar in component.scalars)
+    return driven and takes_samples(system.components[name])
+
+
+def takes_samples(component: Component) -> bool:
+    """Whether a component has real variables that change at events only."""
+    return any(component.sampled(scalar) for scalar in component.scalars)
 
 
 def _rank(system: System, name: str) -> int:
