@@ -86,3 +86,21 @@ def test_a_robot_stops_where_a_cart_cannot_follow_also_with_rough_steps(tmp_path
         assert status != OK
         assert run.instance.message.startswith("GantryTau: the equations for carts[0].s become singular")
         assert k * 0.004 == pytest.approx(0.636, abs=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi, 2 * np.pi, 1e-12])
+def test_a_start_at_which_the_equations_divide_by_zero_is_refused_and_a_millionth_beside_it_is_right(
+    exported, angle
+):
+    """The crank in line with an axis, where a pivot that was good at the start of the export is its sine."""
+    fmu = exported("four-bar")
+    with fmu.new() as run:
+        run.enter()
+        run["crank.phi"] = angle
+        assert run.instance("ExitInitializationMode") != OK
+        assert "divide by zero because of crank.phi" in run.instance.message
+    truth = fmu.dae.evaluate({"crank.phi": angle + 1e-6, "crank.w": 0.0, "torque": 0.0})
+    with fmu.new() as run:
+        run.begin(**{"crank.phi": angle + 1e-6})
+        # 1e-16 in what is divided by 1e-6
+        assert run["der(crank.w)"] == pytest.approx(float(np.ravel(truth["der(crank.w)"])[0]), rel=1e-8)

@@ -163,6 +163,11 @@ class Graph:
     def _fixed(self, number: int) -> bool:
         return not any(self.nodes[n][0] == "INPUT" for n in self.reached([number]))
 
+    def divisors(self, roots: Iterable[int]) -> list[int]:
+        """What is divided by on the way to the roots and changes often."""
+        inverted = [self.nodes[n][1] for n in self.reached(roots) if self.nodes[n][0] == "INV"]
+        return [n for n in dict.fromkeys(inverted) if not self.rarely[n]]
+
     def inside(self, number: int) -> tuple[int, ...]:
         """The nodes that an operation works on."""
         key = self.nodes[number]

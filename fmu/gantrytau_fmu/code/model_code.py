@@ -12,7 +12,15 @@ from gantrytau_fmu.code.formulas import Formulas
 from gantrytau_fmu.code.operations import number_text
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
-SELDOM = {"gt_outputs", "gt_starts", "gt_initial", "gt_forward", "gt_by_parameters", "gt_initial_slopes"}
+SELDOM = {
+    "gt_outputs",
+    "gt_starts",
+    "gt_initial",
+    "gt_forward",
+    "gt_by_parameters",
+    "gt_initial_slopes",
+    "gt_pivots",
+}
 ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
 
 
@@ -82,6 +90,7 @@ def model_code(
     writer = _Writer(formulas, graph, _symbols(formulas), {})
     pieces = _functions(writer, outputs)
     sizes = _sizes(formulas, len(outputs), variables, pieces, len(graph.hoisted))
+    sizes["GT_PIVOTS"] = len(writer.roots["gt_pivots"])
     defines = dict(
         GT_NAME=_quoted(name),
         GT_TOKEN=_quoted(token),
@@ -100,6 +109,7 @@ def model_code(
     lines += [f"#define {key} {value}" for key, value in defines.items()]
     lines += ["", *(piece.code for piece in pieces)]
     lines += _tables(formulas, variables, constants, nominals)
+    lines.append(_texts("gt_pivot_names", _moving(writer)))
     return ModelCode("\n".join(lines) + "\n", sum(p.operations for p in pieces))
 
 
@@ -130,9 +140,25 @@ def _functions(writer: _Writer, outputs: Sequence[ca.SX]) -> list[CFunction]:
     for name, expression in named.items():
         writer.enter(name, expression)
     graph = writer.graph
+    solving = [n for n in named if n == "gt_rates" or n.startswith("gt_residual_")]
+    writer.roots["gt_pivots"] = graph.divisors(root for name in solving for root in writer.roots[name])
     graph.hoist(root for name, roots in writer.roots.items() for root in roots)
     fill = c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True)
-    return [fill, *(c_function(graph, name, writer.roots[name], seldom=name in SELDOM) for name in named)]
+    return [fill, *(c_function(graph, n, roots, seldom=n in SELDOM) for n, roots in writer.roots.items())]
+
+
+def _moving(writer: _Writer) -> list[str]:
+    """For each divisor a variable that moves it, a state if there is one."""
+    formulas, found = writer.formulas, []
+    names = {"x": formulas.states, "u": (*formulas.inputs, *formulas.held), "z": formulas.z_names}
+    for divisor in writer.roots["gt_pivots"]:
+        leaves = [writer.graph.nodes[n] for n in writer.graph.reached([divisor])]
+        places = [(array, index) for kind, array, index in (leaf for leaf in leaves if leaf[0] == "INPUT")]
+        moved = [
+            names[array][index] for array in ("x", "z", "u") for where, index in places if where == array
+        ]
+        found.append(moved[0] if moved else "time")
+    return found
 
 
 def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:

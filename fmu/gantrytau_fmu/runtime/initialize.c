@@ -1,6 +1,7 @@
 /* Initialisation: the states that initial equations determine, modes, first samples. */
 
 #define GT_INITIAL_ITERATIONS 30
+#define GT_SMALL_PIVOT 1e-9 /* of its usual size: below, seven digits and more of what is divided by it are lost */
 
 /* The arguments have been checked. */
 static void gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
@@ -59,11 +60,32 @@ static gt_status gt_initial_equations(gt_instance *it) {
                   "inputs and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
 }
 
+/* Equations solved for their unknowns divide by pivots, which were chosen at the start of the export. */
+static gt_status gt_check_pivots(gt_instance *it) {
+    const double *const there[3] = {it->a[1], it->a[2], it->a[3]};
+    double found[GT_ROOM(GT_PIVOTS)], usual[GT_ROOM(GT_PIVOTS)];
+    int i;
+    if (GT_PIVOTS == 0) return GT_OK;
+    gt_pivots(it->a, found, it->w);
+    it->a[1] = gt_start_x;
+    it->a[2] = gt_start_u;
+    it->a[3] = gt_start_z;
+    gt_pivots(it->a, usual, it->w);
+    memcpy(it->a + 1, there, sizeof there);
+    for (i = 0; i < GT_PIVOTS; i++)
+        if (fabs(found[i]) < GT_SMALL_PIVOT * fabs(usual[i]))
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at this start the equations would divide by zero because of %s; they are arranged "
+                          "for the start of the export: start a millionth away, or export the model with this start", GT_NAME,
+                          gt_pivot_names[i]);
+    return GT_OK;
+}
+
 static gt_status gt_initialize(gt_instance *it) {
     gt_event_info info;
     double rates[GT_ROOM(GT_STATES)];
     gt_status status = gt_initial_equations(it);
     if (status == GT_OK) status = gt_refresh(it);
+    if (status == GT_OK) status = gt_check_pivots(it);
     if (status != GT_OK) return status;
     it->now.initialized = 1;
     gt_keep_point(it);
