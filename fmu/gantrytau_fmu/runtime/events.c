@@ -98,10 +98,13 @@ static gt_status gt_friction_events(gt_instance *it, int *changed) {
     return status;
 }
 
-/* How far locked frictions are from breaking away, and its rates: a difference over a millionth of `span`. */
-static gt_status gt_spares(gt_instance *it, double span, double *spares, double *rates) {
+/* How far locked frictions are from breaking away, and its rates. */
+typedef struct { double forces[GT_ROOM(GT_MODES)], rates[GT_ROOM(GT_MODES)]; } gt_spare;
+
+/* At the present point; the rates are a difference over a millionth of `span`. */
+static gt_status gt_find_spare(gt_instance *it, double span, gt_spare *found) {
     double slopes[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_MODES)];
-    gt_status status = gt_get_indicators(it, spares);
+    gt_status status = gt_get_indicators(it, found->forces);
     const gt_state kept = it->now;
     int i;
     if (status == GT_OK) status = gt_get_rates(it, slopes);
@@ -110,7 +113,7 @@ static gt_status gt_spares(gt_instance *it, double span, double *spares, double 
     it->now.time += 1e-6 * span;
     it->now.stale = 1;
     status = gt_get_indicators(it, moved);
-    for (i = 0; i < GT_MODES && status == GT_OK; i++) rates[i] = (moved[i] - spares[i]) / (it->now.time - kept.time);
+    for (i = 0; i < GT_MODES && status == GT_OK; i++) found->rates[i] = (moved[i] - found->forces[i]) / (it->now.time - kept.time);
     it->now = kept;
     it->outputs_stale = it->factors_stale = 1;
     gt_point_at(it, &it->now.time, it->now.x);
@@ -128,16 +131,16 @@ static double gt_least_between(double step, double first, double rate, double la
     return least;
 }
 
-/* Whether a locked friction may have broken away between two points a step apart: its spare force comes down
- * between them, or goes from one to the other but not at the rates that it has there. The step is too long to know. */
-static int gt_may_have_slipped(const gt_instance *it, double step, const double *spares, const double *rates,
-                               const double *later, const double *later_rates) {
+/* Whether a locked friction may have broken away between two points a step apart: its spare force comes down between
+ * them, or goes from one to the other but not at the rates that it has there. The step is too long to know. */
+static int gt_may_have_slipped(const gt_instance *it, double step, const gt_spare *first, const gt_spare *last) {
     int i;
     for (i = 0; i < GT_MODES; i++) {
-        const double led = 0.5 * step * (rates[i] + later_rates[i]), smaller = fmin(spares[i], later[i]);
+        const double before = first->forces[i], after = last->forces[i], smaller = fmin(before, after);
+        const double led = 0.5 * step * (first->rates[i] + last->rates[i]);
         if (it->now.m[i] != 0) continue;
-        if (fabs(later[i] - spares[i] - led) > 0.1 * smaller + 1e-4 * fabs(led)) return 1;
-        if (gt_least_between(step, spares[i], rates[i], later[i], later_rates[i]) < 0.5 * smaller) return 1;
+        if (fabs(after - before - led) > 0.1 * smaller + 1e-4 * fabs(led)) return 1;
+        if (gt_least_between(step, before, first->rates[i], after, last->rates[i]) < 0.5 * smaller) return 1;
     }
     return 0;
 }

@@ -72,6 +72,12 @@ static gt_status gt_too_short(gt_instance *it, double h) {
                   GT_NAME, h, it->now.time, gt_x_names[gt_fastest(it)]);
 }
 
+static gt_status gt_too_many(gt_instance *it, double t) {
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d steps of the integrator in one communication step, at time = %.9g s, "
+                  "where the fastest state is %s; take a shorter step, or the solver for stiff models", GT_NAME, GT_MOST_STEPS, t,
+                  gt_x_names[gt_fastest(it)]);
+}
+
 /* The unknowns of a trial that was rejected may be so far on that a shorter one would find another solution from there. */
 static void gt_step_back(gt_instance *it) {
     memcpy(it->now.z, it->now.solved_z, sizeof it->now.z);
@@ -86,60 +92,73 @@ static gt_status gt_shorten(gt_instance *it, double *h, double size, double shor
     return turned >= 0 ? gt_side_fails(it, turned, "become singular") : gt_too_short(it, size);
 }
 
+/* What would turn at a singular pose if the step came to `time`, or -1. */
+static int gt_turned_at(gt_instance *it, double time) {
+    const double kept = it->now.time;
+    int turned;
+    it->now.time = time;
+    turned = gt_turned(it);
+    it->now.time = kept;
+    return turned;
+}
+
+/* Whether a locked friction may have slipped on the step of that size from (t, x): then back there. *spare belongs to
+ * the point where the step began, and then to where it has led. */
+static int gt_slipped(gt_instance *it, double t, const double *x, double size, double span, gt_spare *spare, gt_status *status) {
+    gt_spare later;
+    if (!GT_MODES || *status != GT_OK || !gt_sticks(it)) return 0;
+    *status = gt_find_spare(it, size, &later);
+    if (*status == GT_OK && size > GT_LEAST_LOOK * span && gt_may_have_slipped(it, size, spare, &later)) {
+        *status = gt_move(it, t, x);
+        return 1;
+    }
+    *spare = later;
+    return 0;
+}
+
+/* The size of the next step, after one whose error was `norm`. */
+static double gt_next_size(double h, double size, double norm, int last, int rejected) {
+    const double grown = norm < 1e-4 ? 5 : 0.9 * pow(norm, -1. / GT_ORDER), growth = fmin(rejected ? 1 : 5, grown);
+    return !last || growth < 1 || size * growth > h ? size * growth : h;
+}
+
 /* Integrate to `end`, or to an event before; *event tells which. */
 static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event) {
     double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
-    double spares[GT_ROOM(GT_MODES)], spare_rates[GT_ROOM(GT_MODES)], later[GT_ROOM(GT_MODES)], later_rates[GT_ROOM(GT_MODES)];
     const double span = end - it->now.time, shortest = fmax(GT_SHORTEST * span, 4.5e-16 * fabs(end));
     double h = it->now.size > 0 ? it->now.size : span;
+    gt_spare spare;
     gt_status status = gt_prepare(it);
     int rejected = 0;
     *event = 0;
-    if (GT_MODES && status == GT_OK) status = gt_spares(it, span, spares, spare_rates);
+    if (GT_MODES && status == GT_OK) status = gt_find_spare(it, span, &spare);
     while (status == GT_OK && end - it->now.time > shortest) {
         const double t = it->now.time, rest = end - t;
         const int last = h >= rest * (1 - 1e-9);
-        double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, norm;
-        int turned = -1;
-        if (++*count > GT_MOST_STEPS)
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d steps of the integrator in one communication step, at time = %.9g s, "
-                          "where the fastest state is %s; take a shorter step, or the solver for stiff models",
-                          GT_NAME, GT_MOST_STEPS, t, gt_x_names[gt_fastest(it)]);
+        const double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, next = last ? end : t + size;
+        double norm;
+        int turned;
+        if (++*count > GT_MOST_STEPS) return gt_too_many(it, t);
         memcpy(x, it->now.x, GT_STATES * sizeof(double));
         norm = gt_try_step(it, t, size, x, it->next, error) == GT_OK ? gt_error_norm(it, x, it->next, error) : INFINITY;
-        if (norm <= 1 && GT_SIDES) {
-            it->now.time = last ? end : t + size;
-            turned = gt_turned(it);
-            it->now.time = t;
-        }
+        turned = norm <= 1 && GT_SIDES ? gt_turned_at(it, next) : -1;
         if (!(norm <= 1) || turned >= 0) {
             const double share = turned >= 0 || !(norm < INFINITY) ? 0.25 : fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER));
             rejected = 1;
             status = gt_shorten(it, &h, share * size, shortest, turned);
             continue;
         }
-        status = gt_move(it, last ? end : t + size, it->next);
+        status = gt_move(it, next, it->next);
         if (status == GT_OK && gt_crossed(it)) {
-            status = gt_locate(it, t, size, x);
             *event = 1;
-            return status;
+            return gt_locate(it, t, size, x);
         }
-        if (GT_MODES && status == GT_OK && gt_sticks(it)) {
-            status = gt_spares(it, size, later, later_rates);
-            if (status == GT_OK && size > GT_LEAST_LOOK * span && gt_may_have_slipped(it, size, spares, spare_rates, later, later_rates)) {
-                status = gt_move(it, t, x);
-                rejected = 1;
-                h = 0.5 * size;
-                continue;
-            }
-            memcpy(spares, later, sizeof spares);
-            memcpy(spare_rates, later_rates, sizeof spare_rates);
+        if (gt_slipped(it, t, x, size, span, &spare, &status)) {
+            rejected = 1;
+            h = 0.5 * size;
+            continue;
         }
-        {
-            const double grown = norm < 1e-4 ? 5 : 0.9 * pow(norm, -1. / GT_ORDER), growth = fmin(rejected ? 1 : 5, grown);
-            if (!last || growth < 1 || size * growth > h) h = size * growth;
-        }
-        it->now.size = h;
+        it->now.size = h = gt_next_size(h, size, norm, last, rejected);
         rejected = 0;
         if (status == GT_OK && !last) status = gt_accepted(it);
     }
