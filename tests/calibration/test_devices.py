@@ -1,0 +1,335 @@
+"""Devices: what they see, how large their errors are, and which of them do not average out."""
+
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError
+from gantrytau.kinematics.rotations import turned
+from gantrytau_optimica.calibration.cameras import Camera, Cameras, single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices import LaserTracker, TMac
+from gantrytau_optimica.calibration.gauges import LengthGauge, Wires
+from gantrytau_optimica.calibration.sight import Bars, segment_distance
+
+MANY = 4000  # standard deviations from so many readings are right within 1.1 %
+UPRIGHT = np.eye(3)
+TO_CAMERA = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])  # the z axis of the tool along -x
+
+
+@dataclass
+class Ball:
+    centre: Any
+    radius: float
+
+    def distance(self, points: np.ndarray, /) -> np.ndarray:
+        return np.linalg.norm(points - np.asarray(self.centre), axis=1) - self.radius
+
+
+def cube(count: int, half: float, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-half, half, (count, 3))
+
+
+def turn(vector) -> np.ndarray:
+    return turned(np.eye(3)[None], np.array([vector], dtype=float))[0]
+
+
+def vectors(R: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Rotation vectors of small turns from nominal to R, to first order."""
+    D = R @ np.swapaxes(nominal, -1, -2)
+    return np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], axis=1) / 2
+
+
+def squared_distance(errors: np.ndarray, covariance: np.ndarray) -> float:
+    """Mean of e.T C^-1 e, which is the number of columns if the covariance is right."""
+    return float(
+        np.mean(np.einsum("ni,ni->n", errors, np.linalg.solve(covariance, errors[..., None])[..., 0]))
+    )
+
+
+# laser tracker
+
+
+@pytest.mark.parametrize("distance", [1.0, 5.0, 20.0])
+def test_noise_of_a_tracker_along_and_across_the_beam(distance):
+    tracker = LaserTracker(r=[1.0, 2.0, 0.5], R=turn([0.1, -0.2, 2.0]))
+    beam = tracker.R @ [0.6, 0.64, 0.48]  # of length one
+    r = np.tile(tracker.r + distance * beam, (MANY, 1))
+    error = tracker.measure(r, seed=3).r - r
+    along = error @ beam
+    across = np.sqrt(np.sum((error - along[:, None] * beam) ** 2, axis=1).mean() / 2)
+    assert along.std() == pytest.approx(5e-6 + 0.15e-6 * distance, rel=0.05)
+    assert across == pytest.approx(7.5e-6 + 3e-6 * distance, rel=0.05)
+    assert squared_distance(error, tracker.covariance(r)) == pytest.approx(3.0, rel=0.06)
+
+
+def test_readings_of_a_tracker_are_range_azimuth_and_elevation():
+    exact = LaserTracker(
+        range_noise=0.0, range_noise_per_metre=0.0, transverse_noise=0.0, transverse_noise_per_metre=0.0
+    )
+    read = exact.measure([[1.0, 1.0, np.sqrt(2.0) * 0.5]])
+    assert read.readings[0] == pytest.approx([np.sqrt(2.5), np.pi / 4, np.arctan(0.5)], abs=1e-12)
+    assert read.r[0] == pytest.approx([1.0, 1.0, np.sqrt(0.5)], abs=1e-12)
+    assert read.names[0] == "range [m]"
+
+
+def test_the_frame_of_the_device_and_that_of_the_world():
+    tracker = LaserTracker(r=[1.0, 2.0, 0.0], R=turn([0.0, 0.0, 0.3]))
+    world, device = (tracker.measure(cube(5, 0.5), frame=f, seed=4).r for f in ("world", "device"))
+    assert world == pytest.approx(device @ tracker.R.T + tracker.r, abs=1e-12)
+
+
+def test_the_same_seed_gives_the_same_noise():
+    tracker, r = LaserTracker(r=[3.0, 0.0, 0.0]), cube(5, 0.5)
+    first, second, other = (tracker.measure(r, seed=s).r for s in (1, 1, 2))
+    assert np.array_equal(first, second)
+    assert not np.any(first == other)
+
+
+def test_a_scale_does_not_average_out_and_noise_does():
+    tracker, r = LaserTracker(r=[-4.0, 0.0, 0.0], scale=1e-5), np.zeros((MANY, 3))
+    error = (tracker.measure(r).r - r).mean(axis=0)
+    assert error[0] == pytest.approx(
+        4e-5, abs=5 * 5.6e-6 / np.sqrt(MANY)
+    )  # five standard deviations of the mean
+    assert np.abs(error[1:]).max() < 5 * 19.5e-6 / np.sqrt(MANY)
+
+
+def test_range_elevation_and_reflector_limit_what_a_tracker_sees():
+    tracker = LaserTracker(facing=[-1.0, 0.0, 0.0])
+    r = [[3.0, 0, 0], [0.2, 0, 0], [40.0, 0, 0], [3.0, 0, 3.2], [3.0, 2.0, 0]]
+    assert tracker.sees(r, UPRIGHT).tolist() == [True, False, False, False, False]
+    assert tracker.sees(r[4], turn([0.0, 0.0, np.arctan2(2.0, 3.0)]))
+    lost = tracker.measure(r, UPRIGHT)
+    assert np.isnan(lost.r).all(axis=1).tolist() == [False, True, True, True, True]
+    assert np.array_equal(lost.seen, ~np.isnan(lost.readings[:, 0]))
+
+
+def test_a_ball_hides_its_shadow():
+    ball = Ball([2.0, 0.0, 0.0], 0.2)
+    tracker = LaserTracker(obstacles=[ball])
+    y = np.linspace(-1.0, 1.0, 401)
+    r = np.column_stack([np.full(401, 4.0), y, np.zeros(401)])
+    shadow = np.abs(np.arctan2(y, 4.0)) <= np.arcsin(0.1)
+    edge = np.abs(np.abs(np.arctan2(y, 4.0)) - np.arcsin(0.1)) < 1e-3
+    assert np.array_equal(~tracker.sees(r)[~edge], shadow[~edge])
+    assert tracker.sees(r / 4 * 1.7).all()  # in front of it
+    assert not tracker.sees([2.1, 0.0, 0.0])  # inside
+
+
+def test_bars_hide_what_is_behind_them_and_not_what_they_carry():
+    r = np.array([[4.0, 0.0, 0.0], [4.0, 0.0, 1.0]])
+    across = Bars([[[2.0, -1.0, 0.0]], [[2.0, -1.0, 0.0]]], [[[2.0, 1.0, 0.0]], [[2.0, 1.0, 0.0]]], 0.03)
+    assert LaserTracker().sees(r, bars=across).tolist() == [False, True]
+    carried = Bars(r[:, None], r[:, None] + [1.0, 0.5, 0.0], 0.03)
+    assert LaserTracker().sees(r, bars=carried).all()
+
+
+def test_segment_distances_against_a_fine_grid():
+    a, b, c, d = (cube(200, 1.0, seed) for seed in range(4))
+    t = np.linspace(0.0, 1.0, 201)
+    first, second = (p[:, None] + t[:, None] * (q - p)[:, None] for p, q in ((a, b), (c, d)))
+    grid = np.array(
+        [np.linalg.norm(x[:, None] - y, axis=2).min() for x, y in zip(first, second, strict=True)]
+    )
+    found = segment_distance(a, b, c, d)
+    assert np.all(found <= grid + 1e-12)
+    assert np.max(grid - found) < 3.5 / 400  # half of a step on segments of up to 3.5 m
+
+
+def test_segments_that_are_parallel_or_points():
+    o, x, y = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    assert segment_distance(o, x, 3 * x + y, 2 * x + y) == pytest.approx(np.sqrt(2.0))
+    assert segment_distance(o, o, x, x) == pytest.approx(1.0)
+
+
+# T-Mac
+
+
+def test_errors_of_orientation_act_on_the_lever_arm():
+    device = TMac(r=[-3.0, 0.0, 0.0], target=[0.0, 0.0, 0.3])
+    r, R = np.zeros((MANY, 3)), np.broadcast_to(turn([0.3, 0.2, 0.1]), (MANY, 3, 3))
+    read = device.measure(r, R)
+    turns = vectors(read.R, R)
+    assert turns.std(axis=0) == pytest.approx(np.full(3, np.radians(0.005)), rel=0.05)
+    errors = np.hstack([read.r - r, turns])
+    assert squared_distance(errors, device.covariance(r, R)) == pytest.approx(6.0, rel=0.05)
+    whole = np.cov(errors.T) / np.sqrt(np.outer(*[np.diag(device.covariance(r[:1], R[:1])[0])] * 2))
+    expected = device.covariance(r[:1], R[:1])[0]
+    assert whole == pytest.approx(expected / np.sqrt(np.outer(*[np.diag(expected)] * 2)), abs=0.08)
+
+
+def test_a_tmac_needs_more_distance_than_a_reflector():
+    assert LaserTracker().sees([1.0, 0.0, 0.0])
+    assert not TMac().sees([1.0, 0.0, 0.0])
+
+
+# cameras
+
+
+def test_a_pinhole_projects_by_similar_triangles():
+    camera = Camera(np.zeros(3), UPRIGHT, focal=1000.0, size=(801, 601))
+    assert camera.project([[0.1, 0.2, 2.0]])[0] == pytest.approx([450.0, 400.0])
+    assert np.isnan(camera.project([[0.1, 0.2, -2.0]])).all()
+    assert camera.inside(np.array([[0.0, 0.0], [801.0, 10.0]])).tolist() == [True, False]
+
+
+def test_slopes_of_images_against_differences():
+    lens = (-0.2, 0.1, 2e-3, -3e-3, 0.05)
+    camera = Camera.looking([-2.0, 0.3, 0.4], [0.0, 0.0, 0.0], distortion=lens)
+    points, step = cube(50, 0.4), 1e-6
+    _, slopes = camera.slopes(points)
+    for k in range(3):
+        shift = step * np.eye(3)[k]
+        difference = (camera.project(points + shift) - camera.project(points - shift)) / (2 * step)
+        assert slopes[..., k] == pytest.approx(
+            difference, abs=1e-4
+        )  # pixel/m, of 900; rounding 1e-12 / 1e-6 * 1e3
+
+
+def test_a_camera_looks_where_it_is_told_with_up_in_the_image_up():
+    camera = Camera.looking([-2.0, 0.0, 0.0], [0.0, 0.5, 0.3])
+    middle, above = camera.project([[0.0, 0.5, 0.3], [0.0, 0.5, 0.4]])
+    assert middle == pytest.approx(camera.centre)
+    assert above[1] < middle[1]
+    assert above[0] == pytest.approx(middle[0])
+
+
+@pytest.mark.parametrize(
+    "device", [single_camera([-2.5, 0, 0], [0, 0, 0]), stereo_cameras([-2.5, 0, 0], [0, 0, 0])]
+)
+def test_noise_of_poses_is_that_of_their_covariance(device):
+    known = replace(device, believed=device.cameras, noise=0.02)
+    r, R = cube(1000, 0.4), np.broadcast_to(TO_CAMERA @ turn([0.2, 0.1, 0.3]), (1000, 3, 3))
+    read = known.measure(r, R)
+    errors = np.hstack([read.r - r, vectors(read.R, R)])
+    assert squared_distance(errors, known.covariance(r, R)) == pytest.approx(6.0, rel=0.08)
+
+
+def test_two_cameras_know_the_depth_better_than_one():
+    one, two = single_camera([-2.5, 0, 0], [0, 0, 0]), stereo_cameras([-2.5, 0, 0], [0, 0, 0])
+    deep = [np.sqrt(d.covariance([[0.0, 0, 0]], TO_CAMERA)[0, 0, 0]) for d in (one, two)]
+    assert deep[1] < deep[0] / 5
+
+
+def test_stereo_errs_as_much_as_in_the_thesis_and_measuring_again_does_not_help():
+    """Section 5.5: 1.7 mm against a laser tracker."""
+    device = stereo_cameras([-2.5, 0, 0], [0, 0, 0])
+    r = cube(600, 0.5)
+    rounds = np.array([device.measure(r, TO_CAMERA, seed=s).r - r for s in range(9)])
+    once = np.nanmean(np.linalg.norm(rounds, axis=2))
+    averaged = np.nanmean(np.linalg.norm(rounds.mean(axis=0), axis=1))
+    assert once == pytest.approx(1.7e-3, rel=0.1)
+    assert averaged > 0.95 * once
+    noise = replace(device, believed=device.cameras)
+    rounds = np.array([noise.measure(r, TO_CAMERA, seed=s).r - r for s in range(9)])
+    ratio = np.nanmean(np.linalg.norm(rounds.mean(axis=0), axis=1)) / np.nanmean(
+        np.linalg.norm(rounds, axis=2)
+    )
+    assert ratio == pytest.approx(1 / 3, rel=0.12)  # one over the root of nine; 600 poses leave 3 to 4 %
+
+
+def test_a_camera_that_stands_elsewhere_shifts_all_poses():
+    true = stereo_cameras([-2.5, 0, 0], [0, 0, 0], lens_error=0.0, noise=0.0).cameras
+    moved = [replace(c, r=np.add(c.r, [0.0, 0.01, 0.0])) for c in true]
+    read = Cameras(cameras=moved, believed=true, noise=0.0).measure(cube(20, 0.3), TO_CAMERA)
+    assert read.r - cube(20, 0.3) == pytest.approx(np.tile([0.0, -0.01, 0.0], (20, 1)), abs=1e-9)
+    assert read.R == pytest.approx(np.broadcast_to(TO_CAMERA, (20, 3, 3)), abs=1e-9)
+
+
+def test_what_cameras_see():
+    device = stereo_cameras([-2.5, 0, 0], [0, 0, 0])
+    r = [[0.0, 0, 0], [0.0, 1.5, 0], [-4.0, 0, 0], [7.5, 0, 0]]  # beside, behind, too far
+    assert device.sees(r, TO_CAMERA).tolist() == [True, False, False, False]
+    assert not device.sees([0.0, 0, 0], TO_CAMERA @ turn([0, np.radians(70.0), 0]))
+    hidden = replace(device, obstacles=[Ball(np.add(device.cameras[1].r, [0.4, 0, 0]), 0.3)])
+    assert not hidden.sees([0.0, 0, 0], TO_CAMERA)  # one of the two eyes is covered
+    assert device.measure(r, TO_CAMERA).seen.tolist() == [True, False, False, False]
+
+
+# gauges
+
+
+def test_a_gauge_reads_how_far_a_face_is_pushed():
+    gauge = LengthGauge(r=[0.0, 0.0, 0.0], noise=0.0, face=[1.0, 0.0, 0.0])
+    assert gauge.measure([0.01, 0.0, 0.0]).readings[0, 0] == pytest.approx(0.01)
+    tilted = turn([0.0, 0.0, 0.1])
+    # the plane through (0.01, 0.005) with normal (cos, sin) meets the axis at 0.01 + 0.005 tan
+    reading = gauge.measure([0.01, 0.005, 0.0], tilted).readings[0, 0]
+    assert reading == pytest.approx(0.01 + 0.005 * np.tan(0.1), abs=1e-12)
+    assert gauge.sees([[0.01, 0, 0], [-0.01, 0, 0], [0.04, 0, 0], [0.01, 0.03, 0]]).tolist() == [
+        True,
+        *[False] * 3,
+    ]
+    assert gauge.measure([0.01, 0.0, 0.0]).r is None
+
+
+def test_wires_find_the_point_where_their_lengths_meet():
+    anchors = [[-1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]
+    r = cube(50, 0.5) + np.array([0, 0, 1.5])
+    exact = Wires(anchors=anchors, noise=0.0, r=[0.1, 0.2, 0.0], R=turn([0.0, 0.2, 0.1]))
+    assert exact.measure(r).r == pytest.approx(r, abs=1e-12)
+    scaled = Wires(anchors=anchors, noise=0.0, scale=1e-3)
+    distances = np.linalg.norm(r[:, None] - np.array(anchors), axis=2)
+    assert np.linalg.norm(scaled.measure(r).r[:, None] - np.array(anchors), axis=2) == pytest.approx(
+        1.001 * distances
+    )
+    assert Wires(anchors=anchors[:2]).measure(r).r is None
+    assert Wires(anchors=anchors, obstacles=[Ball([0.5, 0.0, 0.5], 0.1)]).sees([0.0, 0.0, 1.0]) is np.False_
+
+
+# messages
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (
+            lambda: LaserTracker(r=[0.0, 1.0]),
+            r"LaserTracker: found r=\[0.0, 1.0\], expected three finite numbers",
+        ),
+        (lambda: LaserTracker(R=2 * np.eye(3)), "LaserTracker: found R=.* expected a rotation matrix"),
+        (lambda: LaserTracker(facing=[0, 0, 0]), "found facing=.* expected a direction"),
+        (
+            lambda: LaserTracker(range_noise=-1e-6),
+            "found range_noise=-1e-06, expected .* 0 leaves this error out",
+        ),
+        (lambda: TMac(rotation_noise=np.nan), "TMac: found rotation_noise=nan"),
+        (lambda: LaserTracker().measure([0.0, 1.0]), r"found r of shape \(2,\)"),
+        (
+            lambda: LaserTracker().measure(np.zeros((2, 3)), frame="robot"),
+            "found frame='robot', expected 'world' or",
+        ),
+        (
+            lambda: Bars(np.zeros((2, 3)), np.zeros((3, 3)), 0.1),
+            r"Bars: found ends of shapes \(2, 3\) and \(3, 3\)",
+        ),
+        (lambda: Bars(np.zeros((2, 3)), np.ones((2, 3)), 0.0), "Bars: found radius=0.0"),
+        (
+            lambda: LaserTracker().sees(
+                np.ones((3, 3)), bars=Bars(np.zeros((2, 1, 3)), np.ones((2, 1, 3)), 0.1)
+            ),
+            "Bars: found 2 rows for 3 poses",
+        ),
+        (lambda: LengthGauge(stroke=(0.1, 0.0)), r"found stroke=\(0.1, 0.0\)"),
+        (lambda: Wires(anchors=np.zeros((3, 2))), r"found anchors of shape \(3, 2\)"),
+        (lambda: Wires(anchors=np.outer([0, 1, 2], [1, 0, 0])), "all anchors on one line"),
+        (lambda: Camera.looking([0, 0, 0], [0, 0, 1]), "Camera: found up=.* along the view"),
+        (lambda: Camera([0, 0, 0], np.eye(3), focal=-5.0), "Camera: found focal=.* expected pixels above 0"),
+        (
+            lambda: Camera([0, 0, 0], np.eye(3), distortion=[0.1]),
+            "found distortion=.* expected 5 finite numbers",
+        ),
+        (lambda: Cameras(cameras=cast(Any, [1])), r"Cameras: found cameras=\[1\]"),
+        (lambda: Cameras(cameras=[]), "found 0 cameras and 0 believed"),
+        (lambda: single_camera([0, 0, 0], [1, 0, 0], pattern=np.eye(3)), r"a pattern of shape \(3, 3\)"),
+        (
+            lambda: single_camera([0, 0, 0], [1, 0, 0], pattern=np.outer(range(4), [1, 0, 0])),
+            "a pattern on one line",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told(wrong, words):
+    with pytest.raises(ModelError, match=words):
+        wrong()
