@@ -1,0 +1,82 @@
+"""Three links in closed form, many poses at once; guideways need be neither parallel nor unit vectors.
+
+    |offset_i + q_i direction_i - r| = L_i                      Dressler (2012), (4.9)
+
+Arrays much longer than the cache make NumPy wait for memory, so the work goes block by block.
+"""
+
+import numpy as np
+
+BLOCK = 4096  # poses: nine rows of them are 288 KiB, which stays in the second cache
+
+
+class InverseOfThreeLinks:
+    """Positions of three carts for positions of the tool; offset, direction (3, 3), a row an arm; length (3,) in m."""
+
+    def __init__(self, offset: np.ndarray, direction: np.ndarray, length: np.ndarray):
+        size = np.linalg.norm(direction, axis=1)
+        # along each guideway, and across it in two directions, all in units of the actuator coordinate
+        across = np.linalg.svd(direction[:, None, :])[2][:, 1:]
+        axes = (
+            np.concatenate([direction[None], np.swapaxes(across, 0, 1) * size[:, None]]) / size[:, None] ** 2
+        )
+        self._axes = np.ascontiguousarray(axes.reshape(9, 3))
+        self._shift = np.einsum("kij,ij->ki", axes, offset).reshape(9, 1)
+        self._squares = ((length / size) ** 2)[:, None]
+
+    def __call__(self, r: np.ndarray, sides: np.ndarray) -> np.ndarray:
+        """Positions q (N, 3) in m for r (N, 3); NaN rows out of reach. sides (3,): 1 with the tool ahead of its cart."""
+        q = np.empty((len(r), 3))
+        sides = np.asarray(sides, dtype=float)[:, None]
+        ahead = bool((sides == 1.0).all())
+        with np.errstate(invalid="ignore"):
+            for first in range(0, len(r), BLOCK):
+                part = slice(first, first + BLOCK)
+                places = self._axes @ r[part].T
+                places -= self._shift
+                along, y, z = places[:3], places[3:6], places[6:]
+                y *= y
+                z *= z
+                y += z
+                np.subtract(self._squares, y, out=z)
+                least = z.min()
+                np.sqrt(z, out=z)
+                if not ahead:
+                    z *= sides
+                np.subtract(along, z, out=q[part].T)
+                if not least >= 0.0:  # NaN as well
+                    q[part][np.isnan(q[part]).any(axis=1)] = np.nan
+        return q
+
+
+def meeting(centres: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where three spheres meet: foot (N, 3), height (N, 3), margin (N,); the points are foot +- height.
+
+    centres: (N, 3, 3), a row a sphere, m; length: (3,) radii, m. height is along the normal of the plane through the
+    centres, first to second cross first to third; it is zero and margin, its square in m2, negative where they do not
+    meet. Centres in one line give NaN.
+    """
+    foot, height, margin = np.empty((len(centres), 3)), np.empty((len(centres), 3)), np.empty(len(centres))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for first in range(0, len(centres), BLOCK):
+            part = slice(first, first + BLOCK)
+            c = np.ascontiguousarray(centres[part].transpose(1, 2, 0))
+            d, e = c[1] - c[0], c[2] - c[0]
+            normal = _cross(d, e)
+            area = _dot(normal, normal)
+            along_d = (_dot(d, d) + (length[0] ** 2 - length[1] ** 2)) / 2
+            along_e = (_dot(e, e) + (length[0] ** 2 - length[2] ** 2)) / 2
+            across = (along_d * _cross(e, normal) + along_e * _cross(normal, d)) / area
+            square = length[0] ** 2 - _dot(across, across)
+            foot[part] = (c[0] + across).T
+            height[part] = (np.sqrt(np.maximum(square, 0.0) / area) * normal).T
+            margin[part] = square
+    return foot, height, margin
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -1,0 +1,155 @@
+"""Guideways, turntables and links of a robot as arrays: where the joints are, and how they move.
+
+    A_j(q) = frame of cart or turntable applied to the joint on it       Dressler (2012), (4.16) to (4.24)
+    B_j(r, R) = r + R b_j                                                (4.6)
+    |B_j - A_j| = L_j                                                    for every link j
+
+The first axis of all arrays is the pose, the second the link. Lengths in m, angles in rad.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau.kinematics.rotations import about, of_quaternion
+
+
+@dataclass(frozen=True, eq=False)
+class Turntable:
+    """A turntable on an arm: its place and orientation in what carries it, its axis in its own frame."""
+
+    arm: int
+    offset: np.ndarray
+    R: np.ndarray
+    axis: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Where guideways, turntables and joints are.
+
+    offset, direction: (3, 3), carts at s = 0 and guideways, a row an arm. The rest has a row a link: arm (m,), length
+    (m,), on_cart (m, 3) in the frame of the outermost turntable or of the cart, on_plate (m, 3) in plate axes.
+    """
+
+    offset: np.ndarray
+    direction: np.ndarray
+    arm: np.ndarray
+    length: np.ndarray
+    on_cart: np.ndarray
+    on_plate: np.ndarray
+    turntables: tuple[Turntable, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuator coordinates, carts first."""
+        turns = (f"turntables[{k}].phi" for k in range(len(self.turntables)))
+        return (*(f"carts[{i}].s" for i in range(3)), *turns)
+
+    def links_of(self, arm: int) -> np.ndarray:
+        """Numbers of the links of an arm."""
+        return np.flatnonzero(self.arm == arm)
+
+    def columns_of(self, arm: int) -> list[int]:
+        """Numbers of the actuator coordinates that move an arm."""
+        return [arm, *(3 + k for k, turntable in enumerate(self.turntables) if turntable.arm == arm)]
+
+    def plate_joints(self, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Joints on the plate, (N, m, 3)."""
+        return r[:, None] + self.on_plate @ np.swapaxes(R, 1, 2)
+
+    def cart_joints(self, q: np.ndarray) -> np.ndarray:
+        """Joints on carts and turntables, (N, m, 3)."""
+        A = np.empty((len(q), len(self.length), 3))
+        for arm in range(3):
+            links = self.links_of(arm)
+            place, R, _ = self.frames(arm, q)
+            A[:, links] = place[:, None] + self.on_cart[links] @ np.swapaxes(R, 1, 2)
+        return A
+
+    def frames(self, arm: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, list]:
+        """Origin (N, 3) and orientation (N, 3, 3) of what carries the links of an arm; axis and origin of its turntables."""
+        place = self.offset[arm] + q[:, arm, None] * self.direction[arm]
+        R, turns = np.broadcast_to(np.eye(3), (len(q), 3, 3)), []
+        for k, turntable in enumerate(self.turntables):
+            if turntable.arm == arm:
+                place = place + R @ turntable.offset
+                R = R @ turntable.R
+                turns.append((R @ turntable.axis, place))
+                R = R @ about(turntable.axis, q[:, 3 + k])
+        return place, R, turns
+
+    def slopes(
+        self, q: np.ndarray, r: np.ndarray, R: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Lengths (N, m), unit vectors from cart to plate u (N, m, 3), and the slopes of the lengths.
+
+        By the pose (N, m, 6), the last three for a rotation vector resolved in the world; by the actuators (N, m, n).
+        (4.31) holds for any angles, with the joint on the plate in plate axes; a rotation vector has no singular pose.
+        """
+        B, A = self.plate_joints(r, R), self.cart_joints(q)
+        gap = B - A
+        length = np.linalg.norm(gap, axis=2)
+        u = gap / length[:, :, None]
+        by_pose = np.concatenate([u, np.cross(B - r[:, None], u)], axis=2)
+        by_joints = np.zeros((*length.shape, len(self.names)))
+        for arm in range(3):
+            links, (cart, *others) = self.links_of(arm), self.columns_of(arm)
+            by_joints[:, links, cart] = -(u[:, links] @ self.direction[arm])
+            turns = self.frames(arm, q)[2] if others else []
+            for column, (axis, place) in zip(others, turns, strict=True):
+                moved = np.cross(axis[:, None], A[:, links] - place[:, None])
+                by_joints[:, links, column] = -np.sum(u[:, links] * moved, axis=2)
+        return length, u, by_pose, by_joints
+
+    def mean_arms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Each arm as one link: mean joint on the plate (3, 3), mean length (3,)."""
+        on_plate = np.stack([self.on_plate[self.links_of(arm)].mean(axis=0) for arm in range(3)])
+        return on_plate, np.array([self.length[self.links_of(arm)].mean() for arm in range(3)])
+
+    def mean_joints(self, q: np.ndarray) -> np.ndarray:
+        """Mean joint of each arm on its cart or turntable, (N, 3, 3)."""
+        A = self.cart_joints(q)
+        return np.stack([A[:, self.links_of(arm)].mean(axis=1) for arm in range(3)], axis=1)
+
+
+def geometry_of(values: Mapping[str, float]) -> Geometry | None:
+    """The geometry that parameters of a model describe, by their names; None where they describe none of these robots.
+
+    `arms[i].length`: three links; `arms[i].links[j].length`: six; `turntables[k].axis` besides: the F1, whose turntables
+    stand on arms 2, 3 and on the one before.
+    """
+
+    def vector(name: str, size: int = 3) -> np.ndarray:
+        return np.array([values[f"{name}[{k}]"] for k in range(size)])
+
+    def has(name: str) -> bool:
+        return name in values or f"{name}[0]" in values
+
+    arms = [f"arms[{i}]" for i in range(3)]
+    if has("arms[3].direction") or not all(has(f"{a}.direction") and has(f"{a}.offset") for a in arms):
+        return None
+    offset, direction = (np.stack([vector(f"{a}.{part}") for a in arms]) for part in ("offset", "direction"))
+    if all(has(f"{a}.length") for a in arms):
+        zero = np.zeros((3, 3))
+        length = np.array([values[f"{a}.length"] for a in arms])
+        return Geometry(offset, direction, np.arange(3), length, zero, zero)
+    links = [
+        (i, f"{a}.links[{j}]") for i, a in enumerate(arms) for j in range(6) if has(f"{a}.links[{j}].length")
+    ]
+    turns = [f"turntables[{k}]" for k in range(6) if has(f"turntables[{k}].axis")]
+    if len(links) != 6 or {i for i, _ in links} != {0, 1, 2} or len(turns) not in (0, 3):
+        return None
+    turntables = tuple(
+        Turntable(
+            arm, vector(f"{t}.offset"), of_quaternion(vector(f"{t}.orientation", 4)), vector(f"{t}.axis")
+        )
+        for arm, t in zip((1, 2, 2), turns, strict=False)
+    )
+    arm = np.array([i for i, _ in links])
+    if turntables and arm.tolist() != [0, 1, 1, 2, 2, 2]:
+        return None
+    length = np.array([values[f"{name}.length"] for _, name in links])
+    on_cart, on_plate = (np.stack([vector(f"{n}.{p}") for _, n in links]) for p in ("offset", "plate_offset"))
+    return Geometry(offset, direction, arm, length, on_cart, on_plate, turntables)

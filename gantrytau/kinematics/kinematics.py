@@ -1,0 +1,270 @@
+"""Forward and inverse kinematics of a robot by name, for one pose or many.
+
+    kinematics = Kinematics(GantryTau(prototypes.L1))
+    q = kinematics.ik([[0.5, 3.0, -0.6], [0.6, 3.0, -0.6]])          # (2, 3), NaN rows out of reach
+    r, R = kinematics.fk(q)
+
+Gantry-Tau robots are known by the names of their parameters, and by their own equations: a closed form is taken only if
+the start of the model, which those equations decide, fits its links. Any other model answers through its equations.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.kinematics.configurations import Configuration, of_joints, of_pose
+from gantrytau.kinematics.geometry import geometry_of
+from gantrytau.kinematics.linked import Home, LinkedRobot, SixLinks, ThreeLinks, TurningLinks
+from gantrytau.kinematics.model_functions import ModelFunctions, home_of
+from gantrytau.kinematics.poses import answered, poses, vectors
+from gantrytau.kinematics.rotations import angle_between
+from gantrytau.model import Model
+from gantrytau.parameters import parameter_table, with_values
+from gantrytau.translation import translate
+
+FITS = 1e-6  # m by which links may miss their lengths at the start of a model
+
+
+class Kinematics:
+    """Kinematics of a robot: a model instance, or what `translate` made of one.
+
+    tool: name of the component whose `.r` (and `.R`) is the pose; joints: names of the actuator coordinates, by default
+    the `s` or `phi` next to each force or torque that drives the model, lengths first; tolerance: m by which links may
+    miss their lengths where ik of a robot with three carts is given an orientation too.
+
+    Poses are r (N, 3) in m and R (N, 3, 3) from plate to world, or one pose without the first axis; q is (N, n) in m and
+    rad. Where there is no solution, or the argument is NaN, rows are NaN. Raises ModelError for arrays of other shapes and
+    models without tool or drives.
+    """
+
+    def __init__(
+        self,
+        robot: Model | Dae,
+        *,
+        tool: str = "tool",
+        joints: Sequence[str] | None = None,
+        tolerance: float = 1e-6,
+    ):
+        self.dae = robot if isinstance(robot, Dae) else translate(robot, units=False)
+        self._tool = tool
+        self._tolerance = tolerance
+        self._values = dict(self.dae.table.values)
+        if f"{tool}.r" not in self.dae.vectors:
+            raise ModelError(
+                f"Kinematics: {self.dae.name} has no '{tool}.r', expected the position of a tool"
+                f"{did_you_mean(f'{tool}.r', self.dae.vectors)} Name its component by tool="
+            )
+        self._solver: Any = self._recognised(joints) or self._by_equations(joints)
+        self.iterations_by_pose: np.ndarray = np.zeros(0, dtype=int)
+
+    def __repr__(self) -> str:
+        return f"<Kinematics of {self.dae.name}: {', '.join(self.joints)} and {self._tool}>"
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the actuator coordinates, the columns of q."""
+        return self._solver.joints
+
+    @property
+    def home(self) -> Home:
+        """The pose in which the model starts, with `.q .r .R`: it decides the branch."""
+        return self._solver.home
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the last call, the most of any pose; `iterations_by_pose` has them one by one."""
+        return int(self.iterations_by_pose.max(initial=0))
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Bounds that the model declares for its actuator coordinates, (n, 2); infinite where it declares none."""
+        found = np.tile([-np.inf, np.inf], (len(self.joints), 1))
+        for row, name in enumerate(self.joints):
+            variable = self.dae.flat.find(name)
+            for column, bound in enumerate((variable.min, variable.max) if variable else ()):
+                if bound is not None:
+                    found[row, column] = self.dae.table.number(bound[0])[0]
+        return found
+
+    def ik(self, r: Any, R: Any = None) -> np.ndarray:
+        """Actuator coordinates q (N, n) of poses; (n,) for one.
+
+        Without R the orientation is the one that the links give; the F1 needs one. A link that is too short, or an
+        orientation that three carts cannot give, is a NaN row.
+        """
+        at = poses(r, R, "Kinematics.ik")
+        q, self.iterations_by_pose = self._solver.ik(at.r, at.R)
+        return answered(at.one, q)[0]
+
+    def fk(self, q: Any, near: Any = None) -> tuple[np.ndarray, np.ndarray]:
+        """Poses r (N, 3), R (N, 3, 3) of actuator coordinates; (3,) and (3, 3) for one.
+
+        near: a position r, or (r, R): the branch near it (three links) or where the iteration starts; by default the
+        branch of the start of the model.
+        """
+        q, one = vectors(q, len(self.joints), "q", "Kinematics.fk")
+        if near is not None:
+            near = self._near(near, len(q))
+        r, R, self.iterations_by_pose = self._solver.fk(q, near)
+        r, R = answered(one, r, R)
+        return r, R
+
+    def jacobian(self, r: Any, R: Any = None) -> np.ndarray:
+        """dq/dpose of poses, (N, n, 3) by r, or (N, n, 6) by r and a rotation vector resolved in the world.
+
+        Three columns where the orientation follows from r (three carts, no R given), six with R.
+        """
+        at = poses(r, R, "Kinematics.jacobian")
+        return answered(at.one, self._solver.jacobian(at.r, at.R))[0]
+
+    def configurations(self, *, q: Any = None, r: Any = None, R: Any = None) -> list[Configuration]:
+        """All solutions, forward of q or inverse of r (and R), each with `.q .r .R .feasible`.
+
+        Three links: two poses of q, eight q of a pose, for many at once. Six links: one pose at a time; all real
+        assembly modes of q, or the q of a pose with every arm on either side of its cart. Raises ModelError unless
+        exactly one of q and r is given.
+        """
+        if (q is None) == (r is None):
+            raise ModelError(
+                f"Kinematics.configurations: found {'neither' if q is None else 'both'} of q and r, expected one of them; "
+                "give q= for poses, r= (and R=) for actuator coordinates"
+            )
+        robot = self.linked("configurations")
+        if q is not None:
+            joints, one = vectors(q, len(self.joints), "q", "Kinematics.configurations")
+            return of_joints(robot, joints, one, self.limits)
+        return of_pose(robot, poses(r, R, "Kinematics.configurations"), self.limits)
+
+    def state(self, r: Any, R: Any = None, q: Any = None) -> np.ndarray:
+        """Configuration state of poses, (N, 4).
+
+        For each arm 1 if it points along its guideway, -1 against, 0 where that is singular; last, 1 if the tool is
+        ahead of the plane of the carts, -1 if behind. q: of that pose, else what ik answers.
+        """
+        robot = self.linked("state")
+        at, q, R = self._whole(robot, r, R, q, "Kinematics.state")
+        found = np.column_stack([robot.sides_of(q, at.r, R), robot.ahead_of(q, at.r, R)])
+        return answered(at.one, found)[0]
+
+    def ball_joint_angles(
+        self, r: Any, R: Any = None, q: Any = None, *, cart_axes: Any = None, plate_axes: Any = None
+    ) -> np.ndarray:
+        """Angles between links and the axes of their ball joints, (N, links, 2) in rad: on the cart, on the plate.
+
+        cart_axes (links, 3), in axes of the cart or of the turntable on it; plate_axes (links, 3), in plate axes; both
+        point as the link does, from cart to plate. By default a joint is mounted along its link in the home pose.
+        """
+        robot = self.linked("ball_joint_angles")
+        at, q, R = self._whole(robot, r, R, q, "Kinematics.ball_joint_angles")
+        default = _directions(robot, robot.home.q[None], robot.home.r[None], robot.home.R[None])
+        axes = [
+            d[0] if a is None else np.asarray(a, float)
+            for a, d in zip((cart_axes, plate_axes), default, strict=True)
+        ]
+        count = len(robot.geometry.length)
+        for name, array in zip(("cart_axes", "plate_axes"), axes, strict=True):
+            if array.shape != (count, 3):
+                raise ModelError(
+                    f"Kinematics.ball_joint_angles: found {name} of shape {array.shape}, expected ({count}, 3), a row a "
+                    "link; give one axis for each link"
+                )
+        links = _directions(robot, q, at.r, R)
+        found = np.stack([angle_between(link, axis) for link, axis in zip(links, axes, strict=True)], axis=2)
+        return answered(at.one, found)[0]
+
+    def replaced(self, parameters: Mapping[str, Any]) -> "Kinematics":
+        """The same robot with other numbers for parameters such as `arms[0].length`, on the same branch.
+
+        Raises ModelError for unknown names or shapes. Quick for Gantry-Tau robots, whose model is not translated anew.
+        """
+        robot = self.linked("replaced")
+        flat = with_values(self.dae.flat, parameters)
+        found = Kinematics.__new__(Kinematics)
+        found.__dict__.update(self.__dict__)
+        found._values = dict(parameter_table(flat).values)
+        geometry = geometry_of(found._values)
+        assert geometry is not None  # names do not change
+        found._solver = type(robot)(geometry, robot.home, robot.tolerance)
+        # what decides the branch is taken over, as the old home is no pose of the new robot
+        found._solver.__dict__.update(sides=robot.sides, ahead=robot.ahead)
+        found.iterations_by_pose = np.zeros(0, dtype=int)
+        return found
+
+    def linked(self, what: str = "links") -> LinkedRobot:
+        """The robot as guideways and links; ModelError for a model that is not made of them."""
+        if isinstance(self._solver, LinkedRobot):
+            return self._solver
+        raise ModelError(
+            f"Kinematics.{what}: found {self.dae.name}, expected a Gantry-Tau robot, whose links are known by name; use "
+            "ik, fk and jacobian, or start values of another branch"
+        )
+
+    def _whole(self, robot: LinkedRobot, r: Any, R: Any, q: Any, place: str):
+        """Poses with the q and R that follow where they are not given."""
+        at = poses(r, R, place)
+        if q is None:
+            q, self.iterations_by_pose = robot.ik(at.r, at.R)
+        else:
+            q, _ = vectors(q, len(self.joints), "q", place)
+        if at.R is not None:
+            return at, q, at.R
+        following = isinstance(robot, SixLinks)
+        return at, q, robot.follow(at.r, robot.sides)[1] if following else robot.repeated(len(at.r))
+
+    def _near(self, near: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
+        r, R = near if isinstance(near, tuple) and len(near) == 2 else (near, None)
+        at = poses(r, R, "Kinematics.fk, near")
+        if len(at.r) not in (1, count):
+            raise ModelError(
+                f"Kinematics.fk: found near of {len(at.r)} rows, expected 1 or {count}, as q has; give one for each pose"
+            )
+        R = self.home.R if at.R is None else at.R
+        return np.broadcast_to(at.r, (count, 3)), np.broadcast_to(R, (count, 3, 3))
+
+    def _recognised(self, joints: Sequence[str] | None) -> LinkedRobot | None:
+        """The robot as guideways and links, if its names and its start say that it is one."""
+        geometry = geometry_of(self._values)
+        known = set(self.dae.variables)
+        if geometry is None or not known.issuperset(geometry.names) or self._tool != "tool":
+            return None
+        if joints is not None and tuple(joints) != geometry.names:
+            return None
+        kind = TurningLinks if geometry.turntables else SixLinks if len(geometry.length) == 6 else ThreeLinks
+        home = home_of(self.dae.evaluate(), self._tool, geometry.names)
+        length = geometry.slopes(home.q[None], home.r[None], home.R[None])[0]
+        return (
+            kind(geometry, home, self._tolerance) if np.abs(length - geometry.length).max() < FITS else None
+        )
+
+    def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
+        names = tuple(joints) if joints is not None else driven_joints(self.dae)
+        return ModelFunctions(self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names))
+
+
+def driven_joints(dae: Dae) -> tuple[str, ...]:
+    """Coordinates that the inputs of a model drive: `x.s` beside a force `x.f`, `x.phi` beside a torque `x.tau`."""
+    known = set(dae.variables)
+    pairs = [(name.rpartition(".")[0], name.rpartition(".")[2]) for name in dae.inputs]
+    lengths = [f"{owner}.s" for owner, last in pairs if last == "f" and f"{owner}.s" in known]
+    angles = [f"{owner}.phi" for owner, last in pairs if last == "tau" and f"{owner}.phi" in known]
+    if not lengths and not angles:
+        raise ModelError(
+            f"Kinematics: {dae.name} has the inputs {', '.join(dae.inputs) or 'none'}, expected forces x.f beside x.s or "
+            "torques x.tau beside x.phi; name the actuator coordinates by joints="
+        )
+    return (*lengths, *angles)
+
+
+def _directions(
+    robot: LinkedRobot, q: np.ndarray, r: np.ndarray, R: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors of links in the axes of what carries them, and in plate axes, (N, m, 3)."""
+    _, u, _, _ = robot.geometry.slopes(q, r, R)
+    on_cart = np.empty_like(u)
+    for arm in range(3):
+        links = robot.geometry.links_of(arm)
+        on_cart[:, links] = u[:, links] @ robot.geometry.frames(arm, q)[1]
+    return on_cart, u @ R

@@ -1,0 +1,118 @@
+"""Kinematics of any model from its own equations, where no closed form is known: functions between joints and pose.
+
+The functions of `Dae.function` are evaluated for many poses at once through buffers of NumPy's memory; the way through
+CasADi's own matrices takes a hundred times longer. Both answer on the branch of the start values.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError
+from gantrytau.kinematics.linked import Home
+from gantrytau.kinematics.rotations import of_quaternion, quaternions, skewed
+
+BLOCK = 256  # poses of one call
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFunctions:
+    """A model with a `tool` and driven `joints`; three joints: a position is a pose, six: an orientation besides."""
+
+    dae: Dae
+    tool: str
+    joints: tuple[str, ...]
+    home: Home
+
+    def ik(self, r, R=None, sides=None):
+        """Joints q and iterations (none are counted: they run inside the functions)."""
+        return _over_poses(self._inverse(), [self._pose(r, R)])[0], np.zeros(len(r), dtype=int)
+
+    def fk(self, q, near=None):
+        """r, R and iterations."""
+        if near is not None:
+            raise ModelError(
+                f"Kinematics: found near= for {self.dae.name}, whose forward kinematics has no closed form, expected none; "
+                "choose the branch by start values of the model"
+            )
+        wanted = [f"{self.tool}.r"] + ([f"{self.tool}.R"] if self._turns else [])
+        found = _over_poses(self.dae.function(list(self.joints), wanted), list(q.T[:, :, None]))
+        if self._turns:
+            R = found[1].reshape(-1, 3, 3).transpose(0, 2, 1)
+        else:
+            R = np.array(np.broadcast_to(np.eye(3), (len(q), 3, 3)))
+        return found[0], R, np.zeros(len(q), dtype=int)
+
+    def jacobian(self, r, R=None):
+        """dq/dpose (N, n, 3), with six joints (N, n, 6)."""
+        pose = self._pose(r, R)
+        inverse = self._inverse()
+        x = ca.MX.sym("pose", pose.shape[1])
+        slopes = ca.Function("slopes", [x], [ca.densify(ca.jacobian(inverse(x), x))])
+        found = _over_poses(slopes, [pose])[0].reshape(len(r), pose.shape[1], -1).transpose(0, 2, 1)
+        if R is None or pose.shape[1] == 3:
+            return found
+        q = quaternions(R)
+        # a rotation vector turns the quaternion (w, v) by half of (w I - [v]x) in its last three elements
+        turn = (q[:, 0, None, None] * np.eye(3) - skewed(q[:, 1:])) / 2
+        return np.concatenate([found[:, :, :3], found[:, :, 3:] @ turn], axis=2)
+
+    @property
+    def _turns(self) -> bool:
+        return f"{self.tool}.R" in self.dae.vectors
+
+    def _inverse(self) -> ca.Function:
+        """Joints from a pose: r, and elements 1 to 3 of the quaternion with six joints, as one column."""
+        six = len(self.joints) == 6
+        names = [f"{self.tool}.r"] + [f"{self.tool}.q[{k}]" for k in (1, 2, 3) if six]
+        function = self.dae.function(names, list(self.joints))
+        x = ca.MX.sym("pose", 6 if six else 3)
+        parts = [x[:3], *(x[3 + k] for k in range(3) if six)]
+        return ca.Function("inverse", [x], [ca.densify(ca.vertcat(*function.call(parts)))])
+
+    def _pose(self, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """Arguments of the inverse."""
+        count = len(self.joints)
+        if count == 3 and R is None:
+            return r
+        if count == 6 and R is not None:
+            return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)
+        raise ModelError(
+            f"Kinematics: found {count} joints and {'no' if R is None else 'an'} orientation R for {self.dae.name}, "
+            "expected three joints and a position, or six and an orientation besides; name others by joints="
+        )
+
+
+def home_of(values: dict, tool: str, joints: tuple[str, ...]) -> Home:
+    """The start of a model as a pose; values as `Dae.evaluate` answers."""
+    R = values.get(f"{tool}.R")
+    q = values.get(f"{tool}.q")
+    if R is None:
+        R = np.eye(3) if q is None else of_quaternion(np.asarray(q))
+    return Home(np.array([float(values[n]) for n in joints]), np.asarray(values[f"{tool}.r"]), np.asarray(R))
+
+
+def _over_poses(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
+    """Results (N, k) of a function for arguments (N, l), a block of poses in one call."""
+    count = len(arguments[0])
+    found = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
+    mapped = function.map(BLOCK)
+    buffer, run = mapped.buffer()
+    inside = [np.zeros((BLOCK, function.numel_in(i))) for i in range(function.n_in())]
+    outside = [np.zeros((BLOCK, mapped.nnz_out(i) // BLOCK)) for i in range(function.n_out())]
+    for i, memory in enumerate(inside):
+        buffer.set_arg(i, memoryview(memory))
+    for i, memory in enumerate(outside):
+        buffer.set_res(i, memoryview(memory))
+    for first in range(0, count, BLOCK):
+        part = slice(first, min(first + BLOCK, count))
+        size = part.stop - first
+        for memory, argument in zip(inside, arguments, strict=True):
+            memory[:size] = argument[part]
+            memory[size:] = argument[part.stop - 1]
+        run()
+        for memory, result in zip(outside, found, strict=True):
+            result[part] = memory[:size]
+    return found

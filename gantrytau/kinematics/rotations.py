@@ -1,0 +1,67 @@
+"""Rotations of many poses at once; the first axis is the pose."""
+
+import numpy as np
+
+SMALL = 1e-8  # rad, below which sin(x) / x is 1 to the last digit
+
+
+def skewed(v: np.ndarray) -> np.ndarray:
+    """The matrix of the cross product with v: (..., 3) -> (..., 3, 3)."""
+    found = np.zeros((*v.shape, 3))
+    found[..., 0, 1], found[..., 0, 2] = -v[..., 2], v[..., 1]
+    found[..., 1, 0], found[..., 1, 2] = v[..., 2], -v[..., 0]
+    found[..., 2, 0], found[..., 2, 1] = -v[..., 1], v[..., 0]
+    return found
+
+
+def turned(R: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """R (N, 3, 3) turned further by rotation vectors (N, 3), rad, resolved in the world (Rodrigues)."""
+    angle = np.linalg.norm(vector, axis=-1)
+    safe = np.where(angle < SMALL, 1.0, angle)
+    once = np.where(angle < SMALL, 1.0, np.sin(safe) / safe)
+    twice = np.where(angle < SMALL, 0.5, 2.0 * np.sin(safe / 2) ** 2 / safe**2)
+    u = skewed(vector)
+    return R + (once[:, None, None] * u + twice[:, None, None] * (u @ u)) @ R
+
+
+def about(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotations about one unit axis (3,) by angles (N,): (N, 3, 3)."""
+    u = skewed(axis)
+    return np.eye(3) + np.sin(angle)[:, None, None] * u + (1.0 - np.cos(angle))[:, None, None] * (u @ u)
+
+
+def of_quaternion(q: np.ndarray) -> np.ndarray:
+    """Rotation of a unit quaternion, scalar first, (3, 3)."""
+    u = skewed(np.asarray(q[1:]))
+    return np.eye(3) + 2 * q[0] * u + 2 * (u @ u)
+
+
+def quaternions(R: np.ndarray) -> np.ndarray:
+    """Unit quaternions of rotations (N, 3, 3), scalar first and not negative: (N, 4)."""
+    d = np.einsum("nii->ni", R)
+    trace = d.sum(axis=1)
+    squares = 1 + np.stack([trace, *(2 * d[:, k] - trace for k in range(3))], axis=1)
+    w = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    symmetric = R + R.transpose(0, 2, 1)
+    table = np.empty((len(R), 4, 4))  # row k is 4 q_k q: the largest is safe to divide by (Shepperd, 1978)
+    table[:, 0, 0], table[:, 0, 1:], table[:, 1:, 0], table[:, 1:, 1:] = squares[:, 0], w, w, symmetric
+    for k in range(3):
+        table[:, k + 1, k + 1] = squares[:, k + 1]
+    largest = np.argmax(np.nan_to_num(squares), axis=1)
+    rows = table[np.arange(len(R)), largest]
+    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.where(rows[:, :1] < 0, -rows, rows)
+
+
+def best_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotations R (N, 3, 3) that bring vectors b (N, k, 3) nearest to a (N, k, 3), in squares (Kabsch, 1976)."""
+    finite = np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=(1, 2))
+    moments = np.where(finite[:, None, None], np.swapaxes(a, 1, 2) @ b, 0.0)
+    u, _, v = np.linalg.svd(moments)
+    u[:, :, 2] *= np.linalg.det(u @ v)[:, None]
+    return np.where(finite[:, None, None], u @ v, np.nan)
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angle between vectors (..., 3) and (..., 3), rad, exact where it is small as well."""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
