@@ -1,0 +1,158 @@
+"""All ways to assemble six links: the forward kinematics of a general hexapod without a start value.
+
+|r + R B_k - A_k| = L_k, k = 1..6: Dressler (2012), (4.34), has 40 solutions in complex poses, of which the real ones
+are the assembly modes. All of them are found, by following those of a known hexapod (study*.py).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau.kinematics.assembly_modes_checks import checked_hexapod, specialities
+from gantrytau.kinematics.assembly_modes_links import PAIRS, link_geometry, sides, signs
+from gantrytau.kinematics.study import pose
+from gantrytau.kinematics.study_poses import exact_poses, link_errors
+from gantrytau.kinematics.study_roots import MODES, Roots, all_roots, placed
+
+REAL = 1e-6  # imaginary part of z of length 1; a pair of complex modes nearer than that to each other is a double one
+MET = 1e-9  # error of links by their length; a real mode that is nearer to a complex one stays complex
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModes:
+    """The modes of a hexapod: real ones first, those of one group together; complex ones in conjugate pairs.
+
+    r: (k, 3), position of the platform, in m; R: (k, 3, 3), its rotation; complex both, real ones without
+    imaginary part. real, regular: (k,); singular modes are where several meet, or where the links do not hold the
+    platform, and known to some 1e-6 only. complete: all 40 are there. error: (k,), what links are wrong by, in m.
+    feasible: (k,), real, no links crossed, links `diameter` apart; crossed: pairs of links per mode; clearance:
+    (k,), least distance of two links, in m, NaN for complex modes. group: (k,), 1 or -1, side of the plane
+    through the base joints, 0 for complex modes; the largest component of its normal is positive. sign: (k,), 1 or
+    -1: between modes of different signs lies a singular pose; 0 for complex modes. findings: what is special.
+    """
+
+    r: np.ndarray
+    R: np.ndarray
+    real: np.ndarray
+    regular: np.ndarray
+    complete: bool
+    error: np.ndarray
+    feasible: np.ndarray
+    crossed: tuple[tuple[tuple[int, int], ...], ...]
+    clearance: np.ndarray
+    group: np.ndarray
+    sign: np.ndarray
+    findings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.r)
+
+    @property
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """The real modes as real arrays, r (m, 3) and R (m, 3, 3), in the order of the record."""
+        return self.r[self.real].real, self.R[self.real].real
+
+    def __str__(self) -> str:
+        lines = [
+            f"{len(self)} assembly modes, {self.real.sum()} real, {self.feasible.sum()} without crossed links"
+        ]
+        for k in np.flatnonzero(self.real):
+            place = ", ".join(f"{x:.4f}" for x in self.r[k].real)
+            pairs = ", ".join(f"{i}-{j}" for i, j in self.crossed[k])
+            crossed = f", links {pairs} crossed" if pairs else ""
+            lines.append(f"  r = ({place}) m, group {self.group[k]:+d}, sign {self.sign[k]:+d}{crossed}")
+        return "\n".join([*lines, *self.findings])
+
+
+def assembly_modes(
+    base: Sequence | np.ndarray,
+    platform: Sequence | np.ndarray,
+    lengths: Sequence | np.ndarray,
+    *,
+    diameter: float = 0.0,
+) -> AssemblyModes:
+    """All poses in which six links of given lengths join a platform to its base, complex ones included.
+
+    base: joints in the world, (6, 3); platform: joints in its own axes, (6, 3); lengths: (6,); diameter: of the
+    links, which makes modes feasible; all in m. Raises ModelError for other shapes and values, StructureError where the
+    modes of the hexapod are no separate poses: joints on one line, or links whose conditions repeat each other.
+    """
+    base, platform, lengths = checked_hexapod(base, platform, lengths, diameter)
+    *normal, size = placed(base, platform, lengths)
+    roots = all_roots(*normal)
+    z, real = _real_ones(roots.z)
+    r, R = pose(z)
+    r = r * size + base.mean(0) - R @ platform.mean(0)
+    r, R, error = _settled(r, R, real, roots.regular, base, platform, lengths)
+    order = _order(r, real, base, platform, R)
+    r, R, real, error, regular = r[order], R[order], real[order], error[order], roots.regular[order]
+    complete = len(r) == MODES and bool(regular.all())
+    findings = (*specialities(base, platform, lengths), *_outcome(roots, real))
+    return AssemblyModes(
+        r=r, R=R, real=real, regular=regular, complete=complete, error=error, findings=findings,
+        **_of_links(r, R, real, base, platform, diameter),
+    )  # fmt: skip
+
+
+def _real_ones(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points with real ones made real, and which they are; the phase of a point says nothing."""
+    squares = (z * z).sum(1)
+    z = z * np.exp(-0.5j * np.angle(squares))[:, None]  # real up to rounding if a real multiple exists
+    real = np.abs(z.imag).max(1, initial=0.0) < REAL
+    return np.where(real[:, None], z.real, z), real
+
+
+def _settled(r, R, real, regular, base, platform, lengths):
+    """Poses with exact links, and their errors; singular ones stay where they are."""
+    error = link_errors(r, R, base, platform, lengths)
+    if regular.any():
+        r, R = r.copy(), R.copy()
+        r[regular], R[regular], error[regular] = exact_poses(r[regular], R[regular], base, platform, lengths)
+    return r, R, error
+
+
+def _order(r, real, base, platform, R) -> np.ndarray:
+    """Real modes by group and height, then complex ones from small imaginary parts to large."""
+    side = sides(base, r.real[:, None] + platform @ R.real.swapaxes(1, 2))
+    imaginary = np.round(np.abs(r.imag).max(1, initial=0.0), 9)
+    first = np.where(real, side, 0)
+    return np.lexsort((r[:, 2].imag, r[:, 2].real, imaginary, first, ~real))
+
+
+def _of_links(r, R, real, base, platform, diameter) -> dict:
+    """What links say of the real modes; what complex ones have instead."""
+    count = len(r)
+    group, sign = np.zeros(count, int), np.zeros(count, int)
+    clearance, feasible, crossed = np.full(count, np.nan), np.zeros(count, bool), [()] * count
+    if real.any():
+        here = r[real].real
+        ends = here[:, None] + platform @ R[real].real.swapaxes(1, 2)
+        found = link_geometry(base, ends)
+        group[real], sign[real] = sides(base, ends), signs(base, ends, here)
+        clearance[real] = found.clearance
+        feasible[real] = ~found.crossed.any(1) & (found.clearance >= diameter)
+        for k, row in zip(np.flatnonzero(real), found.crossed, strict=True):
+            crossed[k] = tuple((int(i), int(j)) for i, j in PAIRS[row])
+    return dict(group=group, sign=sign, clearance=clearance, feasible=feasible, crossed=tuple(crossed))
+
+
+def _outcome(roots: Roots, real: np.ndarray) -> list[str]:
+    """What became of modes that are not there, and of those that are singular."""
+    found = []
+    if roots.at_infinity:
+        found.append(f"{roots.at_infinity} of {MODES} modes are at infinity")
+    if singular := int((~roots.regular).sum()):
+        found.append(
+            f"{singular} modes are singular: several meet there, or the links do not hold the platform; "
+            "lengths a little different separate them"
+        )
+    if roots.lost:
+        found.append(
+            f"{roots.lost} of {MODES} modes were lost on the way; lengths a little different may find them"
+        )
+    if not real.any():
+        found.append(
+            "no mode is real: links of these lengths cannot be assembled; check lengths, joints and units"
+        )
+    return found

@@ -1,0 +1,73 @@
+"""Which assembly modes can be built: links as straight lines between their joints.
+
+Two links cross where their shortest connection meets both between their ends, and is shorter than half the
+distance of their joints, on base or platform, whichever are nearer to each other. So a parallelogram is told from
+the crossed quadrilateral of the same links, and links far apart do not count.
+"""
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+NEAR = 0.5  # of the distance of joints; F1: 0.82 and above where nothing crosses, 0.34 and below otherwise
+PARALLEL = 1e-9  # square of the sine of the angle of two links, and distance of two joints by that of all
+PAIRS = np.array(list(combinations(range(6), 2)))
+
+
+class LinkGeometry(NamedTuple):
+    """Per mode: pairs of links that cross (k, 15), in the order of PAIRS, and the least distance of two links."""
+
+    crossed: np.ndarray
+    clearance: np.ndarray
+
+
+def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
+    """Links from the base joints (6, 3) to the joints on the platform (k, 6, 3), all in the world, in m.
+
+    Pairs that share a joint neither cross nor count in the clearance.
+    """
+    i, j = PAIRS.T
+    starts = np.broadcast_to(base, ends.shape)
+    a, b = starts[:, i], starts[:, j]
+    u, v = ends[:, i] - a, ends[:, j] - b
+    s, t = _shortest(a - b, u, v)
+    between = (s > 0) & (s < 1) & (t > 0) & (t < 1)
+    across = np.linalg.norm(a - b + s[..., None] * u - t[..., None] * v, axis=2)
+    apart = np.minimum(np.linalg.norm(a - b, axis=2), np.linalg.norm(a + u - b - v, axis=2))
+    shared = apart < PARALLEL * np.linalg.norm(u, axis=2)
+    crossed = between & (across < NEAR * apart) & ~shared
+    to_ends = [_to_segment(a, b, v), _to_segment(a + u, b, v), _to_segment(b, a, u), _to_segment(b + v, a, u)]
+    distance = np.min([np.where(between, across, np.inf), *to_ends], axis=0)
+    return LinkGeometry(crossed, np.where(shared, np.inf, distance).min(1))
+
+
+def _shortest(w: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the lines a + s u and b + t v, w = a - b, are nearest to each other; NaN if they are parallel."""
+    uu, uv, vv, uw, vw = ((x * y).sum(2) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    wide = uu * vv - uv * uv
+    wide = np.where(wide < PARALLEL * uu * vv, np.nan, wide)
+    return (uv * vw - vv * uw) / wide, (uu * vw - uv * uw) / wide
+
+
+def _to_segment(point: np.ndarray, start: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Distance of points to the segments from `start` to `start + along`."""
+    share = ((point - start) * along).sum(2) / (along * along).sum(2)
+    return np.linalg.norm(point - start - np.clip(share, 0, 1)[..., None] * along, axis=2)
+
+
+def sides(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Side (k,) of the plane through the base joints on which the middle of the platform is, 1 or -1.
+
+    The largest component of the normal of the plane is positive.
+    """
+    middle = base.mean(0)
+    normal = np.linalg.svd(base - middle)[2][2]
+    normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
+    return np.where((ends.mean(1) - middle) @ normal >= 0, 1, -1)
+
+
+def signs(base: np.ndarray, ends: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Sign (k,) of the determinant of the forces of the links on the platform, 1 or -1: a singular pose divides them."""
+    along = ends - base
+    return np.where(np.linalg.det(np.concatenate([along, np.cross(ends - r[:, None], along)], 2)) >= 0, 1, -1)
