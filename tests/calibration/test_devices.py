@@ -1,30 +1,26 @@
 """Devices: what they see, how large their errors are, and which of them do not average out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from gantrytau import ModelError
+from gantrytau.kinematics.obstacles import Capsule
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.cameras import Camera, Cameras, single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.gauges import LengthGauge, Wires
-from gantrytau_optimica.calibration.sight import Bars, segment_distance
+from gantrytau_optimica.calibration.sight import Bars
 
 MANY = 4000  # standard deviations from so many readings are right within 1.1 %
 UPRIGHT = np.eye(3)
 TO_CAMERA = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])  # the z axis of the tool along -x
 
 
-@dataclass
-class Ball:
-    centre: Any
-    radius: float
-
-    def distance(self, points: np.ndarray, /) -> np.ndarray:
-        return np.linalg.norm(points - np.asarray(self.centre), axis=1) - self.radius
+def ball(centre, radius: float) -> Capsule:
+    return Capsule(centre, centre, radius)
 
 
 def cube(count: int, half: float, seed: int = 0) -> np.ndarray:
@@ -107,8 +103,7 @@ def test_range_elevation_and_reflector_limit_what_a_tracker_sees():
 
 
 def test_a_ball_hides_its_shadow():
-    ball = Ball([2.0, 0.0, 0.0], 0.2)
-    tracker = LaserTracker(obstacles=[ball])
+    tracker = LaserTracker(obstacles=[ball([2.0, 0.0, 0.0], 0.2)])
     y = np.linspace(-1.0, 1.0, 401)
     r = np.column_stack([np.full(401, 4.0), y, np.zeros(401)])
     shadow = np.abs(np.arctan2(y, 4.0)) <= np.arcsin(0.1)
@@ -124,24 +119,6 @@ def test_bars_hide_what_is_behind_them_and_not_what_they_carry():
     assert LaserTracker().sees(r, bars=across).tolist() == [False, True]
     carried = Bars(r[:, None], r[:, None] + [1.0, 0.5, 0.0], 0.03)
     assert LaserTracker().sees(r, bars=carried).all()
-
-
-def test_segment_distances_against_a_fine_grid():
-    a, b, c, d = (cube(200, 1.0, seed) for seed in range(4))
-    t = np.linspace(0.0, 1.0, 201)
-    first, second = (p[:, None] + t[:, None] * (q - p)[:, None] for p, q in ((a, b), (c, d)))
-    grid = np.array(
-        [np.linalg.norm(x[:, None] - y, axis=2).min() for x, y in zip(first, second, strict=True)]
-    )
-    found = segment_distance(a, b, c, d)
-    assert np.all(found <= grid + 1e-12)
-    assert np.max(grid - found) < 3.5 / 400  # half of a step on segments of up to 3.5 m
-
-
-def test_segments_that_are_parallel_or_points():
-    o, x, y = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-    assert segment_distance(o, x, 3 * x + y, 2 * x + y) == pytest.approx(np.sqrt(2.0))
-    assert segment_distance(o, o, x, x) == pytest.approx(1.0)
 
 
 # T-Mac
@@ -243,7 +220,7 @@ def test_what_cameras_see():
     r = [[0.0, 0, 0], [0.0, 1.5, 0], [-4.0, 0, 0], [7.5, 0, 0]]  # beside, behind, too far
     assert device.sees(r, TO_CAMERA).tolist() == [True, False, False, False]
     assert not device.sees([0.0, 0, 0], TO_CAMERA @ turn([0, np.radians(70.0), 0]))
-    hidden = replace(device, obstacles=[Ball(np.add(device.cameras[1].r, [0.4, 0, 0]), 0.3)])
+    hidden = replace(device, obstacles=[ball(np.add(device.cameras[1].r, [0.4, 0, 0]), 0.3)])
     assert not hidden.sees([0.0, 0, 0], TO_CAMERA)  # one of the two eyes is covered
     assert device.measure(r, TO_CAMERA).seen.tolist() == [True, False, False, False]
 
@@ -276,7 +253,7 @@ def test_wires_find_the_point_where_their_lengths_meet():
         1.001 * distances
     )
     assert Wires(anchors=anchors[:2]).measure(r).r is None
-    assert Wires(anchors=anchors, obstacles=[Ball([0.5, 0.0, 0.5], 0.1)]).sees([0.0, 0.0, 1.0]) is np.False_
+    assert Wires(anchors=anchors, obstacles=[ball([0.5, 0.0, 0.5], 0.1)]).sees([0.0, 0.0, 1.0]) is np.False_
 
 
 # messages

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.kinematics.obstacles import Obstacle
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.sight import Bars, Obstacle, clear
+from gantrytau_optimica.calibration.sight import Bars, clear
 
 Array = np.ndarray
 ORTHONORMAL = 1e-6  # what rounding to six decimals leaves of a rotation matrix
@@ -44,7 +45,7 @@ class Device:
 
     r: place in the world, (3,) in m; R: its axes in the world, (3, 3). target: what is measured, in the frame of the
     tool, (3,) in m; facing: the direction into which the target looks, in the frame of the tool, (3,), or None if it can
-    be seen from everywhere. obstacles: with a method `distance(points (N, 3)) -> (N,)` each, in the world.
+    be seen from everywhere. obstacles: Box, Cylinder and others of `gantrytau.kinematics`, convex, in the world.
     """
 
     r: Any = (0.0, 0.0, 0.0)
