@@ -1,8 +1,12 @@
-"""Optimisation of models written with gantrytau, in the style of Optimica."""
+"""Optimisation of models written with gantrytau, in the style of Optimica, and calibration of robots."""
 
 from gantrytau_optimica.archive.run_record import compare_records, run_record, write_record
 from gantrytau_optimica.archive.saved import MissingGuess, SavedOptimum
 from gantrytau_optimica.archive.saving import load_optimum, save_optimum
+from gantrytau_optimica.calibration.calibrating import calibrate
+from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.findings import CalibrationError
+from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.estimation.estimate import Estimate
 from gantrytau_optimica.estimation.estimating import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -24,11 +28,14 @@ from gantrytau_optimica.studies.pareto import TradeOff, pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 
 __all__ = [
+    "Calibration",
+    "CalibrationError",
     "Corner",
     "Deviation",
     "Estimate",
     "Experiment",
     "Free",
+    "Measurements",
     "MissingGuess",
     "Optimization",
     "Optimum",
@@ -40,6 +47,7 @@ __all__ = [
     "TradeOff",
     "Way",
     "at",
+    "calibrate",
     "compare_records",
     "estimate",
     "final",

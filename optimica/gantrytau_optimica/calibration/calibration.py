@@ -1,0 +1,264 @@
+"""What `calibrate` found: parameters, how sure they are, and how well they predict poses that were held out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau import GantryTauError, Model, ModelError
+from gantrytau.errors import did_you_mean
+from gantrytau_optimica.calibration.covariance import joint_covariance, link_noise, undetermined
+from gantrytau_optimica.calibration.findings import Finding
+from gantrytau_optimica.calibration.fitting import Fit, fit_group
+from gantrytau_optimica.calibration.forward import CalibratedKinematics
+from gantrytau_optimica.calibration.geometry import Geometry
+from gantrytau_optimica.calibration.measurements import Measurements
+from gantrytau_optimica.calibration.models import mean_rotation
+from gantrytau_optimica.calibration.parameters import Named, named_parameters, rod_links
+from gantrytau_optimica.calibration.rotations import rotation_vector
+
+CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements.
+
+    model, method, loss: as they were asked for; fits: links that share numbers, at their minima; rows: those of the
+    measurements that were fitted; held_out: those that validate; findings: what was noticed on the way.
+    """
+
+    geometry: Geometry
+    measurements: Measurements
+    model: Any
+    fits: Sequence[Fit]
+    rows: np.ndarray
+    held_out: np.ndarray
+    method: str
+    loss: str
+    findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        return (
+            f"<Calibration of {self.geometry.name}, model {self.model}: {len(self.names)} numbers from {len(self.rows)} "
+            f"poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
+        )
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Any]:
+        """Values by name: `arms[i].length`, `.offset`, `.direction`; of six links `arms[i].links[j].length`, `.offset`,
+        `.plate_offset`; of measured guideways `.frame_offset` and `.frame_rotation` (a rotation vector).
+        """
+        return Named(named_parameters(self.geometry, self.fits))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the identified numbers, scalars."""
+        return tuple(name for fit in self.fits for name in fit.free_names)
+
+    @cached_property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of numbers that data do not hold: they stayed near their start values."""
+        return tuple(name for fit in self.fits for name in undetermined(fit))
+
+    @property
+    def success(self) -> bool:
+        """Whether the last step of every group of links was negligible."""
+        return all(fit.minimum.success for fit in self.fits)
+
+    @property
+    def iterations(self) -> int:
+        """Steps, the most of any group of links."""
+        return max(fit.minimum.iterations for fit in self.fits)
+
+    @property
+    def cost(self) -> float:
+        """Sum of the squares of all closure errors of the fitted poses, m4."""
+        return float(sum(np.sum(fit.group.errors(fit.x) ** 2) for fit in self.fits))
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of one coordinate of a measured position that explains what is left, m."""
+        return float(np.sqrt(np.mean(np.concatenate(link_noise(self.fits, self.loss)) ** 2)))
+
+    @cached_property
+    def _covariance(self) -> np.ndarray:
+        return joint_covariance(self.fits, self.loss)
+
+    def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
+        """Covariance (k, k) of parameters in their order; a vector's name stands for its three elements.
+
+        names: default all that data hold. Links share the noise of a position, so that numbers of different arms vary
+        together. Raises ModelError for unknown names and for numbers that data do not hold.
+        """
+        if isinstance(names, str):
+            raise ModelError(f"covariance: found '{names}', expected a list of names; write ['{names}']")
+        wanted = [n for n in self.names if n not in self.undetermined] if names is None else names
+        places = [k for name in wanted for k in self._places(name)]
+        return self._covariance[np.ix_(places, places)]
+
+    def _places(self, name: str) -> list[int]:
+        aliases = [name, name[name.index("direction") :]] if "direction" in name else [name]
+        for alias in aliases:
+            wanted = [alias] if alias in self.names else [f"{alias}[{k}]" for k in range(3)]
+            if all(n in self.names for n in wanted):
+                lost = [n for n in wanted if n in self.undetermined]
+                if lost:
+                    raise ModelError(
+                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; turn the plate "
+                        "more between poses, or give a prior"
+                    )
+                return [self.names.index(n) for n in wanted]
+        if name in self.parameters:
+            raise ModelError(f"covariance: {name} was not identified but held at its value; leave it out")
+        raise ModelError(f"covariance: there is no parameter '{name}'{did_you_mean(name, self.parameters)}")
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of the identified numbers by name; inf for what data do not hold."""
+        found = np.sqrt(np.diag(self._covariance))
+        lost = set(self.undetermined)
+        return {n: float("inf") if n in lost else float(d) for n, d in zip(self.names, found, strict=True)}
+
+    @cached_property
+    def chains(self) -> CalibratedKinematics:
+        """Kinematics of the calibrated links as they were fitted, of models 2 to 5 too."""
+        few = self.rows[np.linspace(0, len(self.rows) - 1, min(len(self.rows), 500)).astype(int)]
+        r = self.measurements.r[few]
+        middle = few[np.argmin(np.linalg.norm(r - np.median(r, axis=0), axis=1))]
+        R = self.measurements.R
+        turns = sum(len(fit.group.chains) for fit in self.fits) > 3
+        pose = np.eye(3) if R is None else R[middle] if turns else mean_rotation(R[few])
+        return CalibratedKinematics(
+            rod_links(self.fits, self.measurements.rails), self.measurements.r[middle], pose
+        )
+
+    @cached_property
+    def kinematics(self) -> Any:
+        """`Kinematics` of the calibrated robot, with `.ik .fk .jacobian`; of models 2 to 5 `chains`, with the same."""
+        from gantrytau.kinematics import Kinematics
+
+        try:
+            return Kinematics(self.robot)
+        except GantryTauError:  # no model has measured guideways or directions of single links
+            return self.chains
+
+    @cached_property
+    def robot(self) -> Model:
+        """The robot with the identified parameters. Raises ModelError for models 2 to 5, which no robot can hold."""
+        return calibrated_robot(self)
+
+    @cached_property
+    def error_vectors(self) -> np.ndarray:
+        """Measured less predicted positions of the held-out poses, (N, 3) in m."""
+        return self.measurements.r[self.held_out] - self._predicted[0]
+
+    @cached_property
+    def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
+        R, rows = self.measurements.R, self.held_out
+        near = self.measurements.r[rows]
+        six = self.chains.turns and R is not None
+        return self.chains.fk(self.measurements.q[rows], (near, R[rows]) if six and R is not None else near)
+
+    @cached_property
+    def errors(self) -> np.ndarray:
+        """Distances of measured and predicted positions of the held-out poses (5.5), (N,) in m."""
+        return np.sqrt(np.einsum("ij,ij->i", self.error_vectors, self.error_vectors))
+
+    @property
+    def error(self) -> np.float64:
+        """Mean of `errors`, m: the error to expect of a pose that was not fitted."""
+        return _mean(self.errors)
+
+    @cached_property
+    def angle_errors(self) -> np.ndarray:
+        """Angles between measured and predicted orientations of the held-out poses, (N,) in rad; NaN without R."""
+        R = self.measurements.R
+        if R is None:
+            return np.full(len(self.held_out), np.nan)
+        turned = np.einsum("nji,njk->nik", self._predicted[1], R[self.held_out])
+        return np.linalg.norm(rotation_vector(turned), axis=1)
+
+    @property
+    def angle_error(self) -> np.float64:
+        """Mean of `angle_errors`, rad; NaN where no orientations were measured."""
+        return _mean(self.angle_errors)
+
+    def suspicious_rows(self, limit: float) -> np.ndarray:
+        """Rows whose closure errors exceed `limit` robust standard deviations of a fit without them."""
+        fits, bad = list(self.fits), np.zeros(0, dtype=int)
+        used = np.union1d(self.rows, self.held_out)
+        for _ in range(CLEANINGS):
+            found = used[relative_distances(fits, self.measurements, used, self.rows) > limit]
+            if np.array_equal(found, bad):
+                break
+            bad = found
+            weights = 1.0 - np.isin(self.rows, bad)
+            if weights.sum() < 0.7 * len(weights):  # what is bad for so many is the model
+                break
+            fits = [fit_group(fit.group.started(fit.x), weights) for fit in fits]
+        return bad
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
+
+        Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
+        """
+        from gantrytau_optimica.calibration.report import write_report
+
+        return write_report(self, Path(path))
+
+
+def _mean(values: np.ndarray) -> np.float64:
+    """The mean of what is finite, NaN of nothing."""
+    finite = values[np.isfinite(values)]
+    return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
+
+
+def relative_distances(
+    fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray, fitted: np.ndarray
+) -> np.ndarray:
+    """The largest closure error of each of some rows in robust standard deviations of its link, (rows,)."""
+    q, r, R = measurements.q[rows], measurements.r[rows], measurements.R
+    worst = np.zeros(len(rows))
+    for link in rod_links(fits, measurements.rails):
+        y = r - link.guideway.at(q[:, link.arm])
+        if R is not None:
+            y += R[rows] @ link.on_plate
+        miss = np.abs(np.sqrt(np.einsum("ij,ij->i", y, y)) - link.length)
+        worst = np.maximum(worst, miss / max(1.4826 * float(np.median(miss)), 1e-12))
+    return worst
+
+
+def calibrated_robot(found: Calibration) -> Model:
+    """The model with identified parameters in place of its own, started in a measured pose."""
+    if found.model in (2, 3, 4, 5):
+        raise ModelError(
+            f"robot: model {found.model} has measured guideways or a direction for each link, which "
+            f"{found.geometry.name} has not; use .kinematics, or calibrate with model=None"
+        )
+    if found.model == 1 and found.geometry.kind == "six":
+        raise ModelError(
+            "robot: model 1 has one link on each arm, and the robot six; use .kinematics, or model=None"
+        )
+    arms = []
+    for i, arm in enumerate(found.geometry.arms):
+        values = found.parameters
+        direction = list(values[f"arms[{i}].direction"])
+        if found.geometry.kind == "three":
+            own = {k: values[f"arms[{i}].{k}"] for k in ("length", "offset")}
+            arms.append(dict(length=own["length"], offset=list(own["offset"]), direction=direction))
+            continue
+        links = [
+            dict(
+                length=values[f"{link.name}.length"],
+                offset=list(values[f"{link.name}.offset"]),
+                plate_offset=list(values[f"{link.name}.plate_offset"]),
+            )
+            for link in arm.links
+        ]
+        arms.append(dict(direction=direction, links=links))
+    return found.geometry.robot.modified(dict(arms=arms, tool=dict(r=dict(start=list(found.chains.start_r)))))

@@ -1,0 +1,128 @@
+"""Checks of measured numbers that need no robot."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gantrytau_optimica.calibration.findings import Finding, rows_in_words
+
+FEWEST = 8  # poses: a link of a three-link robot has seven parameters
+LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
+FLAT = 2e-3  # extent across a line or plane by that along it, below which it is one
+NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
+
+
+def check_data(
+    q: np.ndarray, r: np.ndarray, R: np.ndarray | None, finite: np.ndarray, rails: Sequence[np.ndarray] | None
+) -> tuple[Finding, ...]:
+    """What is doubtful in measurements q (N, n), r (N, 3), R (N, 3, 3), of which the rows `finite` (N,) are numbers."""
+    rows = np.arange(len(q)) if finite.all() else np.flatnonzero(finite)
+    if len(rows) < len(q):
+        q, r, R = q[rows], r[rows], None if R is None else R[rows]
+    return (
+        *_not_finite(finite),
+        *_few(rows),
+        *_repeated(q, r, rows),
+        *_shape(r, rows),
+        *_units(q, r, rows),
+        *_rotations(R, rows),
+        *_rails(rails),
+    )
+
+
+def _not_finite(finite: np.ndarray) -> Iterator[Finding]:
+    bad = np.flatnonzero(~finite)
+    if bad.size:
+        yield Finding("nan", bad, f"{rows_in_words(bad)} hold no finite numbers and are left out")
+
+
+def _few(rows: np.ndarray) -> Iterator[Finding]:
+    if len(rows) < FEWEST:
+        yield Finding(
+            "too few poses", rows, f"found {len(rows)} usable poses, expected {FEWEST} at the least"
+        )
+
+
+def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
+    later = repeated_rows(np.column_stack([q, r]))
+    if later.size:
+        yield Finding(
+            "duplicates",
+            rows[later],
+            f"{rows_in_words(rows[later])} repeat earlier rows to the last digit; a copied row adds no knowledge but "
+            "counts twice in every deviation; it is left out",
+        )
+
+
+def repeated_rows(table: np.ndarray) -> np.ndarray:
+    """Places of rows of (N, k) that repeat an earlier row to the last bit."""
+    if len(table) < 2:
+        return np.zeros(0, dtype=int)
+    # one number for each row, alike for alike rows, so that one sort finds the candidates
+    keys = np.zeros(len(table))
+    for k in range(
+        table.shape[1]
+    ):  # not a product of matrices, whose rounding depends on the place of the row
+        keys += table[:, k] * np.cos(k + 1.0)
+    order = np.argsort(keys)
+    near = np.flatnonzero(np.diff(keys[order]) == 0.0)
+    if not near.size:
+        return near
+    candidates = np.unique(np.concatenate([order[near], order[near + 1]]))
+    _, first, inverse = np.unique(table[candidates], axis=0, return_index=True, return_inverse=True)
+    return candidates[first[inverse.ravel()] != np.arange(len(candidates))]
+
+
+def _shape(r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
+    if len(r) < 3:
+        return
+    extent = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(r.T))[::-1], 0.0))
+    if extent[0] == 0.0 or extent[1] < FLAT * extent[0]:
+        yield Finding(
+            "line",
+            rows,
+            "all tool positions lie on a line; spread them over the workspace in three directions",
+        )
+    elif extent[2] < FLAT * extent[0]:
+        yield Finding(
+            "plane",
+            rows,
+            "all tool positions lie in a plane; spread them over the workspace in three directions",
+        )
+
+
+def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
+    if not len(r):
+        return
+    wide = [name for name, x in (("q", q), ("r", r)) if np.ptp(x, axis=0).max() > LARGEST]
+    if wide:
+        yield Finding(
+            "millimetres",
+            rows,
+            f"{' and '.join(wide)} extend over more than {LARGEST:g} m, expected m; divide by 1000 if they are mm",
+        )
+
+
+def _rotations(R: np.ndarray | None, rows: np.ndarray) -> Iterator[Finding]:
+    if R is None or not len(R):
+        return
+    error = np.abs(np.einsum("nij,nik->njk", R, R) - np.eye(3)).max(axis=(1, 2))
+    bad = np.flatnonzero((error > NOT_A_ROTATION) | (np.linalg.det(R) < 0))
+    if bad.size:
+        yield Finding(
+            "rotations",
+            rows[bad],
+            f"R of {rows_in_words(rows[bad])} is no rotation matrix; expected R' R = I and determinant 1",
+        )
+
+
+def _rails(rails: Sequence[np.ndarray] | None) -> Iterator[Finding]:
+    for k, rail in enumerate(rails or ()):
+        across = np.linalg.svd(rail[:, 1:] - rail[:, 1:].mean(axis=0), compute_uv=False)
+        slope = np.linalg.norm(rail[-1, 1:] - rail[0, 1:]) / (rail[-1, 0] - rail[0, 0])
+        if (len(rail) > 2 and across[1] > 0.01 * across[0]) or not 0.5 < slope < 2.0:
+            yield Finding(
+                "guideway",
+                np.arange(len(rail)),
+                f"points of guideway {k} lie off a line, or {slope:.3g} m apart for each m of q; expected q, x, y, z in m",
+            )

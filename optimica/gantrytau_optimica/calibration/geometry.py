@@ -1,0 +1,118 @@
+"""The nominal geometry of a robot, read by the names of its parameters."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from gantrytau import Model, ModelError, flatten
+from gantrytau.instantiation import instantiate
+from gantrytau.parameters import parameter_table
+
+
+@dataclass(frozen=True)
+class LinkGeometry:
+    """A link: name, such as "arms[1].links[0]"; length, m; offset, joint on the cart at q = 0, (3,); plate_offset (3,)."""
+
+    name: str
+    length: float
+    offset: np.ndarray
+    plate_offset: np.ndarray
+
+
+@dataclass(frozen=True)
+class ArmGeometry:
+    """A guideway with its links. base: what the model adds to the offsets of its links, (3,) in m."""
+
+    direction: np.ndarray
+    links: tuple[LinkGeometry, ...]
+    base: np.ndarray
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Arms of a robot. kind: "three" (one link on each, the plate keeps its orientation), "six" or "turning"."""
+
+    robot: Model
+    kind: Literal["three", "six", "turning"]
+    arms: tuple[ArmGeometry, ...]
+
+    @property
+    def name(self) -> str:
+        """Class of the robot."""
+        return type(self.robot).__name__
+
+
+def read_geometry(robot: Any) -> Geometry:
+    """The geometry of a model instance with `arms[i].length`, `.offset`, `.direction`, or `arms[i].links[j]` of these.
+
+    Raises ModelError for anything else.
+    """
+    if not isinstance(robot, Model):
+        raise ModelError(
+            f"calibrate: found {robot!r} as robot, expected a model instance such as GantryTau(prototypes.L1)"
+        )
+    values = _values(robot)
+    count = _count(values, "arms[{}].direction")
+    three = "arms[0].length" in values
+    if not count or not (three or "arms[0].links[0].length" in values):
+        raise ModelError(
+            f"calibrate: found {type(robot).__name__} without parameters arms[i].length, .offset and .direction, or "
+            "arms[i].links[j] of these; expected a Gantry-Tau such as GantryTau(prototypes.L1)"
+        )
+    turning = "turntables[0].axis" in values
+    arms = tuple(_three_link_arm(values, i) if three else _arm(values, i) for i in range(count))
+    return Geometry(robot, "three" if three else "turning" if turning else "six", arms)
+
+
+def _three_link_arm(values: dict[str, Any], i: int) -> ArmGeometry:
+    name = f"arms[{i}]"
+    link = LinkGeometry(name, float(values[f"{name}.length"]), values[f"{name}.offset"], np.zeros(3))
+    return ArmGeometry(values[f"{name}.direction"], (link,), np.zeros(3))
+
+
+def _arm(values: dict[str, Any], i: int) -> ArmGeometry:
+    base = values.get(f"arms[{i}].offset", np.zeros(3))
+    links = []
+    for j in range(_count(values, f"arms[{i}].links[{{}}].length")):
+        name = f"arms[{i}].links[{j}]"
+        links.append(
+            LinkGeometry(
+                name,
+                float(values[f"{name}.length"]),
+                base + values[f"{name}.offset"],
+                values[f"{name}.plate_offset"],
+            )
+        )
+    return ArmGeometry(values[f"arms[{i}].direction"], tuple(links), base)
+
+
+def _count(values: dict[str, Any], pattern: str) -> int:
+    count = 0
+    while pattern.format(count) in values:
+        count += 1
+    return count
+
+
+def _values(robot: Model) -> dict[str, Any]:
+    """Numbers of the parameters of arms and turntables by name, vectors whole.
+
+    Plain numbers are read as they are declared, five times as quick as flattening the whole model.
+    """
+    found: dict[str, Any] = {}
+    for placed in instantiate(robot).quantities:
+        if placed.name.startswith(("arms[", "turntables[")) and placed.declaration.kind == "parameter":
+            leaf = placed.attributes.get("value")
+            try:
+                found[placed.name] = np.asarray(leaf.value, dtype=float) if leaf is not None else None
+            except (TypeError, ValueError):
+                found[placed.name] = None
+    needed = ("length", "offset", "direction", "plate_offset", "axis")
+    if all(found[n] is not None for n in found if n.rsplit(".", 1)[-1] in needed):
+        return found
+    flat = flatten(robot)
+    table = parameter_table(flat)
+    return {
+        p.name: np.array([table.values[n] for n in p.elements]).reshape(p.shape, order="F")
+        for p in flat.parameters
+    }

@@ -1,0 +1,130 @@
+"""Whether measurements are those of this robot: columns swapped, millimetres, turned frames, another robot.
+
+Closure errors of nominal values are compared with those after each of a few mistakes is undone. Poses are thinned; the
+median decides, so that outliers do not.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from gantrytau_optimica.calibration.closure import Chain
+from gantrytau_optimica.calibration.findings import CalibrationError
+from gantrytau_optimica.calibration.linear_start import linear_start
+from gantrytau_optimica.calibration.models import Link
+from gantrytau_optimica.calibration.rotations import rotation_vector
+
+NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
+BETTER = 10.0  # times smaller errors that undoing a mistake must leave
+POSES = 200
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """Something that may have been done to q (N, n) and r (N, 3): its kind, words, and how it is undone."""
+
+    kind: str
+    words: str
+    columns: tuple[int, ...]
+    axes: tuple[int, ...]
+    signs: tuple[int, ...] = (1, 1, 1)
+    scale_q: float = 1.0
+    scale_r: float = 1.0
+
+
+def _mistakes(n: int) -> Iterator[Mistake]:
+    same, straight = tuple(range(n)), (0, 1, 2)
+    for columns in permutations(same):
+        for axes in permutations(straight):
+            words = [f"q{k + 1} stands in column q{c + 1}" for k, c in enumerate(columns) if k != c]
+            words += [f"{AXES[k]} stands in column {AXES[c]}" for k, c in enumerate(axes) if k != c]
+            if words:
+                yield Mistake("swapped columns", ", ".join(words), columns, axes)
+    for scale_q, scale_r in ((1e-3, 1e-3), (1.0, 1e-3), (1e-3, 1.0)):
+        names = " and ".join(n for n, s in (("q", scale_q), ("r", scale_r)) if s != 1)
+        yield Mistake("millimetres", f"{names} in mm", same, straight, (1, 1, 1), scale_q, scale_r)
+    for k, axis in enumerate(AXES):
+        signs = tuple(1 if k == i else -1 for i in range(3))
+        yield Mistake(
+            "rotated frame", f"the frame of r turned by 180 degrees about {axis}", same, straight, signs
+        )
+
+
+def thinned(count: int, poses: int = POSES) -> np.ndarray:
+    """At most `poses` rows, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, poses)).astype(int))
+
+
+def check_robot(
+    links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None, rows: np.ndarray
+) -> None:
+    """CalibrationError if undoing a mistake makes nominal values fit that did not.
+
+    links: with nominal values; q (N, n), r (N, 3), R: measured; rows: their numbers for the message.
+    """
+    few = thinned(len(q))
+    q, r, R = q[few], r[few], None if R is None else R[few]
+    found = _miss(links, q, r, R)
+    if found < NEAR / 10:
+        return
+    trials = [(m, _miss(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
+    mistake, left = min(trials, key=lambda trial: trial[1])
+    if left < NEAR and left * BETTER < found:
+        raise CalibrationError(
+            f"Measurements: found {mistake.words} in rows {rows[0]} to {rows[-1]} (links miss their lengths by "
+            f"{found * 1e3:.3g} mm in the median, {left * 1e3:.3g} mm with that undone); correct the columns of the "
+            "measurements",
+            kind=mistake.kind,
+            rows=rows,
+        )
+
+
+def _undone(mistake: Mistake, q: np.ndarray, r: np.ndarray, R: np.ndarray | None):
+    signs = np.array(mistake.signs, dtype=float)
+    turned = R if R is None or mistake.kind != "rotated frame" else signs[:, None] * R
+    return q[:, mistake.columns] * mistake.scale_q, signs * r[:, mistake.axes] * mistake.scale_r, turned
+
+
+def _miss(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
+    """How far links are from their nominal lengths, median over poses of the worst link, m."""
+    errors = []
+    for link in links:
+        chain = Chain("", q[:, link.arm], r, None if link.chain.R is None else R)
+        y = np.linalg.norm(chain.vector(link.start), axis=1)
+        errors.append(np.abs(y - link.start[0]))
+    return float(np.median(np.max(errors, axis=0)))
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """How nominal values fit measurements: miss, m; identified links without them; shift left after the best motion of
+    the frame, m; turn of that motion, rad.
+    """
+
+    miss: float
+    shift: float
+    turn: np.ndarray
+
+
+def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> Fitting:
+    """Nominal values beside measurements: in their frame, and in the frame that suits them best."""
+    few = thinned(len(q), 1000)
+    q, r, R = q[few], r[few], None if R is None else R[few]
+    nominal, found = [], []
+    middle = q.mean(axis=0)
+    for link in links:
+        x = linear_start(Chain("", q[:, link.arm], r))
+        offset = link.start[1:4] - (
+            0 if link.chain.R is None or R is None else R.mean(axis=0) @ link.start[7:10]
+        )
+        for s in (-1.0, 1.0):  # two points of the guideway
+            nominal.append(offset + (middle[link.arm] + s) * link.start[4:7])
+            found.append(x[1:4] + (middle[link.arm] + s) * x[4:7])
+    a, b = np.array(nominal), np.array(found)
+    left, _, right = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    shift = np.linalg.norm(b - b.mean(axis=0) - (a - a.mean(axis=0)) @ turn.T, axis=1).max()
+    return Fitting(_miss(links, q, r, R), float(shift), rotation_vector(turn))
