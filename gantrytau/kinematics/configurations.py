@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.kinematics.assembly_modes import assembly_modes
+from gantrytau.kinematics.assembly_modes_links import link_geometry
 from gantrytau.kinematics.closed_form import meeting
 from gantrytau.kinematics.geometry import Geometry
 from gantrytau.kinematics.linked import LinkedRobot, SixLinks, ThreeLinks, TurningLinks
 from gantrytau.kinematics.newton import solve_lengths
 from gantrytau.kinematics.poses import Poses, answered
 
-CLEARANCE = 0.01  # m between the axes of two links, below which they pass through each other
 SAME = 1e-6  # m or rad between solutions that are one
 GRID = 24  # starts around a turn of each turntable
 
@@ -23,7 +24,7 @@ SIDES = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
 class Configuration:
     """One solution: q (N, n), r (N, 3), R (N, 3, 3) and feasible (N,), or one pose without the first axis.
 
-    feasible: it exists, within the bounds that the model declares, and no two links pass through each other.
+    feasible: it exists, within the bounds that the model declares, and no two links cross.
     """
 
     q: np.ndarray
@@ -45,12 +46,12 @@ def of_joints(robot: LinkedRobot, q: np.ndarray, one: bool, limits: np.ndarray) 
             f"Kinematics.configurations: found q of {len(q)} rows, expected one for a robot with six links, as the number "
             "of solutions differs from pose to pose; ask for one after the other"
         )
-    from gantrytau.kinematics.assembly_modes import assembly_modes
-
     geometry = robot.geometry
     modes = assembly_modes(geometry.cart_joints(q)[0], geometry.on_plate, geometry.length)
-    found = zip(modes.r[modes.real].real, modes.R[modes.real].real, strict=True)
-    return [configuration(robot, q, r[None], R[None], one, limits) for r, R in found]
+    r, R = np.real(modes.r[modes.real]), np.real(modes.R[modes.real])
+    home_r, home_R, _ = robot.fk(q)
+    away = np.linalg.norm(r - home_r, axis=1) + np.linalg.norm(R - home_R, axis=(1, 2))
+    return [configuration(robot, q, r[k][None], R[k][None], one, limits) for k in np.argsort(away)]
 
 
 def of_pose(robot: LinkedRobot, at: Poses, limits: np.ndarray) -> list[Configuration]:
@@ -77,26 +78,10 @@ def configuration(robot: LinkedRobot, q, r, R, one: bool, limits: np.ndarray) ->
 
 
 def crossed(geometry: Geometry, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """(N,), whether two links come nearer than CLEARANCE; links that share a joint meet there and do not count."""
-    A, B = geometry.cart_joints(q), geometry.plate_joints(r, R)
-    found = np.zeros(len(q), dtype=bool)
-    for i, j in itertools.combinations(range(len(geometry.length)), 2):
-        if np.allclose(geometry.on_plate[i], geometry.on_plate[j]):
-            continue
-        found |= distance(A[:, i], B[:, i], A[:, j], B[:, j]) < CLEARANCE
-    return found
-
-
-def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Distances (N,) of segments from a to b and from c to d, all (N, 3), m."""
-    u, v, w = b - a, d - c, a - c
-    uu, uv, vv, uw, vw = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
-    flat = uu * vv - uv**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = np.clip(np.where(flat > 1e-12 * uu * vv, (uv * vw - vv * uw) / flat, 0.0), 0.0, 1.0)
-        t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
-        s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
-    return np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
+    """(N,), whether two links cross."""
+    if len(geometry.length) == 3:  # single links all end in the tool
+        return np.zeros(len(q), dtype=bool)
+    return np.any(link_geometry(geometry.cart_joints(q), geometry.plate_joints(r, R)).crossed, axis=1)
 
 
 def _of_turntables(robot: TurningLinks, at: Poses, limits: np.ndarray) -> list[Configuration]:

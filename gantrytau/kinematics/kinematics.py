@@ -120,6 +120,24 @@ class Kinematics:
         at = poses(r, R, "Kinematics.jacobian")
         return answered(at.one, self._solver.jacobian(at.r, at.R))[0]
 
+    def ik_of_five_degrees(self, r: Any, R: Any) -> np.ndarray:
+        """Coordinates q (N, 6) of the F1 as if the links of an arm were parallel and of one length (4.25).
+
+        A turntable takes the angle nearest to R, and carts out of reach are nearest to it: ik starts here.
+        """
+        robot = self._with_turntables("ik_of_five_degrees")
+        at = poses(r, R, "Kinematics.ik_of_five_degrees")
+        if at.R is None:
+            raise ModelError("Kinematics.ik_of_five_degrees: found no orientation R, expected one; give R")
+        return answered(at.one, robot.five_degrees(at.r, at.R, robot.sides))[0]
+
+    def fk_of_five_degrees(self, q: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Poses r (N, 3), R (N, 3, 3) of the F1 with each arm as one link, its joints parallel to the plate's (4.26)."""
+        robot = self._with_turntables("fk_of_five_degrees")
+        q, one = vectors(q, 6, "q", "Kinematics.fk_of_five_degrees")
+        r, R = answered(one, *robot.pose_of_five_degrees(q))
+        return r, R
+
     def configurations(self, *, q: Any = None, r: Any = None, R: Any = None) -> list[Configuration]:
         """All solutions, forward of q or inverse of r (and R), each with `.q .r .R .feasible`.
 
@@ -202,6 +220,14 @@ class Kinematics:
             "ik, fk and jacobian, or start values of another branch"
         )
 
+    def _with_turntables(self, what: str) -> TurningLinks:
+        if isinstance(self._solver, TurningLinks):
+            return self._solver
+        raise ModelError(
+            f"Kinematics.{what}: found {self.dae.name}, expected a robot with turntables such as "
+            "F1GantryTau(prototypes.F1); use ik and fk"
+        )
+
     def _whole(self, robot: LinkedRobot, r: Any, R: Any, q: Any, place: str):
         """Poses with the q and R that follow where they are not given."""
         at = poses(r, R, place)
@@ -241,6 +267,7 @@ class Kinematics:
 
     def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
+        names = tuple(scalar for name in names for scalar in self.dae.expand(name))
         return ModelFunctions(self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names))
 
 

@@ -39,6 +39,18 @@ class LinkedRobot:
     home: Home
     tolerance: float = 1e-6
 
+    def ik(self, r: np.ndarray, R: np.ndarray | None = None, sides: np.ndarray | None = None):
+        """Coordinates q (N, n) and iterations (N,), every arm on its side; sides: 1 ahead, -1 behind, else as at home."""
+        raise NotImplementedError
+
+    def fk(self, q: np.ndarray, near: tuple[np.ndarray, np.ndarray] | None = None):
+        """Poses r (N, 3), R (N, 3, 3) and iterations (N,); near: where to start, or what to be near to."""
+        raise NotImplementedError
+
+    def jacobian(self, r: np.ndarray, R: np.ndarray | None = None) -> np.ndarray:
+        """dq/dpose (N, n, 3) or (N, n, 6)."""
+        raise NotImplementedError
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of the actuator coordinates."""
@@ -151,7 +163,7 @@ class SixLinks(LinkedRobot):
         return q, np.zeros(len(r), dtype=int)
 
     def follow(self, r, sides):
-        """Coordinates q, the orientation that the links give a tool at r, and iterations: Newton in q and three rotations."""
+        """Coordinates q, orientation and iterations of a tool at r: Newton in q and three rotations."""
         R = self.repeated(len(r))
         A = self.geometry.cart_joints(np.zeros((len(r), 3)))
         start = self.mean_carts(self.carts(r, R, A, sides))
@@ -185,7 +197,7 @@ class TurningLinks(LinkedRobot):
     """The F1: turntables on two carts give the plate six degrees of freedom (section 4.5)."""
 
     def ik(self, r, R=None, sides=None):
-        """Coordinates q and iterations: the inverse of five degrees (4.25), then Newton's method arm by arm (4.27) to (4.29)."""
+        """Coordinates q and iterations: five degrees (4.25), then Newton arm by arm (4.27) to (4.29)."""
         if R is None:
             raise ModelError(
                 "Kinematics: found no orientation R, expected one, as this robot can turn its plate; give R of shape "
@@ -256,6 +268,7 @@ class TurningLinks(LinkedRobot):
     def jacobian(self, r, R=None):
         """dq/dpose, (N, 6, 6)."""
         q, _ = self.ik(r, R)
+        assert R is not None  # else ik raised
         _, _, by_pose, by_joints = self.geometry.slopes(q, r, R)
         return -solved(by_joints, by_pose)
 

@@ -5,6 +5,7 @@ CasADi's own matrices takes a hundred times longer. Both answer on the branch of
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -28,7 +29,7 @@ class ModelFunctions:
 
     def ik(self, r, R=None, sides=None):
         """Joints q and iterations (none are counted: they run inside the functions)."""
-        return _over_poses(self._inverse(), [self._pose(r, R)])[0], np.zeros(len(r), dtype=int)
+        return _over_poses(self._inverse, [self._pose(r, R)])[0], np.zeros(len(r), dtype=int)
 
     def fk(self, q, near=None):
         """r, R and iterations."""
@@ -37,8 +38,7 @@ class ModelFunctions:
                 f"Kinematics: found near= for {self.dae.name}, whose forward kinematics has no closed form, expected none; "
                 "choose the branch by start values of the model"
             )
-        wanted = [f"{self.tool}.r"] + ([f"{self.tool}.R"] if self._turns else [])
-        found = _over_poses(self.dae.function(list(self.joints), wanted), list(q.T[:, :, None]))
+        found = _over_poses(self._forward, list(q.T[:, :, None]))
         if self._turns:
             R = found[1].reshape(-1, 3, 3).transpose(0, 2, 1)
         else:
@@ -48,10 +48,7 @@ class ModelFunctions:
     def jacobian(self, r, R=None):
         """dq/dpose (N, n, 3), with six joints (N, n, 6)."""
         pose = self._pose(r, R)
-        inverse = self._inverse()
-        x = ca.MX.sym("pose", pose.shape[1])
-        slopes = ca.Function("slopes", [x], [ca.densify(ca.jacobian(inverse(x), x))])
-        found = _over_poses(slopes, [pose])[0].reshape(len(r), pose.shape[1], -1).transpose(0, 2, 1)
+        found = _over_poses(self._slopes, [pose])[0].reshape(len(r), pose.shape[1], -1).transpose(0, 2, 1)
         if R is None or pose.shape[1] == 3:
             return found
         q = quaternions(R)
@@ -63,6 +60,19 @@ class ModelFunctions:
     def _turns(self) -> bool:
         return f"{self.tool}.R" in self.dae.vectors
 
+    @cached_property
+    def _forward(self) -> ca.Function:
+        """Position and orientation, column after column, from the joints one by one."""
+        wanted = [f"{self.tool}.r"] + ([f"{self.tool}.R"] if self._turns else [])
+        return _dense(self.dae.function(list(self.joints), wanted))
+
+    @cached_property
+    def _slopes(self) -> ca.Function:
+        """Jacobian of the inverse, column after column."""
+        x = ca.MX.sym("pose", self._inverse.numel_in(0))
+        return ca.Function("slopes", [x], [ca.densify(ca.jacobian(self._inverse(x), x))])
+
+    @cached_property
     def _inverse(self) -> ca.Function:
         """Joints from a pose: r, and elements 1 to 3 of the quaternion with six joints, as one column."""
         six = len(self.joints) == 6
@@ -94,25 +104,32 @@ def home_of(values: dict, tool: str, joints: tuple[str, ...]) -> Home:
     return Home(np.array([float(values[n]) for n in joints]), np.asarray(values[f"{tool}.r"]), np.asarray(R))
 
 
+def _dense(function: ca.Function) -> ca.Function:
+    """The same function with all zeros of its results stored."""
+    x = function.mx_in()
+    return ca.Function("dense", x, [ca.densify(y) for y in function.call(x)])
+
+
 def _over_poses(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
     """Results (N, k) of a function for arguments (N, l), a block of poses in one call."""
     count = len(arguments[0])
+    whole = count - count % BLOCK
     found = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
-    mapped = function.map(BLOCK)
-    buffer, run = mapped.buffer()
-    inside = [np.zeros((BLOCK, function.numel_in(i))) for i in range(function.n_in())]
-    outside = [np.zeros((BLOCK, mapped.nnz_out(i) // BLOCK)) for i in range(function.n_out())]
-    for i, memory in enumerate(inside):
-        buffer.set_arg(i, memoryview(memory))
-    for i, memory in enumerate(outside):
-        buffer.set_res(i, memoryview(memory))
-    for first in range(0, count, BLOCK):
-        part = slice(first, min(first + BLOCK, count))
-        size = part.stop - first
-        for memory, argument in zip(inside, arguments, strict=True):
-            memory[:size] = argument[part]
-            memory[size:] = argument[part.stop - 1]
-        run()
-        for memory, result in zip(outside, found, strict=True):
-            result[part] = memory[:size]
+    for size, firsts in ((BLOCK, range(0, whole, BLOCK)), (count - whole, range(whole, count, BLOCK))):
+        if not firsts:
+            continue
+        mapped = function.map(size)
+        buffer, run = mapped.buffer()
+        inside = [np.empty((size, function.numel_in(i))) for i in range(function.n_in())]
+        outside = [np.empty((size, function.numel_out(i))) for i in range(function.n_out())]
+        for i, memory in enumerate(inside):
+            buffer.set_arg(i, memory.data)
+        for i, memory in enumerate(outside):
+            buffer.set_res(i, memory.data)
+        for first in firsts:
+            for memory, argument in zip(inside, arguments, strict=True):
+                memory[:] = argument[first : first + size]
+            run()
+            for memory, result in zip(outside, found, strict=True):
+                result[first : first + size] = memory
     return found

@@ -75,7 +75,7 @@ def _solve_block(
             r[rows] += whole[:, :3]
             if any(k >= 3 for k in pose):
                 R[rows] = turned(R[rows], whole[:, 3:])
-            q[np.ix_(rows, joints)] += step[:, len(pose) :]
+            q[rows[:, None], np.array(joints, dtype=int)] += step[:, len(pose) :]
     for lost in (rows, spoiled):
         q[lost], r[lost], R[lost] = np.nan, np.nan, np.nan
 

@@ -55,7 +55,7 @@ def quaternions(R: np.ndarray) -> np.ndarray:
 
 def best_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The rotations R (N, 3, 3) that bring vectors b (N, k, 3) nearest to a (N, k, 3), in squares (Kabsch, 1976)."""
-    finite = np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=(1, 2)))
     moments = np.where(finite[:, None, None], np.swapaxes(a, 1, 2) @ b, 0.0)
     u, _, v = np.linalg.svd(moments)
     u[:, :, 2] *= np.linalg.det(u @ v)[:, None]

@@ -1,0 +1,102 @@
+"""Figures of kinematics: poses per second beside a C loop, and how surely and quickly the F1 finds its pose."""
+
+import ctypes
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from gantrytau.kinematics import Kinematics
+from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
+from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
+from tests.kinematics.test_kinematics_f1 import LIMIT, poses
+
+POSES = 1_000_000
+# (4.9) pose after pose, as it is written down
+LOOP = r"""
+#include <math.h>
+void ik(long n, const double *r, const double *A, const double *v, const double *L, double *q)
+{
+    for (long k = 0; k < n; k++)
+        for (int i = 0; i < 3; i++) {
+            const double *a = A + 3 * i, *u = v + 3 * i;
+            double x = r[3 * k] - a[0], y = r[3 * k + 1] - a[1], z = r[3 * k + 2] - a[2];
+            double uu = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], p = u[0] * x + u[1] * y + u[2] * z;
+            q[3 * k + i] = (p - sqrt(p * p - uu * (x * x + y * y + z * z - L[i] * L[i]))) / uu;
+        }
+}
+"""
+
+
+def rows() -> Iterator[Row]:
+    """All figures of kinematics."""
+    yield from _three_links()
+    yield from _others()
+    yield from _right_poses()
+
+
+def _three_links() -> Iterator[Row]:
+    kinematics = Kinematics(GantryTau(prototypes.L1))
+    random = np.random.default_rng(0)
+    r = kinematics.home.r + random.uniform(-0.3, 0.3, (POSES, 3))
+    with tempfile.TemporaryDirectory() as folder:
+        loop, q = _compiled(Path(folder), r)
+        loop()
+        assert np.abs(kinematics.ik(r) - q).max() < 1e-12
+        times = in_turn({"ik": lambda: kinematics.ik(r), "C": loop}, 7)
+    rate = POSES / times["ik"] / 1e6
+    yield at_least("three links, inverse, million poses per second", round(rate, 1), 2)
+    yield shown("the same, a C loop (cc -O2)", f"{POSES / times['C'] / 1e6:.3g}")
+    yield at_most("three links, inverse against a C loop", times["ik"] / times["C"], 3.0, "x")
+    q = kinematics.ik(r)
+    times = in_turn({"fk": lambda: kinematics.fk(q), "jacobian": lambda: kinematics.jacobian(r)}, 3)
+    yield shown("three links, forward, million poses per second", f"{POSES / times['fk'] / 1e6:.3g}")
+    yield shown("three links, Jacobian, million poses per second", f"{POSES / times['jacobian'] / 1e6:.3g}")
+
+
+def _compiled(folder: Path, r: np.ndarray) -> tuple[Callable[[], None], np.ndarray]:
+    """The C loop over poses r, and the array that it fills."""
+    (folder / "ik.c").write_text(LOOP)
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", "ik.so", "ik.c", "-lm"], cwd=folder, check=True)
+    function = ctypes.CDLL(str(folder / "ik.so")).ik
+    arms = prototypes.L1.arms
+    q = np.empty_like(r)
+    arrays = [r, *(np.array([getattr(arm, n) for arm in arms]) for n in ("offset", "direction", "length")), q]
+
+    def loop() -> None:
+        function(ctypes.c_long(len(r)), *(a.ctypes.data_as(ctypes.c_void_p) for a in arrays))
+
+    return loop, q
+
+
+def _others() -> Iterator[Row]:
+    random = np.random.default_rng(1)
+    for name, robot in (
+        ("six links", SixLinkGantryTau(prototypes.D1)),
+        ("F1", F1GantryTau(prototypes.F1)),
+        ("delta robot, no closed form", DeltaRobot()),
+    ):
+        kinematics = Kinematics(robot)
+        count = 1000 if name.startswith("delta") else 20_000
+        q = kinematics.home.q + random.uniform(-0.1, 0.1, (count, len(kinematics.joints)))
+        r, R = kinematics.fk(q)
+        given = R if len(kinematics.joints) == 6 else None
+        calls = {"fk": lambda k=kinematics, q=q: k.fk(q), "ik": lambda k=kinematics, r=r, R=given: k.ik(r, R)}
+        times = in_turn(calls, 3)
+        rates = ", ".join(f"{count / times[word]:.2g}" for word in ("ik", "fk"))
+        yield shown(f"{name}, inverse and forward, poses per second", rates)
+
+
+def _right_poses() -> Iterator[Row]:
+    kinematics = Kinematics(F1GantryTau(prototypes.F1))
+    r, R = poses(kinematics, 20_000)
+    q = kinematics.ik(r, R)
+    bent = kinematics.ball_joint_angles(r, R, np.nan_to_num(q)).max(axis=(1, 2))
+    inside = np.flatnonzero(np.isfinite(q[:, 0]) & (bent < LIMIT))[:10_000]
+    found, _ = kinematics.fk(q[inside])
+    right = int(np.sum(np.abs(found - r[inside]).max(axis=1) < 1e-9))
+    yield at_least("F1, right poses of 10000 from the five-degree start", right, 10_000)
+    yield at_most("F1, most iterations of these", kinematics.iterations, 6)
+    yield shown("F1, iterations of these on average", f"{kinematics.iterations_by_pose.mean():.2f}")

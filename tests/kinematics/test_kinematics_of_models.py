@@ -1,0 +1,119 @@
+"""Kinematics of models that are no Gantry-Tau, through their own equations."""
+
+import numpy as np
+import pytest
+
+from gantrytau import GantryTauError
+from gantrytau.errors import ModelError
+from gantrytau.kinematics import Kinematics
+from gantrytau.kinematics.rotations import turned
+from gantrytau_models import DeltaRobot, GantryTau, Pendulum, StewartPlatform, prototypes
+
+ALONG_X = np.array([1.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def delta():
+    return Kinematics(DeltaRobot())
+
+
+def test_a_delta_robot_there_and_back(delta):
+    assert delta.joints == ("arms[0].phi", "arms[1].phi", "arms[2].phi")
+    random = np.random.default_rng(0)
+    q = delta.home.q + random.uniform(-0.2, 0.2, (300, 3))
+    r, R = delta.fk(q)
+    np.testing.assert_allclose(delta.ik(r), q, atol=1e-9)  # of the iteration in the model
+    np.testing.assert_allclose(R, np.broadcast_to(np.eye(3), R.shape), atol=1e-9)  # a delta robot stays level
+    step = 1e-5
+    slope = (delta.ik(r + step * ALONG_X) - delta.ik(r - step * ALONG_X)) / (2 * step)
+    np.testing.assert_allclose(delta.jacobian(r)[:, :, 0], slope, atol=1e-6)
+
+
+def test_a_delta_robot_out_of_reach(delta):
+    assert np.isnan(delta.ik([[0.0, 0.0, -9.0]])).all()
+
+
+def test_the_legs_of_a_stewart_platform():
+    kinematics = Kinematics(StewartPlatform(), tool="platform")
+    assert kinematics.joints == tuple(f"legs[{k}].s" for k in range(6))
+    random = np.random.default_rng(1)
+    r = kinematics.home.r + random.uniform(-0.05, 0.05, (20, 3))
+    R = turned(np.broadcast_to(kinematics.home.R, (20, 3, 3)), random.uniform(-0.1, 0.1, (20, 3)))
+    q = kinematics.ik(r, R)
+    values = kinematics.dae.table.values
+    base, plate = (
+        np.array([[values[f"legs[{k}].{end}_offset[{i}]"] for i in range(3)] for k in range(6)])
+        for end in ("base", "platform")
+    )
+    expected = np.linalg.norm(r[:, None] + plate @ np.swapaxes(R, 1, 2) - base, axis=2)
+    np.testing.assert_allclose(q, expected, atol=1e-9)
+    step = 1e-5
+    for k in range(3):
+        turn = np.broadcast_to(step * np.eye(3)[k], (20, 3))
+        slope = (kinematics.ik(r, turned(R, turn)) - kinematics.ik(r, turned(R, -turn))) / (2 * step)
+        np.testing.assert_allclose(kinematics.jacobian(r, R)[:, :, 3 + k], slope, atol=1e-8)
+    found, turns = kinematics.fk(q[:3])
+    np.testing.assert_allclose(found, r[:3], atol=1e-9)
+    np.testing.assert_allclose(turns, R[:3], atol=1e-9)
+
+
+def test_the_equations_of_a_gantry_tau_answer_as_its_closed_form():
+    """Joints named in another order are no longer recognised."""
+    known = Kinematics(GantryTau(prototypes.L1))
+    order = [2, 0, 1]
+    through = Kinematics(known.dae, joints=[known.joints[k] for k in order])
+    q = known.home.q + np.random.default_rng(2).uniform(-0.2, 0.2, (50, 3))
+    r, _ = known.fk(q)
+    np.testing.assert_allclose(through.fk(q[:, order])[0], r, atol=1e-9)
+    np.testing.assert_allclose(through.ik(r), q[:, order], atol=1e-9)
+    np.testing.assert_allclose(through.jacobian(r), known.jacobian(r)[:, order], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Kinematics(StewartPlatform()), "has no 'tool.r', expected the position of a tool"),
+        (lambda: Kinematics(Pendulum(), tool="body"), "has no 'body.r'"),
+        (
+            lambda: Kinematics(DeltaRobot(), joints=["arms[0].psi"]),
+            r"no variable or parameter 'arms\[0\].psi'",
+        ),
+    ],
+)
+def test_models_without_what_is_needed(make, words):
+    with pytest.raises(GantryTauError, match=words):
+        make()
+
+
+def test_what_only_links_answer_is_told(delta):
+    with pytest.raises(ModelError, match="expected a Gantry-Tau robot"):
+        delta.state(delta.home.r)
+    with pytest.raises(ModelError, match="found near= for DeltaRobot"):
+        delta.fk(delta.home.q, near=delta.home.r)
+    with pytest.raises(ModelError, match="found 3 joints and an orientation R"):
+        delta.ik(delta.home.r, np.eye(3))
+
+
+def test_a_model_that_nothing_drives():
+    from gantrytau import Real, connect
+    from gantrytau.mechanics.multibody import PointMass, Prismatic, World
+    from gantrytau.model import Model
+
+    class Thing(Model):
+        r = Real(3, unit="m")
+        body = PointMass(m=1.0)
+
+        def equations(self):
+            yield self.r == self.body.frame_a.r
+
+    class Loose(Model):
+        world = World()
+        tool = Thing()
+        x = Prismatic(n=[1.0, 0.0, 0.0])
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.x.frame_a)
+            yield connect(self.x.frame_b, self.tool.body.frame_a)
+
+    with pytest.raises(ModelError, match="has the inputs none, expected forces"):
+        Kinematics(Loose())
