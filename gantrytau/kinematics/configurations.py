@@ -38,7 +38,8 @@ def of_joints(robot: LinkedRobot, q: np.ndarray, one: bool, limits: np.ndarray) 
     if isinstance(robot, ThreeLinks):
         R = robot.repeated(len(q))
         foot, height, margin = meeting(robot.spheres(q, R)[0], robot.geometry.length)
-        height[~(margin >= 0.0)] = np.nan
+        lost = ~(margin >= 0.0)
+        height[lost], R[lost] = np.nan, np.nan
         up = robot.ahead * np.sign(height @ robot.geometry.direction.sum(axis=0))[:, None] * height
         return [configuration(robot, q, foot + s * up, R, one, limits) for s in (1.0, -1.0)]
     if len(q) > 1:
@@ -115,7 +116,7 @@ def _of_arm(robot: TurningLinks, arm: int, r: np.ndarray, R: np.ndarray) -> list
     many = len(q)
     free = [6 + k for k in columns]
     poses = np.repeat(r, many, axis=0), np.repeat(R, many, axis=0)
-    q = solve_lengths(robot.geometry, q, *poses, free, robot.geometry.links_of(arm))[0][:, columns]
+    q = solve_lengths(robot.geometry.of_arm(arm), q, *poses, free)[0][:, columns]
     q[:, 1:] = np.arctan2(np.sin(q[:, 1:]), np.cos(q[:, 1:]))
     found: list[np.ndarray] = []
     for solution in q[np.isfinite(q).all(axis=1)]:

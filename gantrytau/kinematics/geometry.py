@@ -8,11 +8,11 @@ The first axis of all arrays is the pose, the second the link. Lengths in m, ang
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau.kinematics.rotations import about, of_quaternion
+from gantrytau.kinematics.rotations import about, cross, of_quaternion
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +51,12 @@ class Geometry:
         """Numbers of the links of an arm."""
         return np.flatnonzero(self.arm == arm)
 
+    def of_arm(self, arm: int) -> "Geometry":
+        """The same robot with the links of one arm only."""
+        links = self.links_of(arm)
+        parts = {n: getattr(self, n)[links] for n in ("arm", "length", "on_cart", "on_plate")}
+        return replace(self, **parts)
+
     def columns_of(self, arm: int) -> list[int]:
         """Numbers of the actuator coordinates that move an arm."""
         return [arm, *(3 + k for k, turntable in enumerate(self.turntables) if turntable.arm == arm)]
@@ -64,6 +70,8 @@ class Geometry:
         A = np.empty((len(q), len(self.length), 3))
         for arm in range(3):
             links = self.links_of(arm)
+            if links.size == 0:
+                continue
             place, R, _ = self.frames(arm, q)
             A[:, links] = place[:, None] + self.on_cart[links] @ np.swapaxes(R, 1, 2)
         return A
@@ -81,25 +89,26 @@ class Geometry:
         return place, R, turns
 
     def slopes(
-        self, q: np.ndarray, r: np.ndarray, R: np.ndarray
+        self, q: np.ndarray, r: np.ndarray, R: np.ndarray, *, joints: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Lengths (N, m), unit vectors from cart to plate u (N, m, 3), and the slopes of the lengths.
 
-        By the pose (N, m, 6), the last three for a rotation vector resolved in the world; by the actuators (N, m, n).
+        By the pose (N, m, 6), the last three for a rotation vector resolved in the world; by the actuators (N, m, n), zero
+        if no slopes by joints are wanted.
         (4.31) holds for any angles, with the joint on the plate in plate axes; a rotation vector has no singular pose.
         """
         B, A = self.plate_joints(r, R), self.cart_joints(q)
         gap = B - A
         length = np.linalg.norm(gap, axis=2)
         u = gap / length[:, :, None]
-        by_pose = np.concatenate([u, np.cross(B - r[:, None], u)], axis=2)
+        by_pose = np.concatenate([u, cross(B - r[:, None], u)], axis=2)
         by_joints = np.zeros((*length.shape, len(self.names)))
-        for arm in range(3):
+        for arm in np.unique(self.arm) if joints else ():
             links, (cart, *others) = self.links_of(arm), self.columns_of(arm)
             by_joints[:, links, cart] = -(u[:, links] @ self.direction[arm])
             turns = self.frames(arm, q)[2] if others else []
             for column, (axis, place) in zip(others, turns, strict=True):
-                moved = np.cross(axis[:, None], A[:, links] - place[:, None])
+                moved = cross(axis[:, None], A[:, links] - place[:, None])
                 by_joints[:, links, column] = -np.sum(u[:, links] * moved, axis=2)
         return length, u, by_pose, by_joints
 

@@ -131,12 +131,15 @@ class ThreeLinks(LinkedRobot):
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) whose nearer point is taken."""
         foot, height, margin = meeting(self.spheres(q, self.repeated(1))[0], self.geometry.length)
-        height[~(margin >= 0.0)] = np.nan
+        lost = ~(margin >= 0.0)
+        height[lost] = np.nan
         if near is None:
             side = self.ahead * np.sign(height @ self.geometry.direction.sum(axis=0))
         else:
             side = np.where(np.sum((near[0] - foot) * height, axis=1) < 0, -1.0, 1.0)
-        return foot + side[:, None] * height, self.repeated(len(q)), np.zeros(len(q), dtype=int)
+        R = self.repeated(len(q))
+        R[lost] = np.nan
+        return foot + side[:, None] * height, R, np.zeros(len(q), dtype=int)
 
     def jacobian(self, r, R=None):
         """dq/dr, (N, 3, 3)."""
@@ -208,7 +211,7 @@ class TurningLinks(LinkedRobot):
         iterations = np.zeros(len(r), dtype=int)
         for arm in range(3):
             free = [6 + k for k in self.geometry.columns_of(arm)]
-            q, _, _, count = solve_lengths(self.geometry, q, r, R, free, self.geometry.links_of(arm))
+            q, _, _, count = solve_lengths(self.geometry.of_arm(arm), q, r, R, free)
             iterations = np.maximum(iterations, count)
         with np.errstate(invalid="ignore"):
             q[(self.sides_of(q, r, R) * np.asarray(sides) <= 0).any(axis=1)] = np.nan

@@ -25,7 +25,6 @@ def solve_lengths(
     r: np.ndarray,
     R: np.ndarray,
     free: Sequence[int],
-    links: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Coordinates q (N, n), r (N, 3), R (N, 3, 3) at which links have their lengths, and the number of iterations (N,).
 
@@ -33,11 +32,10 @@ def solve_lengths(
     end are NaN.
     """
     q, r, R = (np.array(a, dtype=float) for a in (q, r, R))
-    links = np.arange(len(geometry.length)) if links is None else links
     iterations = np.zeros(len(q), dtype=int)
     for first in range(0, len(q), BLOCK):
         part = slice(first, first + BLOCK)
-        _solve_block(geometry, (q[part], r[part], R[part]), iterations[part], list(free), links)
+        _solve_block(geometry, (q[part], r[part], R[part]), iterations[part], list(free))
     return q, r, R, iterations
 
 
@@ -46,7 +44,6 @@ def _solve_block(
     at: tuple[np.ndarray, np.ndarray, np.ndarray],
     iterations: np.ndarray,
     free: list[int],
-    links: np.ndarray,
 ) -> None:
     """Moves the arrays `at` in place."""
     q, r, R = at
@@ -59,15 +56,13 @@ def _solve_block(
     spoiled = np.setdiff1d(np.arange(len(q)), rows)
     with np.errstate(all="ignore"):
         for _ in range(MOST + 1):
-            length, _, by_pose, by_joints = geometry.slopes(q[rows], r[rows], R[rows])
-            error = (geometry.length - length)[:, links]
+            length, _, by_pose, by_joints = geometry.slopes(q[rows], r[rows], R[rows], joints=bool(joints))
+            error = geometry.length - length
             open_ = ~(np.abs(error).max(axis=1) <= close)
             rows, error = rows[open_], error[open_]
             if rows.size == 0:
                 break
-            matrix = np.concatenate(
-                [by_pose[open_][:, links][:, :, pose], by_joints[open_][:, links][:, :, joints]], axis=2
-            )
+            matrix = np.concatenate([by_pose[open_][:, :, pose], by_joints[open_][:, :, joints]], axis=2)
             step = limited(solved(matrix, error))
             iterations[rows] += 1
             whole = np.zeros((rows.size, 6))

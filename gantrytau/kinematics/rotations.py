@@ -14,6 +14,13 @@ def skewed(v: np.ndarray) -> np.ndarray:
     return found
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The cross product (..., 3), several times as quick as that of NumPy for many short vectors."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    u, v, w = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+
+
 def turned(R: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """R (N, 3, 3) turned further by rotation vectors (N, 3), rad, resolved in the world (Rodrigues)."""
     angle = np.linalg.norm(vector, axis=-1)
