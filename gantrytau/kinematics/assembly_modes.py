@@ -15,8 +15,8 @@ from gantrytau.kinematics.study import pose
 from gantrytau.kinematics.study_poses import exact_poses, link_errors
 from gantrytau.kinematics.study_roots import MODES, Roots, all_roots, placed
 
-REAL = 1e-6  # imaginary part of z of length 1; a pair of complex modes nearer than that to each other is a double one
-MET = 1e-9  # error of links by their length; a real mode that is nearer to a complex one stays complex
+REAL = 1e-6  # imaginary part of z of length 1: a complex pair nearer to each other than that counts as real
+REAL_SINGULAR = 1e-5  # the same of singular modes, which are known less well
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class AssemblyModes:
     @property
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """The real modes as real arrays, r (m, 3) and R (m, 3, 3), in the order of the record."""
-        return self.r[self.real].real, self.R[self.real].real
+        return np.real(self.r[self.real]), np.real(self.R[self.real])
 
     def __str__(self) -> str:
         lines = [
@@ -81,7 +81,7 @@ def assembly_modes(
     base, platform, lengths = checked_hexapod(base, platform, lengths, diameter)
     *normal, size = placed(base, platform, lengths)
     roots = all_roots(*normal)
-    z, real = _real_ones(roots.z)
+    z, real = _real_ones(roots)
     r, R = pose(z)
     r = r * size + base.mean(0) - R @ platform.mean(0)
     r, R, error = _settled(r, R, real, roots.regular, base, platform, lengths)
@@ -95,11 +95,10 @@ def assembly_modes(
     )  # fmt: skip
 
 
-def _real_ones(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points with real ones made real, and which they are; the phase of a point says nothing."""
-    squares = (z * z).sum(1)
-    z = z * np.exp(-0.5j * np.angle(squares))[:, None]  # real up to rounding if a real multiple exists
-    real = np.abs(z.imag).max(1, initial=0.0) < REAL
+def _real_ones(roots: Roots) -> tuple[np.ndarray, np.ndarray]:
+    """The roots with real ones made real, and which they are; the phase of a root says nothing."""
+    z = roots.z * np.exp(-0.5j * np.angle((roots.z**2).sum(1)))[:, None]  # real, if any multiple is
+    real = np.abs(z.imag).max(1, initial=0.0) < np.where(roots.regular, REAL, REAL_SINGULAR)
     return np.where(real[:, None], z.real, z), real
 
 
@@ -141,10 +140,12 @@ def _outcome(roots: Roots, real: np.ndarray) -> list[str]:
     """What became of modes that are not there, and of those that are singular."""
     found = []
     if roots.at_infinity:
-        found.append(f"{roots.at_infinity} of {MODES} modes are at infinity")
+        found.append(
+            f"{roots.at_infinity} of {MODES} modes are at infinity, or too far away for numbers of 16 digits"
+        )
     if singular := int((~roots.regular).sum()):
         found.append(
-            f"{singular} modes are singular: several meet there, or the links do not hold the platform; "
+            f"{singular} of the modes found are singular: several meet there, or the links do not hold the platform; "
             "lengths a little different separate them"
         )
     if roots.lost:

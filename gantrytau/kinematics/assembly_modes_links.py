@@ -1,8 +1,7 @@
 """Which assembly modes can be built: links as straight lines between their joints.
 
-Two links cross where their shortest connection meets both between their ends, and is shorter than half the
-distance of their joints, on base or platform, whichever are nearer to each other. So a parallelogram is told from
-the crossed quadrilateral of the same links, and links far apart do not count.
+Two links whose joints are about as far apart on the base as on the platform should form something like a
+parallelogram. They are crossed where, seen along them, their joints change sides from one end to the other.
 """
 
 from itertools import combinations
@@ -10,8 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-NEAR = 0.5  # of the distance of joints; F1: 0.82 and above where nothing crosses, 0.34 and below otherwise
-PARALLEL = 1e-9  # square of the sine of the angle of two links, and distance of two joints by that of all
+ALIKE = 2.0  # ratio of distances of joints, base by platform; above, and below its inverse, links form no parallelogram
+PARALLEL = (
+    1e-9  # square of the sine of the angle of two links, and distance of two joints by the length of links
+)
 PAIRS = np.array(list(combinations(range(6), 2)))
 
 
@@ -25,21 +26,33 @@ class LinkGeometry(NamedTuple):
 def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
     """Links from the base joints (6, 3) to the joints on the platform (k, 6, 3), all in the world, in m.
 
-    Pairs that share a joint neither cross nor count in the clearance.
+    Pairs that share a joint do not count.
     """
     i, j = PAIRS.T
     starts = np.broadcast_to(base, ends.shape)
     a, b = starts[:, i], starts[:, j]
     u, v = ends[:, i] - a, ends[:, j] - b
+    at_base, at_platform = (np.linalg.norm(gap, axis=2) for gap in (a - b, a + u - b - v))
+    shared = np.minimum(at_base, at_platform) < PARALLEL * np.linalg.norm(u, axis=2)
+    alike = (at_base < ALIKE * at_platform) & (at_platform < ALIKE * at_base)
+    crossed = alike & ~shared & (_seen_along(a - b, a + u - b - v, u, v) < 0)
+    return LinkGeometry(crossed, np.where(shared, np.inf, _distance(a, b, u, v)).min(1))
+
+
+def _seen_along(first: np.ndarray, second: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Product of two vectors seen along two links u and v, (k, 15)."""
+    mean = u / np.linalg.norm(u, axis=2)[..., None] + v / np.linalg.norm(v, axis=2)[..., None]
+    size = np.maximum((mean * mean).sum(2), PARALLEL)  # links of opposite directions have none in common
+    return (first * second).sum(2) - (first * mean).sum(2) * (second * mean).sum(2) / size
+
+
+def _distance(a: np.ndarray, b: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Least distances of links from a along u and from b along v, (k, 15) in m."""
     s, t = _shortest(a - b, u, v)
     between = (s > 0) & (s < 1) & (t > 0) & (t < 1)
     across = np.linalg.norm(a - b + s[..., None] * u - t[..., None] * v, axis=2)
-    apart = np.minimum(np.linalg.norm(a - b, axis=2), np.linalg.norm(a + u - b - v, axis=2))
-    shared = apart < PARALLEL * np.linalg.norm(u, axis=2)
-    crossed = between & (across < NEAR * apart) & ~shared
     to_ends = [_to_segment(a, b, v), _to_segment(a + u, b, v), _to_segment(b, a, u), _to_segment(b + v, a, u)]
-    distance = np.min([np.where(between, across, np.inf), *to_ends], axis=0)
-    return LinkGeometry(crossed, np.where(shared, np.inf, distance).min(1))
+    return np.min([np.where(between, across, np.inf), *to_ends], axis=0)
 
 
 def _shortest(w: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

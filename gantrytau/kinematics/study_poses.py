@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.kinematics.study import cross_matrices
 from gantrytau.kinematics.study_tracking import solved
 
-STEPS = 4  # two converge from the roots in Study's coordinates
+STEPS = 8  # two converge from the roots in Study's coordinates; of the others the best is taken
 
 
 def link_errors(r: np.ndarray, R: np.ndarray, base: np.ndarray, platform: np.ndarray, lengths: np.ndarray):
@@ -21,7 +21,11 @@ def link_errors(r: np.ndarray, R: np.ndarray, base: np.ndarray, platform: np.nda
 def exact_poses(
     r: np.ndarray, R: np.ndarray, base: np.ndarray, platform: np.ndarray, lengths: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The poses r (k, 3), R (k, 3, 3) after Newton, and their link errors (k,) in m."""
+    """The poses r (k, 3), R (k, 3, 3) after Newton, and their link errors (k,) in m.
+
+    What remains is rounding: some 1e-16 |r|^2 / L, which only complex poses far away make visible.
+    """
+    R = R @ (3 * np.eye(3) - R.swapaxes(1, 2) @ R) / 2  # orthogonal again where x.x was a small difference
     best_r, best_R = r, R
     best = link_errors(r, R, base, platform, lengths)
     for _ in range(STEPS):
@@ -42,5 +46,4 @@ def _step(r: np.ndarray, R: np.ndarray, base: np.ndarray, platform: np.ndarray, 
     half = change[:, 3:] / 2
     K = cross_matrices(half)
     turn = np.eye(3) + 2 * (K + K @ K) / (1 + (half * half).sum(1))[:, None, None]
-    R = turn @ R
-    return r + change[:, :3], R @ (3 * np.eye(3) - R.swapaxes(1, 2) @ R) / 2  # orthogonal but for rounding
+    return r + change[:, :3], turn @ R

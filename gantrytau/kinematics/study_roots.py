@@ -18,6 +18,7 @@ SIZE = 1.7  # of a hexapod, root mean square; start system and target are then o
 NO_POSE = 1e-6  # |x.x| below which a singular root is at infinity
 SINGULAR = 1e-7  # smallest singular value of the Jacobian: double roots are found to about 1e-8
 NEAR_END = 1e-4  # 1 - t where paths to singular roots stop at the latest
+HALVINGS = 12  # Newton halves the error at double roots, down to about 1e-8
 APART = 1e-3  # distance of singular roots that count as two: they are known less well
 
 
@@ -88,7 +89,7 @@ def _sorted(target: np.ndarray, paths: Paths) -> tuple[Roots, int]:
     away = (np.abs((z[:, :4] ** 2).sum(1)) < NO_POSE) & (least < NO_POSE)
     regular = kept & (least > SINGULAR) & ~away
     lost = ~regular & ~away & (paths.t < 1.0 - NEAR_END)
-    singular = z[~regular & ~away & ~lost]
+    singular = polished(target, z[~regular & ~away & ~lost], steps=HALVINGS)
     singular = singular[distinct(singular, APART)]
     roots = _distinct(z[regular])
     both = np.concatenate([roots, singular])

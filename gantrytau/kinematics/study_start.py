@@ -44,7 +44,7 @@ def with_study(forms: np.ndarray) -> np.ndarray:
 def distinct(z: np.ndarray, same: float = SAME) -> np.ndarray:
     """Which of the points z (n, 8) of length 1 are not among those before them, whatever their phases, (n,)."""
     near = np.abs(z.conj() @ z.T) > 1.0 - same**2 / 2
-    return ~np.tril(near, -1).any(1)
+    return np.logical_not(np.tril(near, -1).any(axis=1))
 
 
 def solve_by_monodromy(seed: int = SEED) -> Start:

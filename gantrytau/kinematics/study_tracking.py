@@ -102,7 +102,7 @@ def _value(terms: np.ndarray, step: np.ndarray) -> np.ndarray:
 def _corrected(
     homotopy: Homotopy, z: np.ndarray, t: np.ndarray, patch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """z after two steps of Newton, of length 1, and whether they contract as near a regular root they must."""
+    """Points after two steps of Newton, and whether those contract as they must near a regular root."""
     sizes = []
     for _ in range(2):
         step = _newton_step(homotopy.forms(z, t)[0], z, patch)
