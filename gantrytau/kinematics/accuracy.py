@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau.errors import ModelError
-from gantrytau.kinematics.workspace_links import Links, links_of
+from gantrytau.kinematics.kinematics import Kinematics
+from gantrytau.kinematics.linked import ThreeLinks
+from gantrytau.kinematics.poses import vectors
 from gantrytau.model import Model
 
 if TYPE_CHECKING:
@@ -95,74 +97,55 @@ class Accuracy:
         return draw_levels(self, quantity, axes, file)
 
 
-def accuracy(robot: Model, r: ArrayLike, semi_axes: ArrayLike) -> Accuracy:
+def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> Accuracy:
     """Errors of the tool of a three-link robot for errors of its actuators (Appendix A).
 
-    robot: an instance such as GantryTau(prototypes.D1), its tool ahead of the carts; r: places of the tool, (N, 3) or
-    (3,), in m; semi_axes: of the error ellipsoids along the axes of the base, (3, 3) in m, one row per actuator.
-    Raises ModelError for other robots, shapes, or semi-axes that are negative or not finite.
+    robot: an instance such as GantryTau(prototypes.D1), or its Kinematics; r: places of the tool, (N, 3) or (3,), in m;
+    semi_axes: of the error ellipsoids along the axes of the base, (3, 3) in m, one row per actuator.
+    Raises ModelError for other robots, shapes, or semi-axes that are negative or not small.
     """
-    links = links_of(robot)
-    if not links.single or len(links.lengths) != 3:
+    kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
+    linked, name = kinematics.linked("accuracy"), kinematics.dae.name
+    if not isinstance(linked, ThreeLinks):
         raise ModelError(
-            f"{links.name}: found {len(links.lengths)} links, expected three that end in the tool; ask for the accuracy "
+            f"{name}: found {len(linked.geometry.length)} links, expected three that end in the tool; ask for the accuracy "
             "of the three-link robot, as GantryTau(prototypes.D1)"
         )
-    r = _places(links.name, r)
+    places, _ = vectors(r, 3, "r", name)
+    lengths = linked.geometry.length
     axes = np.asarray(semi_axes, dtype=float)
-    if axes.shape != (3, 3) or not ((axes >= 0) & (axes < 0.1 * links.lengths.min())).all():
+    if axes.shape != (3, 3) or not ((axes >= 0) & (axes < 0.1 * lengths.min())).all():
         raise ModelError(
-            f"{links.name}: found semi_axes {axes.tolist()}, expected three rows (one per actuator) of three lengths in m "
+            f"{name}: found semi_axes {axes.tolist()}, expected three rows (one per actuator) of three lengths in m "
             "(along x, y, z of the base), of at least 0 and below a tenth of a link; convert millimetres"
         )
-    blocks = [_of_block(links, r[k : k + _BLOCK], axes) for k in range(0, len(r), _BLOCK)]
+    carts = linked.geometry.cart_joints(kinematics.ik(places))
+    parts = [slice(k, k + _BLOCK) for k in range(0, len(places), _BLOCK)] or [slice(0)]
+    blocks = [_of_block(carts[part], lengths, places[part], axes) for part in parts]
     columns = {
         name: np.concatenate([block[name] for block in blocks]) for name in blocks[0] if name != "passes"
     }
     passes = max(block["passes"] for block in blocks)
-    return Accuracy(r=r, lengths=links.lengths, semi_axes=axes, passes=passes, **columns)
+    return Accuracy(r=places, carts=carts, lengths=lengths, semi_axes=axes, passes=passes, **columns)
 
 
-def _places(name: str, r: ArrayLike) -> np.ndarray:
-    """Places of the tool as (N, 3), N > 0."""
-    places = np.atleast_2d(np.asarray(r, dtype=float))
-    if places.ndim != 2 or places.shape[1] != 3 or not len(places):
-        raise ModelError(f"{name}: found r of shape {np.shape(r)}, expected (N, 3) places of the tool in m")
-    return places
-
-
-def _of_block(links: Links, r: np.ndarray, semi_axes: np.ndarray) -> dict:
+def _of_block(carts: np.ndarray, lengths: np.ndarray, r: np.ndarray, semi_axes: np.ndarray) -> dict:
     """The fields of Accuracy for some poses."""
-    carts = _carts(links, r)
-    gaps = carts - r[:, None]
-    u = gaps / links.lengths[:, None]
+    u = (carts - r[:, None]) / lengths[:, None]
     half = np.sqrt(((u * semi_axes) ** 2).sum(-1))
-    corners, passes = _corners(carts, links.lengths, semi_axes, r)
+    corners, passes = _corners(carts, lengths, semi_axes, r)
     with np.errstate(divide="ignore", invalid="ignore"):
         determinant = np.abs(np.linalg.det(u))
         areas = 4 * half[:, [1, 2, 0]] * half[:, [2, 0, 1]] / determinant[:, None]
     return dict(
-        carts=carts,
         corners=corners,
         error=np.linalg.norm(corners - r[:, None], axis=-1).max(axis=-1),
-        bound=_bound(carts, links.lengths, semi_axes, r, u),
+        bound=_bound(carts, lengths, semi_axes, r, u),
         half_widths=half,
         areas=areas,
         directions=u,
         passes=passes,
     )
-
-
-def _carts(links: Links, r: np.ndarray) -> np.ndarray:
-    """Places A_i of the carts behind the tool, (N, 3, 3) in m (4.9); NaN rows out of reach."""
-    gap, v = r[:, None] - links.offsets, links.directions
-    squared = (v**2).sum(-1)
-    along = (gap * v).sum(-1)
-    with np.errstate(invalid="ignore"):
-        root = np.sqrt(along**2 - squared * ((gap**2).sum(-1) - links.lengths**2))
-    carts = links.offsets + ((along - root) / squared)[..., None] * v
-    carts[np.isnan(carts).any(axis=(1, 2))] = np.nan
-    return carts
 
 
 def _corners(

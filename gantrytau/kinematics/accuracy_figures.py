@@ -31,7 +31,7 @@ def draw_levels(found: "Accuracy", quantity: str, axes: str, file: str | os.Path
     figure, drawn = plt.subplots(1, len(panels), squeeze=False, figsize=size, layout="constrained")
     for axis, (title, values) in zip(drawn[0], panels.items(), strict=True):
         # points out of reach are in no triangle that is drawn
-        filled = axis.tricontourf(triangles, np.nan_to_num(values), levels=_levels(values))
+        filled = axis.tricontourf(triangles, np.nan_to_num(values), levels=_levels(values), extend="max")
         lines = axis.tricontour(
             triangles, np.nan_to_num(values), levels=filled.levels, colors="k", linewidths=0.4
         )
@@ -87,7 +87,7 @@ def _triangles(horizontal: np.ndarray, vertical: np.ndarray, inside: np.ndarray,
 
 
 def _levels(values: np.ndarray) -> np.ndarray:
-    """Round levels around finite values; the largest per cent is drawn in the last colour."""
+    """Round levels; the largest per cent, which grows beyond bounds near singular poses, is in one colour."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.nanpercentile(values, [0, 99])
