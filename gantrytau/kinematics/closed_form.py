@@ -61,17 +61,59 @@ def meeting(centres: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.nda
         for first in range(0, len(centres), BLOCK):
             part = slice(first, first + BLOCK)
             c = np.ascontiguousarray(centres[part].transpose(1, 2, 0))
-            d, e = c[1] - c[0], c[2] - c[0]
-            normal = _cross(d, e)
-            area = _dot(normal, normal)
-            along_d = (_dot(d, d) + (length[0] ** 2 - length[1] ** 2)) / 2
-            along_e = (_dot(e, e) + (length[0] ** 2 - length[2] ** 2)) / 2
-            across = (along_d * _cross(e, normal) + along_e * _cross(normal, d)) / area
-            square = length[0] ** 2 - _dot(across, across)
-            foot[part] = (c[0] + across).T
-            height[part] = (np.sqrt(np.maximum(square, 0.0) / area) * normal).T
-            margin[part] = square
+            foot[part].T[:], height[part].T[:], margin[part] = _spheres(c, length)
     return foot, height, margin
+
+
+def forward_of_three_links(
+    offset: np.ndarray, direction: np.ndarray, length: np.ndarray, q: np.ndarray, side: float | np.ndarray
+) -> np.ndarray:
+    """The tool (N, 3) in m for cart positions q (N, 3); NaN rows where links do not meet.
+
+    side: 1 for the tool on that side of the plane of the carts to which the guideways point, -1 for the other; or points
+    (N, 3), of which the tool is the nearer.
+    """
+    r = np.empty((len(q), 3))
+    upwards = direction.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for first in range(0, len(q), BLOCK):
+            part = slice(first, first + BLOCK)
+            centres = offset[:, :, None] + direction[:, :, None] * np.ascontiguousarray(q[part].T)[:, None]
+            foot, height, margin = _spheres(centres, length)
+            wanted = side[part].T - foot if isinstance(side, np.ndarray) else side * upwards[:, None]
+            height *= np.where(_dot(height, wanted) < 0, -1.0, 1.0)
+            height[:, ~(margin >= 0.0)] = np.nan
+            np.add(foot, height, out=r[part].T)
+    return r
+
+
+def slopes_of_three_links(
+    offset: np.ndarray, direction: np.ndarray, r: np.ndarray, q: np.ndarray
+) -> np.ndarray:
+    """dq/dr (N, 3, 3): a link l keeps its length, l.(dr - v dq) = 0."""
+    found = np.empty((len(r), 3, 3))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for first in range(0, len(r), BLOCK):
+            part = slice(first, first + BLOCK)
+            place, along = np.ascontiguousarray(r[part].T), np.ascontiguousarray(q[part].T)
+            for i in range(3):
+                link = place - offset[i, :, None] - direction[i, :, None] * along[i]
+                link /= _dot(link, direction[i])
+                found[part, i] = link.T
+    return found
+
+
+def _spheres(c: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `meeting` answers, the pose last: foot and height (3, N), margin (N,) of centres (3, 3, N)."""
+    d, e = c[1] - c[0], c[2] - c[0]
+    normal = _cross(d, e)
+    area = _dot(normal, normal)
+    # the foot lies on the planes in which two spheres meet
+    along_d = (_dot(d, d) + (length[0] ** 2 - length[1] ** 2)) / 2
+    along_e = (_dot(e, e) + (length[0] ** 2 - length[2] ** 2)) / 2
+    across = (along_d * _cross(e, normal) + along_e * _cross(normal, d)) / area
+    square = length[0] ** 2 - _dot(across, across)
+    return c[0] + across, np.sqrt(np.maximum(square, 0.0) / area) * normal, square
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -10,7 +10,12 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.kinematics.closed_form import InverseOfThreeLinks, meeting
+from gantrytau.kinematics.closed_form import (
+    InverseOfThreeLinks,
+    forward_of_three_links,
+    meeting,
+    slopes_of_three_links,
+)
 from gantrytau.kinematics.geometry import Geometry
 from gantrytau.kinematics.newton import solve_lengths, solved
 from gantrytau.kinematics.rotations import best_rotation
@@ -84,12 +89,12 @@ class LinkedRobot:
         on_plate, length = self.geometry.mean_arms()
         return self.geometry.mean_joints(q) - on_plate @ np.swapaxes(R, 1, 2), length
 
-    def single_links(self, q: np.ndarray, R: np.ndarray, ahead: float | None = None) -> np.ndarray:
+    def single_links(self, q: np.ndarray, R: np.ndarray) -> np.ndarray:
         """The tool (N, 3), were each arm one link; over the plane of the carts where they do not meet."""
         centres, length = self.spheres(q, R)
         foot, height, _ = meeting(centres, length)
         upwards = np.sign(height @ self.geometry.direction.sum(axis=0))[:, None]
-        return foot + (self.ahead if ahead is None else ahead) * upwards * height
+        return foot + self.ahead * upwards * height
 
     def carts(self, r: np.ndarray, R: np.ndarray, A: np.ndarray, sides: np.ndarray) -> np.ndarray:
         """Positions (N, m) of carts for each link alone (4.9); joints A (N, m, 3) at s = 0; nearest where out of reach."""
@@ -130,23 +135,18 @@ class ThreeLinks(LinkedRobot):
 
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) whose nearer point is taken."""
-        foot, height, margin = meeting(self.spheres(q, self.repeated(1))[0], self.geometry.length)
-        lost = ~(margin >= 0.0)
-        height[lost] = np.nan
-        if near is None:
-            side = self.ahead * np.sign(height @ self.geometry.direction.sum(axis=0))
-        else:
-            side = np.where(np.sum((near[0] - foot) * height, axis=1) < 0, -1.0, 1.0)
+        g = self.geometry
+        r = forward_of_three_links(
+            g.offset, g.direction, g.length, q, self.ahead if near is None else near[0]
+        )
         R = self.repeated(len(q))
-        R[lost] = np.nan
-        return foot + side[:, None] * height, R, np.zeros(len(q), dtype=int)
+        R[np.isnan(r[:, 0])] = np.nan
+        return r, R, np.zeros(len(q), dtype=int)
 
     def jacobian(self, r, R=None):
         """dq/dr, (N, 3, 3)."""
         q, _ = self.ik(r, R)
-        _, _, by_pose, by_joints = self.geometry.slopes(q, r, self.repeated(len(r)))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return -by_pose[:, :, :3] / np.einsum("nii->ni", by_joints)[:, :, None]
+        return slopes_of_three_links(self.geometry.offset, self.geometry.direction, r, q)
 
 
 class SixLinks(LinkedRobot):
