@@ -29,12 +29,14 @@ if TYPE_CHECKING:
 SIGNS = np.array([[a, b, c] for a in (-1.0, 1.0) for b in (-1.0, 1.0) for c in (-1.0, 1.0)])
 _BLOCK = 4096  # poses whose arrays stay in the cache
 _CONVERGED = 1e-12  # m, a hundred roundings of a coordinate
+_MET = 1e-9  # m, by which what is not solved misses by far
 _PASSES = 20  # three suffice where the links are not in one plane
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Errors of the tool in N poses. Rows are NaN where the tool is out of reach.
+    """Errors of the tool in N poses. Rows are NaN where the tool is out of reach; where links are so nearly in one plane
+    that errors pull them apart, corners are NaN and error and bound infinite.
 
     r: tool (N, 3) in m; carts: A_i (N, 3, 3) in m; lengths: (3,) in m; semi_axes: r_ij (3, 3) in m.
     corners: the corners of the printed region (A.2), places in the world, (N, 8, 3) in m; the order is that of
@@ -139,7 +141,7 @@ def _of_block(carts: np.ndarray, lengths: np.ndarray, r: np.ndarray, semi_axes: 
         areas = 4 * half[:, [1, 2, 0]] * half[:, [2, 0, 1]] / determinant[:, None]
     return dict(
         corners=corners,
-        error=np.linalg.norm(corners - r[:, None], axis=-1).max(axis=-1),
+        error=_farthest(corners, carts, r),
         bound=_bound(carts, lengths, semi_axes, r, u),
         half_widths=half,
         areas=areas,
@@ -156,16 +158,16 @@ def _corners(
     weights = (lengths[:, None] + SIGNS[:, :, None] * semi_axes) ** -2.0  # (8, 3, 3), diagonals of M_i
     x = np.broadcast_to(r[:, None], (len(r), 8, 3))
     passes = 0
-    for passes in range(_PASSES + 1):  # noqa: B007 - the number of passes is a result
+    while True:
         gap = x[:, :, None] - centres
-        scale = np.sqrt((gap**2 * weights).sum(-1, keepdims=True))
-        touching = gap / scale
-        miss = np.abs(touching - gap).max(initial=0.0, where=np.isfinite(gap))
-        if miss < _CONVERGED:
+        touching = gap / np.sqrt((gap**2 * weights).sum(-1, keepdims=True))
+        miss: np.ndarray = np.abs(touching - gap).max(axis=(-1, -2))
+        if passes == _PASSES or miss.max(initial=0.0, where=np.isfinite(miss)) < _CONVERGED:
             break
         normals = touching * weights
         x = _solve(normals, 1.0 + (normals * centres).sum(-1))
-    return np.where(np.isfinite(centres[..., 0]).all(-1, keepdims=True), x, np.nan), passes
+        passes += 1
+    return np.where(miss[..., None] < _MET, x, np.nan), passes
 
 
 def _bound(
@@ -187,19 +189,30 @@ def _bound(
         x = _meet(carts[:, None], lengths + SIGNS * half, x)
         gap = carts[:, None] - x[:, :, None]
         directions = gap / np.linalg.norm(gap, axis=-1, keepdims=True)
-    return np.linalg.norm(x - r[:, None], axis=-1).max(axis=-1) + 10 * _CONVERGED
+    return _farthest(x, carts, r) + 10 * _CONVERGED
+
+
+def _farthest(corners: np.ndarray, carts: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Largest distance of corners (N, 8, 3) from the tool; infinite where one is missing although the tool is in reach."""
+    distance = np.linalg.norm(corners - r[:, None], axis=-1).max(axis=-1)
+    return np.where(np.isnan(distance) & np.isfinite(carts).all(axis=(1, 2)), np.inf, distance)
 
 
 def _meet(centres: np.ndarray, lengths: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Where spheres of these centres (..., 3, 3) and radii (..., 3) meet next to `near`, (..., 3), by Newton steps."""
+    """Where spheres of these centres (..., 3, 3) and radii (..., 3) meet next to `near`, (..., 3), by Newton steps.
+
+    NaN where they do not meet.
+    """
     x = near
-    for _ in range(_PASSES):
-        gap = x[..., None, :] - centres
-        step = _solve(2 * gap, lengths**2 - (gap**2).sum(-1))
-        x = x + step
-        if np.abs(step).max(initial=0.0, where=np.isfinite(step)) < _CONVERGED:
-            break
-    return x
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_PASSES):
+            gap = x[..., None, :] - centres
+            step = _solve(2 * gap, lengths**2 - (gap**2).sum(-1))
+            x = x + step
+            if np.abs(step).max(initial=0.0, where=np.isfinite(step)) < _CONVERGED:
+                break
+        met = (np.abs(np.linalg.norm(x[..., None, :] - centres, axis=-1) - lengths) < _MET).all(axis=-1)
+    return np.where(met[..., None], x, np.nan)
 
 
 def _solve(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -207,5 +220,5 @@ def _solve(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
     one, two, three = rows[..., 0, :], rows[..., 1, :], rows[..., 2, :]
     first, second, third = np.cross(two, three), np.cross(three, one), np.cross(one, two)
     total = right[..., :1] * first + right[..., 1:2] * second + right[..., 2:] * third
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return total / (one * first).sum(-1, keepdims=True)

@@ -25,7 +25,7 @@ class Obstacle(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Box:
     """A box between two corners, low and high, (3,) in m; R (3, 3) turns it about its centre."""
 
@@ -53,7 +53,7 @@ class Box:
         return np.sqrt((outside**2).sum(-1)) + np.minimum(beyond.max(-1), 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cylinder:
     """A cylinder with flat ends: its axis from start to end, (3,) in m, and its radius in m."""
 
@@ -80,7 +80,7 @@ class Cylinder:
         return np.sqrt((outside**2).sum(0)) + np.minimum(beyond.max(0), 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Capsule:
     """All points within a radius of the segment from start to end, (3,) in m; a sphere where these are the same."""
 

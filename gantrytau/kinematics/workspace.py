@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _MOST = 20_000_000  # places, whose results fill a few GB
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Workspace:
     """Places of the tool on a grid, x, y, z: the middles of its cells in m; box: (3, 2) in m, which the cells fill.
 

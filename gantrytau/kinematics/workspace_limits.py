@@ -20,7 +20,7 @@ REASONS = ("inside", "out of reach", "stroke", "ball joint", "collision")
 _BLOCK = 1024  # poses, whose links and their distances stay in the cache
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Limits:
     """What a robot may do. Lengths in m, angles in rad; what is not said is not limited.
 
@@ -71,7 +71,7 @@ class Limits:
                 raise ModelError(f"Limits.plate: found {body!r}, expected Capsule in plate axes")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Examined:
     """N poses and what each leaves of the limits, less the margins for safety; negative where a limit is broken.
 

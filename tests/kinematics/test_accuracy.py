@@ -18,14 +18,13 @@ CASE_1 = np.repeat([[32e-6], [77e-6], [54e-6]], 3, axis=1)
 CASE_2 = np.array([[11e-6, 28e-6, 28e-6], [58e-6, 38e-6, 38e-6], [19e-6, 47e-6, 47e-6]])
 
 
-def orthogonal() -> GantryTau:
-    """A robot whose links are along x, y and z when its tool is in the origin; guideways are oblique."""
-    robot = MODEL
+def with_links_along(axes: np.ndarray) -> GantryTau:
+    """A robot whose carts are 2 m from the tool along these unit vectors when that is in the origin; guideways oblique."""
     arms = []
-    for axis in np.eye(3):
+    for axis in axes:
         direction = -axis + 0.3 * np.roll(axis, 1)
         arms.append(dict(length=2.0, offset=list(2.0 * axis - 0.7 * direction), direction=list(direction)))
-    return robot.modified(dict(arms=arms, tool=dict(r=Start([0.0, 0.0, 0.0]))))
+    return MODEL.modified(dict(arms=arms, tool=dict(r=Start([0.0, 0.0, 0.0]))))
 
 
 def slice_between_guideways(x: float = 0.0, points: int = 31) -> np.ndarray:
@@ -57,7 +56,7 @@ def test_the_largest_errors_are_where_the_thesis_has_them():
 
 
 def test_orthogonal_links_make_a_box():
-    found = accuracy(orthogonal(), [0.0, 0.0, 0.0], CASE_1)
+    found = accuracy(with_links_along(np.eye(3)), [0.0, 0.0, 0.0], CASE_1)
     r = CASE_1[:, 0]
     assert found.error == pytest.approx(np.linalg.norm(r), rel=1e-4)  # sqrt(r1^2 + r2^2 + r3^2) = 99.3 um
     assert found.error == pytest.approx(99.3e-6, abs=0.1e-6)
@@ -124,6 +123,23 @@ def test_poses_out_of_reach_are_nan_and_do_not_disturb_others():
         assert np.isnan(getattr(found, name)[1]).all()
         assert getattr(found, name)[0] == pytest.approx(getattr(alone, name)[0], rel=1e-12)
     assert np.isnan(accuracy(D1, r[1], CASE_2).error).all()
+
+
+def test_links_in_one_plane_leave_the_error_without_bound():
+    third = np.array([1.0, 1.0, 1e-3])
+    robot = Kinematics(with_links_along(np.array([[1.0, 0, 0], [0, 1.0, 0], third / np.linalg.norm(third)])))
+    found = accuracy(robot, [0.0, 0.0, 0.0], CASE_1)
+    assert np.isinf(found.error).all()
+    assert np.isinf(found.bound).all()
+    assert np.isnan(found.corners).any()
+    small = accuracy(robot, [0.0, 0.0, 0.0], 1e-5 * CASE_1)  # errors that do not pull the links apart
+    assert small.error == pytest.approx(small.bound, rel=0.01)
+
+
+def test_the_bound_holds_for_errors_of_decimetres():
+    found = accuracy(D1, slice_between_guideways(points=6), 2500 * CASE_2)
+    sampled = np.linalg.norm(found.sampled(2000, seed=5), axis=-1).max(axis=1)
+    assert (sampled < found.bound).all()
 
 
 def test_no_errors_move_nothing():
