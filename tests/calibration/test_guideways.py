@@ -243,6 +243,7 @@ def test_nan_outliers_and_scale_are_found_with_their_rows():
         ),
         (lambda q, p: linearity(q, p, intervals=0), ModelError, "found intervals=0"),
         (lambda q, p: linearity(q, p, rising=np.full(400, 2)), ModelError, "found rising of another length"),
+        (lambda q, p: linearity(q, p, rising=np.ones(401)), ModelError, "found rising of another length"),
         (
             lambda q, p: linearity(q[:5], p[:5]),
             CalibrationError,

@@ -34,7 +34,7 @@ def draw_errors(found: "Linearity", file: str | os.PathLike[str] | None) -> "Fig
 
 
 def draw_backlash(found: "Linearity", file: str | os.PathLike[str] | None) -> "Figure":
-    """Errors along the axis, in two colours for the two directions of motion."""
+    """Errors along the axis, in two colours for the two directions of motion, with the fit but for its waves."""
     if found.backlash is None:
         raise ModelError(
             "plot_backlash: found points from one direction of motion only, expected both; measure forth and back"
@@ -43,7 +43,11 @@ def draw_backlash(found: "Linearity", file: str | os.PathLike[str] | None) -> "F
     for side, name in ((1, "with rising q"), (-1, "with falling q")):
         rows = np.flatnonzero(found.rising == side)
         rows = rows[np.argsort(found.q[rows])]
-        axis.plot(found.q[rows], MICRO * found.along[rows], ".-", markersize=4, linewidth=0.6, label=name)
+        (line,) = axis.plot(
+            found.q[rows], MICRO * found.along[rows], ".-", markersize=3, linewidth=0.4, label=name
+        )
+        smooth = found.profile(found.q[rows])[0][:, 0] - side * found.backlash / 2
+        axis.plot(found.q[rows], MICRO * smooth, color=line.get_color(), linewidth=1.5)
     axis.set_title(f"backlash {MICRO * found.backlash:.1f} ± {MICRO * (found.backlash_error or 0.0):.1f} µm")
     axis.set_xlabel("position of the cart [m]")
     axis.set_ylabel("error along the axis [µm]")

@@ -89,11 +89,11 @@ def checked(
     return q[rows], points[rows], rows, findings
 
 
-def approach(q: Array, rising: Any, rows: Array) -> Array:
+def approach(q: Array, rising: Any, rows: Array, given: int) -> Array:
     """The direction from which the cart came to each point, 1 or -1; the first counts as the second."""
     if rising is not None:
         found = np.asarray(rising, dtype=float)
-        if found.ndim != 1 or found.size <= rows.max() or not np.all(np.isin(found, (-1.0, 0.0, 1.0))):
+        if found.shape != (given,) or not np.all(np.isin(found, (-1.0, 0.0, 1.0))):
             raise ModelError(
                 "linearity: found rising of another length than q, or with values other than 1, -1 and 0 (unknown); "
                 "expected one for each row"

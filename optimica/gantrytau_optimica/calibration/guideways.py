@@ -186,8 +186,9 @@ def linearity(
     loss: "linear" fits all points, "robust" leaves out those that do not fit the others; both tell which they are.
     Raises ModelError for other shapes, CalibrationError (`.rows`) for data that do not hold what is asked.
     """
+    given = np.size(q)
     q, points, rows, findings = checked(q, points, pitch, harmonics, loss)
-    rising = approach(q, rising, rows)
+    rising = approach(q, rising, rows, given)
     design = np.column_stack([np.ones(len(q)), q])
     (start, direction), *_ = np.linalg.lstsq(design, points, rcond=None)
     findings += scale_findings(float(np.linalg.norm(direction)), rows)

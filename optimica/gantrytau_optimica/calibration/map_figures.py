@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gantrytau_optimica.calibration.error_maps import ErrorMap
     from gantrytau_optimica.calibration.orientation_errors import Causes, OrientationErrors
 
-ARROW = 0.1  # the longest arrow by the width of what is drawn
+ARROW = 0.15  # the longest arrow by the width of what is drawn
 MOST_LAYERS = 12
 
 
@@ -45,7 +45,7 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
         raise ModelError(f"plot: found layers={layers!r}, expected 1 to {MOST_LAYERS}")
     first, second = ("xyz".index(a) for a in axes)
     third = 3 - first - second
-    figure, panels = panels_of(1, file, layers, sharey=True)
+    figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.2 + 3.8 * layers, 4.2))
     borders = np.linspace(found.r[:, third].min(), found.r[:, third].max(), layers + 1)
     layer = np.clip(np.searchsorted(borders, found.r[:, third], side="right") - 1, 0, layers - 1)
     width = max(np.ptp(found.r[:, first]), np.ptp(found.r[:, second]), 1e-9)
@@ -55,7 +55,7 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
         rows = layer == k
         arrows = axis.quiver(
             found.r[rows, first], found.r[rows, second], found.errors[rows, first], found.errors[rows, second],
-            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.004,
+            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.008,
             clim=(0.0, MICRO * found.size.max()),
         )  # fmt: skip
         drawn.append(arrows)
