@@ -1,0 +1,267 @@
+"""Which poses to measure, and how good the calibrated robot will be, before anything is measured.
+
+    A_i = (noise / tape)^2 I + sum_k J_ik' J_ik       information of the poses on arm i, scaled as in `arm_fit`
+    D-optimal: sum_i log det A_i is largest; poses are exchanged as long as that grows (Fedorov, 1972)
+    tool: sum_i tr (W_i A_i^-1) is least, W_i = mean of G_i'G_i with G_i = dx/dp_i, the expected error of the tool itself
+    condition (5.9): C_k = cond(J without pose k), poses with the least C_k are left out, a few at a time
+
+The first term is what is known from a tape measure; it keeps directions that no pose determines out of the choice.
+`predict` propagates noise of the device and the tape measure through the fit to the tool: dx = -(de/dx)^-1 (de/dp) dp.
+Dressler (2012), section 5.4, which applies (5.9) once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from gantrytau import Model, ModelError
+from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, checked_poses, scales
+from gantrytau_optimica.calibration.arm_poses import pose_rows, tool_gain
+from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
+from gantrytau_optimica.calibration.identifiability import NOTHING, Poses, deviations, measured_poses
+
+Method = Literal["d-optimal", "tool", "condition", "random"]
+METHODS = ("d-optimal", "tool", "condition", "random")
+PASS = 0.1  # of the poses that are too many, left out before (5.9) is evaluated anew
+EXCHANGES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """The error of the tool that is to be expected after a calibration, at poses.
+
+    position: standard deviation of its distance from where the robot believes it to be, (N,) in m; angle: the same of its
+    orientation, (N,) in rad, zero where it cannot turn; covariance: of the pose, (N, 6, 6) or (N, 3, 3).
+    """
+
+    position: np.ndarray
+    angle: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def error(self) -> float:
+        """Mean of `position`, m."""
+        return float(self.position.mean())
+
+
+def select_poses(
+    robot: Model,
+    measurements: Any,
+    n: int,
+    *,
+    method: Method = "d-optimal",
+    seed: int = 0,
+    orientation: Orientation = "local",
+) -> np.ndarray:
+    """The rows of n poses to measure, ascending, (n,).
+
+    measurements: candidates, a record with q, r and R, or a tuple of them; rows that are not finite are not chosen;
+    method: "d-optimal", "tool" for the least error of its position over the candidates, "condition" for (5.9), or
+    "random"; seed: of the poses that exchange begins with.
+    Raises ModelError for another method, robot or number, and for arrays that do not fit.
+    """
+    if method not in METHODS:
+        raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
+    arms, poses, rows = _candidates(robot, measurements, orientation)
+    if not 0 < n <= len(rows):
+        raise ModelError(
+            f"n: found {n}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
+        )
+    start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
+    if method != "random":
+        blocks, weights = _blocks(arms, poses)
+        if method == "condition":
+            start = _well_conditioned(blocks, n)
+        else:
+            start = _exchanged(blocks, start, weights if method == "tool" else [None] * len(blocks))
+    return np.sort(rows[start])
+
+
+def predict(
+    robot: Model,
+    measurements: Any,
+    rows: Sequence[int] | np.ndarray | None = None,
+    *,
+    at: Any = None,
+    noise: float = NOISE,
+    angle: float = 0.0,
+    tape: float = TAPE,
+    orientation: Orientation = "local",
+) -> Prediction:
+    """The error of the tool to be expected after calibration by some of the candidates.
+
+    measurements: candidates, as for `select_poses`, rows: those that are measured, all if None; at: the poses to predict
+    for, candidates if None; noise, angle: standard deviations of the measured pose per axis, in m and rad; tape: of
+    nominal parameters, in m at the joints.
+    Raises ModelError for another robot or arrays that do not fit, SolveError at a singular pose.
+    """
+    arms, poses, finite = _candidates(robot, measurements, orientation)
+    if rows is not None and not np.isin(rows, finite).all():
+        raise ModelError(
+            "rows: found some that the candidates do not have with finite numbers, expected rows of them"
+        )
+    chosen = poses if rows is None else _rows_of(poses, np.searchsorted(finite, rows))
+    there = poses if at is None else _candidates(robot, at, orientation)[1]
+    covariance = _parameter_covariance(arms, chosen, (noise, angle), tape)
+    gains = np.concatenate([gain for gain, _ in tool_gain(arms, *there)], axis=2)
+    found = gains @ covariance @ np.swapaxes(gains, 1, 2)
+    variances = np.diagonal(found, axis1=1, axis2=2)
+    return Prediction(np.sqrt(variances[:, :3].sum(axis=1)), np.sqrt(variances[:, 3:].sum(axis=1)), found)
+
+
+def enough_poses(
+    robot: Model,
+    measurements: Any,
+    error: float,
+    *,
+    noise: float = NOISE,
+    angle: float = 0.0,
+    tape: float = TAPE,
+    seed: int = 0,
+) -> np.ndarray:
+    """The rows of the fewest D-optimal poses, within one in twenty, that leave the tool an expected mean error of `error`.
+
+    measurements: candidates, as for `select_poses`; error: in m, over the candidates; noise, angle, tape: as for `predict`.
+    Raises ModelError where even all of the candidates are not enough.
+    """
+    arms, poses, finite = _candidates(robot, measurements, "local")
+    blocks, _ = _blocks(arms, poses)
+
+    def expected(chosen: np.ndarray) -> float:
+        rows = finite[chosen]
+        return predict(robot, measurements, rows, noise=noise, angle=angle, tape=tape).error
+
+    everything = np.arange(len(finite))
+    if (least := expected(everything)) > error:
+        raise ModelError(
+            f"error: all {len(finite)} candidates leave {least:.3g} m, expected no more than {error:.3g} m; offer more "
+            "or other poses, or a better device"
+        )
+    few, many, chosen = 0, len(finite), everything
+    while many - few > max(1, many // 20):
+        n = (few + many) // 2
+        start = np.random.default_rng(seed).choice(len(finite), n, replace=False)
+        rows = _exchanged(blocks, start, [None] * len(blocks))
+        if expected(rows) > error:
+            few = n
+        else:
+            many, chosen = n, rows
+    return np.sort(finite[chosen])
+
+
+def _candidates(
+    robot: Model, measurements: Any, orientation: Orientation
+) -> tuple[tuple[Arm, ...], Poses, np.ndarray]:
+    """The arms, the candidates whose numbers are finite, and their rows."""
+    arms, found = read_arms(robot, orientation), measured_poses(measurements)
+    finite = np.isfinite(found.q).all(axis=-1) & np.isfinite(found.r).all(axis=-1)
+    if found.R is not None:
+        finite &= np.isfinite(found.R).all(axis=(-2, -1))
+    rows = np.flatnonzero(finite)
+    poses = _rows_of(found, rows)
+    return arms, Poses(*[checked_poses(arm, *poses) for arm in arms][-1]), rows
+
+
+def _rows_of(poses: Poses, rows: np.ndarray) -> Poses:
+    return Poses(poses.q[rows], poses.r[rows], None if poses.R is None else np.asarray(poses.R)[rows])
+
+
+def _blocks(arms: Sequence[Arm], poses: Poses) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """J S of each arm, (N, m, rank), and W, (rank, rank), in the directions that all candidates together determine."""
+    blocks, weights = [], []
+    for arm, (gain, J) in zip(arms, tool_gain(arms, *poses), strict=True):
+        J, gain = J * scales(arm), gain[:, :3] * scales(arm)
+        _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, arm.count), mode="r"), full_matrices=False)
+        V = V[s > NOTHING * s[0]]
+        rows = (gain @ V.T).reshape(-1, len(V))
+        blocks.append(J @ V.T)
+        weights.append(rows.T @ rows / len(J))
+    return blocks, weights
+
+
+def _exchanged(
+    blocks: Sequence[np.ndarray], chosen: np.ndarray, weights: Sequence[np.ndarray | None]
+) -> np.ndarray:
+    """Exchange poses, the best one outside for the least one inside, as long as the criterion grows."""
+    inside = np.zeros(len(blocks[0]), dtype=bool)
+    inside[chosen] = True
+    for _ in range(EXCHANGES if not inside.all() else 0):
+        before = np.flatnonzero(inside)
+        gain = _growths(blocks, before, np.arange(len(inside)), 1.0, weights)
+        new = int(np.argmax(np.where(inside, -np.inf, gain)))
+        after = np.append(before, new)
+        change = _growths(blocks, after, after, -1.0, weights)  # negative, of what is lost
+        old = int(np.argmax(change))
+        if after[old] == new or change[old] + gain[new] < 1e-9 * np.abs(gain[new]):  # rounding
+            break
+        inside[new], inside[after[old]] = True, False
+    return np.flatnonzero(inside)
+
+
+def _growths(
+    blocks: Sequence[np.ndarray],
+    inside: np.ndarray,
+    asked: np.ndarray,
+    sign: float,
+    weights: Sequence[np.ndarray | None],
+) -> np.ndarray:
+    """How the criterion of the poses inside grows when each of those asked for comes (+1) or goes (-1)."""
+    total = np.zeros(len(asked))
+    for J, W in zip(blocks, weights, strict=True):
+        rows = J[inside].reshape(-1, J.shape[2])
+        total += _growth(J[asked], rows.T @ rows + (NOISE / TAPE) ** 2 * np.eye(J.shape[2]), sign, W)
+    return total
+
+
+def _growth(J: np.ndarray, A: np.ndarray, sign: float, W: np.ndarray | None) -> np.ndarray:
+    """What J_k'J_k more or less brings each, (N,): log det (A +- J_k'J_k) - log det A, or by W as said above.
+
+    By Woodbury's identity, with matrices as large as there are links; A keeps its first term, so none of them is singular.
+    """
+    half = np.linalg.solve(A, J.reshape(-1, J.shape[2]).T).T.reshape(J.shape)
+    small = np.eye(J.shape[1]) + sign * half @ np.swapaxes(J, 1, 2)
+    if W is None:
+        return np.log(np.maximum(np.linalg.det(small), 1e-300))
+    return sign * np.trace(np.linalg.solve(small, half @ W @ np.swapaxes(half, 1, 2)), axis1=1, axis2=2)
+
+
+def _well_conditioned(blocks: Sequence[np.ndarray], n: int) -> np.ndarray:
+    """What is left when poses with the least (5.9), a product over the arms, are left out again and again."""
+    left = np.arange(len(blocks[0]))
+    while len(left) > n:
+        criterion = np.zeros(len(left))
+        for J in blocks:
+            squares = np.swapaxes(J[left], 1, 2) @ J[left]
+            values = np.linalg.eigvalsh(squares.sum(axis=0) - squares)
+            floor = 1e-15 * values[:, -1]  # rounding: such a set no longer determines all parameters
+            criterion += np.log(values[:, -1] / np.maximum(values[:, 0], floor)) / 2
+        leave = max(1, int(PASS * (len(left) - n)))
+        left = np.sort(left[np.argsort(criterion, kind="stable")[leave:]])
+    return left
+
+
+def _parameter_covariance(
+    arms: Sequence[Arm], poses: Poses, noise: tuple[float, float], tape: float
+) -> np.ndarray:
+    """Covariance of all unknowns after a fit, arms one after another, (p, p).
+
+    A pose is measured with one error for all of its links, which correlates what is identified for different arms.
+    """
+    least, halves, remains = noise[0] / tape, [], []
+    for arm in arms:
+        scale = scales(arm)
+        J = arm.closure(*poses)[1] * scale
+        rows = J.reshape(-1, arm.count)
+        inverse = np.linalg.inv(rows.T @ rows + least**2 * np.eye(arm.count)) * scale[:, None]
+        slopes = pose_rows([arm], *poses) * deviations(noise, poses.R)
+        halves.append(inverse @ np.einsum("nmp,nmc->pnc", J, slopes).reshape(arm.count, -1))
+        remains.append(least * noise[0] * inverse)  # of the tape measure's error
+    found, start = np.concatenate(halves), 0
+    covariance = found @ found.T
+    for remain in remains:
+        part = slice(start, start + len(remain))
+        covariance[part, part] += remain @ remain.T
+        start += len(remain)
+    return covariance
