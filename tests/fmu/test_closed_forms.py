@@ -6,7 +6,7 @@ Nothing in the rates tells: (-L, 0) is an equilibrium of the equations in y. The
 import numpy as np
 import pytest
 
-from gantrytau import simulate, translate
+from gantrytau import Fixed, Model, Parameter, Real, der, if_else, simulate, sin, translate
 from gantrytau_models import GantryTau, Pendulum, prototypes
 from tests.fmu.exported import export
 from tests.fmu.raw_calls import OK
@@ -104,3 +104,25 @@ def test_a_start_at_which_the_equations_divide_by_zero_is_refused_and_a_milliont
         run.begin(**{"crank.phi": angle + 1e-6})
         # 1e-16 in what is divided by 1e-6
         assert run["der(crank.w)"] == pytest.approx(float(np.ravel(truth["der(crank.w)"])[0]), rel=1e-8)
+
+
+class Guarded(Model):
+    """A division that the model guards itself, and one by a parameter that changes by decades."""
+
+    m = Parameter(2e9, description="divides")
+    v = Real(start=1.0, fixed=True, description="state")
+    y = Real(description="sin(v) / v")
+
+    def equations(self):
+        yield self.y == if_else(self.v**2 > 1e-12, sin(self.v) / self.v, 1.0)
+        yield der(self.v) == 1.0 / self.m - 0.1 * self.y
+
+
+@pytest.mark.parametrize("changes", [{"v": 0.0}, {"m": 1.0}, {"v": 0.0, "m": 1e-3}])
+def test_divisors_that_are_small_and_do_no_harm_raise_no_alarm(tmp_path, changes):
+    modified = {name: Fixed(value) if name == "v" else value for name, value in changes.items()}
+    truth = simulate(Guarded(**modified), stop=0.1, points=2, tolerance=1e-10)
+    with export(Guarded(), tmp_path / "guarded.fmu").new() as run:
+        run.begin(**changes)
+        run.step(0.1)
+        assert run["v"] == pytest.approx(truth["v"][-1], rel=1e-5)

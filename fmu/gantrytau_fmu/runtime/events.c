@@ -101,19 +101,20 @@ static gt_status gt_friction_events(gt_instance *it, int *changed) {
 /* How far locked frictions are from breaking away, and its rates. */
 typedef struct { double forces[GT_ROOM(GT_MODES)], rates[GT_ROOM(GT_MODES)]; } gt_spare;
 
-/* At the present point; the rates are a difference over a millionth of `span`. */
+/* At the present point; the rates are a difference within `span`. */
 static gt_status gt_find_spare(gt_instance *it, double span, gt_spare *found) {
     double slopes[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_MODES)];
     gt_status status = gt_get_indicators(it, found->forces);
     const gt_state kept = it->now;
+    const double delta = gt_small_time(kept.time, span);
     int i;
     if (status == GT_OK) status = gt_get_rates(it, slopes);
     if (status != GT_OK) return status;
-    for (i = 0; i < GT_STATES; i++) it->now.x[i] += 1e-6 * span * slopes[i];
-    it->now.time += 1e-6 * span;
+    for (i = 0; i < GT_STATES; i++) it->now.x[i] += delta * slopes[i];
+    it->now.time += delta;
     it->now.stale = 1;
     status = gt_get_indicators(it, moved);
-    for (i = 0; i < GT_MODES && status == GT_OK; i++) found->rates[i] = (moved[i] - found->forces[i]) / (it->now.time - kept.time);
+    for (i = 0; i < GT_MODES && status == GT_OK; i++) found->rates[i] = (moved[i] - found->forces[i]) / delta;
     it->now = kept;
     it->outputs_stale = it->factors_stale = 1;
     gt_point_at(it, &it->now.time, it->now.x);

@@ -1,6 +1,7 @@
 /* Initialisation: the states that initial equations determine, modes, first samples. */
 
 #define GT_INITIAL_ITERATIONS 30
+#define GT_SMOOTH 3e-5
 #define GT_SMALL_PIVOT 1e-9 /* of its usual size: below, seven digits and more of what is divided by it are lost */
 
 /* The arguments have been checked. */
@@ -60,6 +61,26 @@ static gt_status gt_initial_equations(gt_instance *it) {
                   "inputs and parameters", GT_NAME, gt_x_names[gt_initial_states[0]], GT_INITIAL > 1 ? " and others" : "", it->now.time);
 }
 
+/* Whether the rates are about the same a millionth beside the present states. */
+static int gt_is_smooth(gt_instance *it) {
+    const gt_state kept = it->now;
+    double here[GT_ROOM(GT_STATES)], beside[GT_ROOM(GT_STATES)], largest = 0, apart = 0;
+    int i, found;
+    gt_rates(it->a, here, it->w);
+    for (i = 0; i < GT_STATES; i++) it->now.x[i] += 1e-6 * (1 + fabs(kept.x[i]));
+    it->now.stale = 1;
+    found = gt_refresh(it) == GT_OK;
+    if (found) gt_rates(it->a, beside, it->w);
+    it->now = kept;
+    it->outputs_stale = it->factors_stale = 1;
+    gt_point_at(it, &it->now.time, it->now.x);
+    for (i = 0; i < GT_STATES && found; i++) {
+        largest = fmax(largest, fmax(fabs(here[i]), fabs(beside[i])));
+        apart = fabs(here[i] - beside[i]) <= apart ? apart : fabs(here[i] - beside[i]); /* NaN stays */
+    }
+    return found && apart <= GT_SMOOTH * (1 + largest);
+}
+
 /* Equations solved for their unknowns divide by pivots, which were chosen at the start of the export. */
 static gt_status gt_check_pivots(gt_instance *it) {
     const double *const there[3] = {it->a[1], it->a[2], it->a[3]};
@@ -73,7 +94,7 @@ static gt_status gt_check_pivots(gt_instance *it) {
     gt_pivots(it->a, usual, it->w);
     memcpy(it->a + 1, there, sizeof there);
     for (i = 0; i < GT_PIVOTS; i++)
-        if (fabs(found[i]) < GT_SMALL_PIVOT * fabs(usual[i]))
+        if (fabs(found[i]) < GT_SMALL_PIVOT * fabs(usual[i]) && !gt_is_smooth(it))
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at this start the equations would divide by zero because of %s; they are arranged "
                           "for the start of the export: start a millionth away, or export the model with this start", GT_NAME,
                           gt_pivot_names[i]);
@@ -90,7 +111,7 @@ static gt_status gt_initialize(gt_instance *it) {
     it->now.initialized = 1;
     gt_keep_point(it);
     memset(it->now.side_rates, 0, sizeof it->now.side_rates);
-    if (GT_ROOTS && !it->cosimulation) gt_root_rates(it, 1e-3, it->now.root_rates);
+    if (GT_ROOTS && !it->cosimulation) gt_root_rates(it, 1e-3, it->now.kept_rates, it->now.root_rates);
     memset(it->now.ticks, 0, sizeof it->now.ticks);
     status = gt_check_clocks(it);
     if (status == GT_OK) status = gt_begin_modes(it);

@@ -26,7 +26,7 @@ typedef struct {
     double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
     /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
-    double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)]; /* there, in Model Exchange */
+    double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)], kept_rates[GT_ROOM(GT_STATES)]; /* there, in Model Exchange */
     double first_held[GT_ROOM(GT_HELD_COUNT)]; /* held variables before the first samples */
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
@@ -79,6 +79,11 @@ static gt_status gt_initial_equations(gt_instance *it);
 static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
 static int gt_other_side(const gt_instance *it);
+
+/* A time for differences: short within `span`, but one that numbers of the size of `time` can tell. */
+static double gt_small_time(double time, double span) {
+    return fmax(1e-6 * span, fmin(1e-2 * span, 1e-9 * fabs(time)));
+}
 
 /* Where the functions of the model find their arguments; the order is that of ARRAYS in code/model_code.py. */
 static void gt_point_at(gt_instance *it, const double *time, const double *x) {

@@ -63,15 +63,6 @@ static double gt_regularity(int n, const double *a, const double *scales) {
     return pivot * least / most;
 }
 
-/* Determinant, of rows relative to the largest; sign: what gt_factor returned. */
-static double gt_determinant(int n, const double *a, const double *scales, int sign) {
-    double product = sign, least = INFINITY;
-    int i;
-    for (i = 0; i < n; i++) least = fmin(least, scales[i]);
-    for (i = 0; i < n; i++) product *= fabs(a[i + i * n]) * least / scales[i];
-    return product;
-}
-
 /* Solve with the factors: b (n) becomes the solution. */
 static void gt_solve_factored(int n, const double *a, const int *pivots, const double *scales, double *b) {
     int i, k;

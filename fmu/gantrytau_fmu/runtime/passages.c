@@ -7,11 +7,13 @@
 #define GT_STRIDE (1. / 32)        /* of the way of a step that is looked at again */
 #define GT_SHORTEST_STRIDE 1e-5    /* rounding moves solutions next to a singular pose by its root */
 #define GT_CLOSE 1e-4              /* determinants that are so much smaller than at the ends of the way are zero */
-#define GT_POINTED 0.02            /* relative: how exactly root and rate tell the instant of a passage */
+#define GT_POINTED 0.1             /* relative: how exactly root and rate tell the instant of a passage, and how low it is there */
+#define GT_TOO_CLOSE 3e-5          /* of its largest size: no motion is followed there */
 #define GT_APART 1e-6              /* relative: solutions that differ more are not the same */
 
+/* Linear blocks are those of speeds, accelerations and forces; what makes them singular does so to positions. */
 static int gt_is_watched(int i) {
-    return i >= GT_BLOCKS || !gt_blocks[i].frictions;
+    return i >= GT_BLOCKS || !(gt_blocks[i].frictions || gt_blocks[i].linear);
 }
 
 static gt_status gt_side_fails(gt_instance *it, int i, const char *why) {
@@ -48,11 +50,11 @@ static int gt_turned(const gt_instance *it) {
     return gt_turns(it->now.kept_sides, it->now.side_rates, it->now.time - it->now.kept_time);
 }
 
-/* A closed form that is so close to its end that rounding, which a root magnifies, would hide where the motion goes; or -1. */
-static int gt_close_root(const gt_instance *it) {
+/* What is so close to singular that errors, which a root magnifies, would hide where the motion goes; or -1. */
+static int gt_close(const gt_instance *it) {
     int i;
-    for (i = GT_BLOCKS; i < GT_SIDES; i++)
-        if (fabs(it->now.sides[i]) < GT_CLOSE * it->now.largest_sides[i]) return i;
+    for (i = 0; i < GT_SIDES; i++)
+        if (gt_is_watched(i) && fabs(it->now.sides[i]) < GT_TOO_CLOSE * it->now.largest_sides[i]) return i;
     return -1;
 }
 
@@ -150,35 +152,54 @@ static int gt_crosses(gt_instance *it) {
     return passed;
 }
 
-/* The rates of the measures of closed forms along the motion, by a difference. */
-static void gt_root_rates(gt_instance *it, double span, double *rates) {
+/* Rates of states, and of the measures of closed forms along the motion, by a difference. */
+static void gt_root_rates(gt_instance *it, double span, double *slopes, double *rates) {
     const double *const there[2] = {it->a[0], it->a[1]};
-    double slopes[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_ROOTS)], time = it->now.time + 1e-6 * span;
+    const double delta = gt_small_time(it->now.time, span);
+    double x[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_ROOTS)], time = it->now.time + delta;
     int i;
     gt_rates(it->a, slopes, it->w);
-    for (i = 0; i < GT_STATES; i++) x[i] = it->now.x[i] + 1e-6 * span * slopes[i];
+    for (i = 0; i < GT_STATES; i++) x[i] = it->now.x[i] + delta * slopes[i];
     it->a[0] = &time;
     it->a[1] = x;
     gt_roots(it->a, moved, it->w);
     memcpy(it->a, there, sizeof there);
-    for (i = 0; i < GT_ROOTS; i++) rates[i] = (moved[i] - it->now.sides[GT_BLOCKS + i]) / (time - it->now.time);
+    for (i = 0; i < GT_ROOTS; i++) rates[i] = (moved[i] - it->now.sides[GT_BLOCKS + i]) / delta;
+}
+
+/* The roots at a share of the step that ends at the present point, where cubics lead from one end to the other. */
+static void gt_roots_between(gt_instance *it, double share, double span, const double *slopes, double *found) {
+    const double *const there[2] = {it->a[0], it->a[1]};
+    const double s = share, r = 1 - s;
+    double x[GT_ROOM(GT_STATES)], time = it->now.kept_time + share * span;
+    int i;
+    for (i = 0; i < GT_STATES; i++)
+        x[i] = r * r * (1 + 2 * s) * it->now.kept_x[i] + s * s * (1 + 2 * r) * it->now.x[i] +
+               span * s * r * (r * it->now.kept_rates[i] - s * slopes[i]);
+    it->a[0] = &time;
+    it->a[1] = x;
+    gt_roots(it->a, found, it->w);
+    memcpy(it->a, there, sizeof there);
 }
 
 /* A root that came down to zero and up again, as if mirrored there, on the step that ends at the present point; or -1.
- * At both ends root and rate point to the same instant, which a root that turns before zero does not do. */
+ * At both ends root and rate point to the same instant, and there it is low, or there is none. */
 static int gt_mirrored(gt_instance *it) {
     const double span = it->now.time - it->now.kept_time;
-    double rates[GT_ROOM(GT_ROOTS)];
+    double slopes[GT_ROOM(GT_STATES)], rates[GT_ROOM(GT_ROOTS)], between[GT_ROOM(GT_ROOTS)];
     int i, found = -1;
     if (!(span > 0)) return -1;
     gt_watch(it);
-    gt_root_rates(it, span, rates);
+    gt_root_rates(it, span, slopes, rates);
     for (i = 0; i < GT_ROOTS; i++) {
         const double before = it->now.kept_sides[GT_BLOCKS + i], after = it->now.sides[GT_BLOCKS + i];
         const double down = it->now.root_rates[i], up = rates[i];
-        if (down < 0 && up > 0 && before / -down + after / up < span * (1 + GT_POINTED)) found = GT_BLOCKS + i;
-        it->now.root_rates[i] = rates[i];
+        if (!(down < 0 && up > 0 && fabs(before / -down + after / up - span) < GT_POINTED * span)) continue;
+        gt_roots_between(it, before / -down / span, span, slopes, between);
+        if (!(between[i] > GT_POINTED * fmax(before, after))) found = GT_BLOCKS + i;
     }
+    memcpy(it->now.root_rates, rates, sizeof rates);
+    memcpy(it->now.kept_rates, slopes, sizeof slopes);
     return found;
 }
 
@@ -192,6 +213,6 @@ static gt_status gt_completed(gt_instance *it) {
     if (GT_ROOTS && passed < 0 && !it->cosimulation) passed = gt_mirrored(it);
     if (passed >= 0) return gt_side_fails(it, passed, "have passed a singular pose");
     gt_keep_sides(it);
-    if (GT_ROOTS && (passed = gt_close_root(it)) >= 0) return gt_side_fails(it, passed, "become singular");
+    if (GT_SIDES && (passed = gt_close(it)) >= 0) return gt_side_fails(it, passed, "become singular");
     return GT_OK;
 }

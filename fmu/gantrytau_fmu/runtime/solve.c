@@ -71,8 +71,10 @@ static int gt_is_singular(const gt_instance *it, const gt_block *block) {
     return !block->linear && gt_regularity(block->count, it->matrices + block->matrix, it->scales + block->first) < GT_SINGULAR;
 }
 
-static double gt_block_determinant(const gt_instance *it, const gt_block *block, int sign) {
-    return gt_determinant(block->count, it->matrices + block->matrix, it->scales + block->first, sign);
+/* A measure with the sign of the determinant that goes to zero as the block becomes singular. A determinant of many
+ * rows changes by decades where nothing happens. */
+static double gt_measure(const gt_instance *it, const gt_block *block, int sign) {
+    return sign * gt_regularity(block->count, it->matrices + block->matrix, it->scales + block->first);
 }
 
 /* GT_DISCARD: not found, told nowhere if quiet. direct: give up where the first step is far. */
@@ -99,7 +101,7 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
                 gt_direction(it, block, residual, step);
                 for (i = 0; i < block->count; i++) z[i] += step[i];
             }
-            it->now.sides[number] = gt_block_determinant(it, block, side);
+            it->now.sides[number] = gt_measure(it, block, side);
             return GT_OK;
         }
         before = gt_norm(block->count, residual);
@@ -114,7 +116,7 @@ static gt_status gt_solve_block(gt_instance *it, int number, int quiet, int dire
             if (size > 1e-8 || gt_is_singular(it, block))
                 return gt_block_fails(it, block, quiet, "could not be solved");
             memcpy(z, old, block->count * sizeof(double));
-            it->now.sides[number] = gt_block_determinant(it, block, side);
+            it->now.sides[number] = gt_measure(it, block, side);
             return GT_OK;
         }
     }
