@@ -131,7 +131,7 @@ def test_the_f1_has_8_or_fewer_real_modes(q, count):
 def test_real_modes_of_the_f1_are_two_groups_of_four():
     # Dressler (2012), section 4.5: above and below the carts, as the three-link robot has two modes
     modes = assembly_modes(*f1_hexapod(np.zeros(6)))
-    height = modes.r[modes.real, 2].real
+    height = np.real(modes.r[modes.real, 2])
     carts = f1_hexapod(np.zeros(6))[0][:, 2].mean()
     assert sorted(modes.group[modes.real]) == [-1] * 4 + [1] * 4
     assert ((height > carts) == (modes.group[modes.real] > 0)).all()
