@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gantrytau import ModelError, SolveError
+from gantrytau import Array, Model, ModelError, Parameter, SolveError
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.arm_fit import TAPE, fit_arm, scales
 from gantrytau_optimica.calibration.arm_ipopt import fit_arm_with_ipopt
@@ -250,3 +250,24 @@ def test_arrays_that_do_not_fit_are_told(truth, data):
         fit_arm(truth[0], data.q, r, data.R)
     with pytest.raises(ModelError, match=r"arms\[0\]: there is no unknown 'x', expected one of"):
         fit_arm_with_ipopt(truth[0], *data, fixed=["x"])
+
+
+class Guideway(Model):
+    """What calibration reads of an arm with one link."""
+
+    length = Parameter(unit="m", description="length of the link")
+    offset = Parameter([0.0, 1.0, 0.0], unit="m", description="cart at s = 0")
+    direction = Parameter([1.0, 0.0, 0.0], unit="1", description="axis")
+
+
+class AlikeRobot(Model):
+    """Three arms of one length, which is a parameter of the robot."""
+
+    size = Parameter(2.1, unit="m", description="length of all links")
+    arms = Array(Guideway, 3, length=2 * size)
+
+
+def test_parameters_that_follow_from_others_are_read():
+    arms = read_arms(AlikeRobot())
+    assert [float(arm.values[f"{arm.name}.length"]) for arm in arms] == [4.2, 4.2, 4.2]
+    assert [arm.count for arm in arms] == [7, 7, 7]
