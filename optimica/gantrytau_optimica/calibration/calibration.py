@@ -154,14 +154,16 @@ class Calibration:
     @cached_property
     def error_vectors(self) -> np.ndarray:
         """Measured less predicted positions of the held-out poses, (N, 3) in m."""
-        return self.measurements.r[self.held_out] - self._predicted[0]
+        return self.measurements.r.take(self.held_out, axis=0) - self._predicted[0]
 
     @cached_property
     def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
         R, rows = self.measurements.R, self.held_out
-        near = self.measurements.r[rows]
+        near = self.measurements.r.take(rows, axis=0)
         six = self.chains.turns and R is not None
-        return self.chains.fk(self.measurements.q[rows], (near, R[rows]) if six and R is not None else near)
+        return self.chains.fk(
+            self.measurements.q.take(rows, axis=0), (near, R[rows]) if six and R is not None else near
+        )
 
     @cached_property
     def errors(self) -> np.ndarray:
@@ -190,9 +192,11 @@ class Calibration:
     def suspicious_rows(self, limit: float) -> np.ndarray:
         """Rows whose closure errors exceed `limit` robust standard deviations of a fit without them."""
         fits, bad = list(self.fits), np.zeros(0, dtype=int)
-        used = np.union1d(self.rows, self.held_out)
+        mask = np.zeros(len(self.measurements), dtype=bool)
+        mask[self.rows] = mask[self.held_out] = True
+        used = np.flatnonzero(mask)
         for _ in range(CLEANINGS):
-            found = used[relative_distances(fits, self.measurements, used, self.rows) > limit]
+            found = used[relative_distances(fits, self.measurements, used) > limit]
             if np.array_equal(found, bad):
                 break
             bad = found
@@ -218,17 +222,16 @@ def _mean(values: np.ndarray) -> np.float64:
     return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
 
 
-def relative_distances(
-    fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray, fitted: np.ndarray
-) -> np.ndarray:
+def relative_distances(fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray) -> np.ndarray:
     """The largest closure error of each of some rows in robust standard deviations of its link, (rows,)."""
-    q, r, R = measurements.q[rows], measurements.r[rows], measurements.R
+    q, r, R = measurements.q.take(rows, axis=0), measurements.r.take(rows, axis=0).T, measurements.R
+    q, r = np.ascontiguousarray(q.T), np.ascontiguousarray(r)
     worst = np.zeros(len(rows))
     for link in rod_links(fits, measurements.rails):
-        y = r - link.guideway.at(q[:, link.arm])
-        if R is not None:
-            y += R[rows] @ link.on_plate
-        miss = np.abs(np.sqrt(np.einsum("ij,ij->i", y, y)) - link.length)
+        y = r - link.guideway.across(q[link.arm])
+        if R is not None and link.on_plate.any():
+            y += (R[rows] @ link.on_plate).T
+        miss = np.abs(np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2) - link.length)
         worst = np.maximum(worst, miss / max(1.4826 * float(np.median(miss)), 1e-12))
     return worst
 

@@ -14,6 +14,8 @@ import numpy as np
 
 from gantrytau_optimica.calibration.rotations import left_jacobian, rotation
 
+BLOCK = 2000  # poses; their columns take 160 kB, or 500 kB where the plate turns
+ALL = slice(None)
 LENGTH, OFFSET, ALONG, PLATE = slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 10)
 
 
@@ -140,21 +142,22 @@ def _squares(length: float, A: np.ndarray, v: np.ndarray) -> np.ndarray:
     return found
 
 
-def columns(chain: Chain, centre_q: float, centre_r: np.ndarray) -> np.ndarray:
-    """F, (N, 10) or (N, 31)."""
-    q, r, R = chain.q - centre_q, chain.r - centre_r, chain.R
-    F = np.empty((len(q), 10 if R is None else 31))
-    F[:, 0] = 1.0
-    F[:, 1] = q
-    F[:, 2] = q * q
-    F[:, 3:6] = r
-    F[:, 6:9] = q[:, None] * r
+def columns(chain: Chain, centre_q: float, centre_r: np.ndarray, rows: slice = ALL) -> np.ndarray:
+    """F of some rows, (N, 10) or (N, 31)."""
+    q, r, R = chain.q[rows] - centre_q, chain.r[rows] - centre_r, chain.R
+    R = None if R is None else R[rows]
+    F = np.empty((10 if R is None else 31, len(q)))  # columns in rows, as LAPACK wants them
+    F[0] = 1.0
+    F[1] = q
+    F[2] = q * q
+    F[3:6] = r.T
+    np.multiply(q, F[3:6], out=F[6:9])
     if R is not None:
-        F[:, 9:12] = np.einsum("nji,nj->ni", R, r)
-        F[:, 12:21] = R.reshape(-1, 9)
-        F[:, 21:30] = q[:, None] * F[:, 12:21]
-    F[:, -1] = np.einsum("ij,ij->i", r, r)
-    return F
+        F[9:12] = np.einsum("nji,nj->in", R, r)
+        F[12:21] = R.reshape(-1, 9).T
+        np.multiply(q, F[12:21], out=F[21:30])
+    F[-1] = np.einsum("jn,jn->n", F[3:6], F[3:6])
+    return F.T
 
 
 def condense(chain: Chain, weights: np.ndarray | None = None) -> "Chain | Condensed | Weighted":
@@ -162,10 +165,7 @@ def condense(chain: Chain, weights: np.ndarray | None = None) -> "Chain | Conden
     if chain.points is not None or len(chain.q) < 31:
         return chain if weights is None else Weighted(chain, weights)
     centre_q, centre_r = float(chain.q.mean()), chain.r.mean(axis=0)
-    F = columns(chain, centre_q, centre_r)
-    if weights is not None:
-        F *= weights[:, None]
-    return Condensed(chain, triangle(F), centre_q, centre_r)
+    return Condensed(chain, triangle(chain, centre_q, centre_r, weights), centre_q, centre_r)
 
 
 @dataclass(frozen=True)
@@ -189,10 +189,13 @@ class Weighted:
         return self.weights[:, None] * self.chain.slopes(p)
 
 
-def triangle(F: np.ndarray) -> np.ndarray:
+def triangle(
+    chain: Chain, centre_q: float, centre_r: np.ndarray, weights: np.ndarray | None = None
+) -> np.ndarray:
     """The upper triangle U of F = Z U, in blocks that stay in the cache."""
-    width, block = F.shape[1], 2000
-    if len(F) <= 2 * block:
-        return np.asarray(np.linalg.qr(F, mode="r"))
-    parts = [np.asarray(np.linalg.qr(F[k : k + block], mode="r")) for k in range(0, len(F), block)]
-    return np.asarray(np.linalg.qr(np.concatenate(parts).reshape(-1, width), mode="r"))
+    parts = []
+    for first in range(0, len(chain.q), BLOCK):
+        rows = slice(first, first + BLOCK)
+        F = columns(chain, centre_q, centre_r, rows)
+        parts.append(np.asarray(np.linalg.qr(F if weights is None else weights[rows, None] * F, mode="r")))
+    return parts[0] if len(parts) == 1 else np.asarray(np.linalg.qr(np.concatenate(parts), mode="r"))

@@ -9,6 +9,7 @@ from gantrytau_optimica.calibration.findings import Finding, rows_in_words
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
 FLAT = 2e-3  # extent across a line or plane by that along it, below which it is one
+SAMPLE = 2000  # rows that show how far all extend
 NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
 
 
@@ -23,8 +24,8 @@ def check_data(
         *_not_finite(finite),
         *_few(rows),
         *_repeated(q, r, rows),
-        *_shape(r, rows),
         *_units(q, r, rows),
+        *_shape(r, rows),
         *_rotations(R, rows),
         *_rails(rails),
     )
@@ -64,6 +65,9 @@ def repeated_rows(table: np.ndarray) -> np.ndarray:
         table.shape[1]
     ):  # not a product of matrices, whose rounding depends on the place of the row
         keys += table[:, k] * np.cos(k + 1.0)
+    sorted_keys = np.sort(keys)
+    if not np.any(sorted_keys[1:] == sorted_keys[:-1]):
+        return np.zeros(0, dtype=int)
     order = np.argsort(keys)
     near = np.flatnonzero(np.diff(keys[order]) == 0.0)
     if not near.size:
@@ -76,6 +80,7 @@ def repeated_rows(table: np.ndarray) -> np.ndarray:
 def _shape(r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     if len(r) < 3:
         return
+    r = _some(r)
     extent = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(r.T))[::-1], 0.0))
     if extent[0] == 0.0 or extent[1] < FLAT * extent[0]:
         yield Finding(
@@ -91,15 +96,32 @@ def _shape(r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
         )
 
 
+def _some(x: np.ndarray) -> np.ndarray:
+    """Rows enough to see the extent of all, by chance, as every tenth row of a grid may lie in a plane."""
+    return x if len(x) <= SAMPLE else x[np.random.default_rng(0).integers(0, len(x), SAMPLE)]
+
+
+def _far(x: np.ndarray) -> np.ndarray:
+    """Places of rows (N, k) that are too far from most for metres."""
+    middle = np.median(_some(x), axis=0)
+    if max(np.abs(x.max(axis=0) - middle).max(), np.abs(x.min(axis=0) - middle).max()) < LARGEST / 2:
+        return np.zeros(0, dtype=int)
+    far = np.flatnonzero((np.abs(x - middle) > LARGEST / 2).any(axis=1))
+    return np.arange(len(x)) if 2 * len(far) > len(x) else far
+
+
 def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     if not len(r):
         return
-    wide = [name for name, x in (("q", q), ("r", r)) if np.ptp(x, axis=0).max() > LARGEST]
-    if wide:
+    far = {name: _far(x) for name, x in (("q", q), ("r", r))}
+    found = np.union1d(far["q"], far["r"]) if any(len(k) for k in far.values()) else ()
+    if len(found):
+        names = " and ".join(name for name, k in far.items() if len(k))
         yield Finding(
             "millimetres",
-            rows,
-            f"{' and '.join(wide)} extend over more than {LARGEST:g} m, expected m; divide by 1000 if they are mm",
+            rows[found],
+            f"{names} of {rows_in_words(rows[found])} extend over more than {LARGEST:g} m, expected m; divide by 1000 if "
+            "they are mm",
         )
 
 

@@ -80,12 +80,6 @@ def _noise(minimum: Minimum, group: Group) -> float:
     return float(np.sqrt(minimum.cost / max(1, count - minimum.rank)))
 
 
-def best_of(groups: Sequence[Group]) -> Fit:
-    """The fit of least cost among several starts."""
-    fits = [fit_group(group) for group in groups]
-    return min(fits, key=lambda fit: fit.minimum.cost if np.isfinite(fit.minimum.cost) else np.inf)
-
-
 def fit_robust(groups: Sequence[Group]) -> list[Fit]:
     """All groups with one weight for each pose: Huber's until it settles, then Tukey's, which drops gross errors."""
     fits = [fit_group(group) for group in groups]

@@ -27,6 +27,12 @@ class Guideway:
             return self.place + q[:, None] * self.along
         return self.place + between(self.points, q) @ self.along.T
 
+    def across(self, q: np.ndarray) -> np.ndarray:
+        """The same as (3, N), each coordinate in a row, with which numpy is quicker."""
+        if self.points is None:
+            return self.place[:, None] + self.along[:, None] * q
+        return self.at(q).T
+
     def slope(self, q: np.ndarray) -> np.ndarray:
         """Their derivatives by q, (N, 3)."""
         if self.points is None:
@@ -152,19 +158,28 @@ class CalibratedKinematics:
 
     def _three_spheres(self, q: np.ndarray, near: np.ndarray) -> np.ndarray:
         """The point with the distances L_i from three joints, of two the one on the side of `near`."""
-        a, b, c = (link.guideway.at(q[:, link.arm]) for link in self.links)
+        a, b, c = (link.guideway.across(np.ascontiguousarray(q[:, link.arm])) for link in self.links)
         la, lb, lc = (link.length**2 for link in self.links)
         b, c = b - a, c - a
-        normal = np.cross(b, c)
+        normal = _cross(b, c)
         with np.errstate(invalid="ignore", divide="ignore"):
-            square = np.einsum("ni,ni->n", normal, normal)
-            beta = (np.einsum("ni,ni->n", b, b) + la - lb) / 2
-            gamma = (np.einsum("ni,ni->n", c, c) + la - lc) / 2
+            square = _dot(normal, normal)
+            beta = (_dot(b, b) + la - lb) / 2
+            gamma = (_dot(c, c) + la - lc) / 2
             # the foot has b.p = beta, c.p = gamma, and lies in their plane
-            foot = np.cross(beta[:, None] * c - gamma[:, None] * b, normal) / square[:, None]
-            height = np.sqrt((la - np.einsum("ni,ni->n", foot, foot)) / square)
-        side = np.where(np.einsum("ni,ni->n", near - a, normal) < 0, -1.0, 1.0)
-        return a + foot + (side * height)[:, None] * normal
+            foot = _cross(beta * c - gamma * b, normal) / square
+            height = np.sqrt((la - _dot(foot, foot)) / square)
+        side = np.where(_dot(np.ascontiguousarray(near.T) - a, normal) < 0, -1.0, 1.0)
+        return np.ascontiguousarray((a + foot + side * height * normal).T)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A x b of vectors (3, N)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _cart_position(link: RodLink, joint: np.ndarray) -> np.ndarray:

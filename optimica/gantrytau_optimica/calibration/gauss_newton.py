@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 ITERATIONS = 60
-NEGLIGIBLE = (
-    1e-11  # of steps in m; a tenth of what rounding leaves of lengths of metres in squares of them is 1e-13
+NEGLIGIBLE = 1e-11  # m, of a step; rounding leaves 1e-13 of lengths of metres
+UNSEEN = (
+    1e-18  # of the cost, what a step may still gain; with the noise of a tracker it then moves by 1e-12 m
 )
+ROUNDING = 1e-12  # of the cost
+SHARES = 0.5 ** np.arange(12)  # of a step that are tried
 RELATIVE = 1e-10  # of the largest singular value, below which data say nothing
 
 
@@ -50,30 +53,34 @@ def gauss_newton(
     that what data do not hold stays where it began. Steps that do not make the errors smaller are halved.
     """
     x, e, success, iteration = x.copy(), errors(x), False, 0
-    best = float(e @ e)
-    step, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
+    cost = float(e @ e)
+    step, gain, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
     while iteration < ITERATIONS and np.isfinite(step).all():
         iteration += 1
-        share, trial, found = 1.0, x, np.inf
-        while share > 1e-4:
-            trial = x.copy()
-            trial[free] -= share * step
-            e = errors(trial)
-            found = float(e @ e)
-            if found <= best or np.abs(share * step).max(initial=0.0) < NEGLIGIBLE:
-                break
-            share /= 2
-        if not found <= best * (1 + 1e-6):
+        done = np.abs(step).max(initial=0.0) < NEGLIGIBLE or gain < UNSEEN * cost
+        moved = _shortened(errors, x, free, step, cost)
+        if moved is None:
+            success = done
             break
-        x, best = trial, min(best, found)
-        done = np.abs(step).max(initial=0.0) < NEGLIGIBLE
-        step, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
+        x, e = moved
+        cost = float(e @ e)
+        step, gain, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
         if done:
             success = True
             break
-    e = errors(x)
     rank = int((singular > _limit(singular, smallest)).sum())
     return Minimum(x, e, J, singular, directions, rank, iteration, success)
+
+
+def _shortened(errors, x: np.ndarray, free: np.ndarray, step: np.ndarray, cost: float):
+    """X and its errors after the step, or half of it and so on, that does not make them larger; None if none does."""
+    for share in SHARES:
+        trial = x.copy()
+        trial[free] -= share * step
+        e = errors(trial)
+        if float(e @ e) <= cost * (1 + ROUNDING):
+            return trial, e
+    return None
 
 
 def _limit(singular: np.ndarray, smallest: float) -> float:
@@ -81,10 +88,13 @@ def _limit(singular: np.ndarray, smallest: float) -> float:
 
 
 def _step(J: np.ndarray, e: np.ndarray, smallest: float):
-    """The step of least norm among those that make |e - J step| least, by the directions that count."""
+    """The step of least norm among those that make |e - J step| least, by the directions that count.
+
+    With it what it would gain, singular values and directions, and J.
+    """
     if not np.isfinite(J).all() or not np.isfinite(e).all():
-        return np.full(J.shape[1], np.nan), np.zeros(J.shape[1]), np.eye(J.shape[1]), J
+        return np.full(J.shape[1], np.nan), 0.0, np.zeros(J.shape[1]), np.eye(J.shape[1]), J
     left, singular, right = np.linalg.svd(J, full_matrices=False)
     counts = singular > _limit(singular, smallest)
-    step = right[counts].T @ ((left[:, counts].T @ e) / singular[counts])
-    return step, singular, right, J
+    along = left[:, counts].T @ e
+    return right[counts].T @ (along / singular[counts]), float(along @ along), singular, right, J

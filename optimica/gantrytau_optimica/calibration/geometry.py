@@ -1,5 +1,6 @@
 """The nominal geometry of a robot, read by the names of its parameters."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -52,7 +53,7 @@ def read_geometry(robot: Any) -> Geometry:
         raise ModelError(
             f"calibrate: found {robot!r} as robot, expected a model instance such as GantryTau(prototypes.L1)"
         )
-    values = _values(robot)
+    values = _written(robot) or _values(robot)
     count = _count(values, "arms[{}].direction")
     three = "arms[0].length" in values
     if not count or not (three or "arms[0].links[0].length" in values):
@@ -92,6 +93,27 @@ def _count(values: dict[str, Any], pattern: str) -> int:
     while pattern.format(count) in values:
         count += 1
     return count
+
+
+def _written(robot: Model) -> dict[str, Any] | None:
+    """The parameters of a three-link robot where its own modifications give them all as plain numbers.
+
+    Nothing else can override these, so that nothing has to be instantiated; None for all other robots.
+    """
+    arms = robot.modifications.get("arms")
+    if not isinstance(arms, list) or "turntables" in robot.modifications:
+        return None
+    found: dict[str, Any] = {}
+    for i, arm in enumerate(arms):
+        for name, shape in (("length", ()), ("offset", (3,)), ("direction", (3,))):
+            value = arm.get(name) if isinstance(arm, Mapping) and "links" not in arm else None
+            if not isinstance(value, (int, float, list, tuple, np.ndarray)) or np.shape(value) != shape:
+                return None
+            try:
+                found[f"arms[{i}].{name}"] = np.array(value, dtype=float)
+            except (TypeError, ValueError):
+                return None
+    return found
 
 
 def _values(robot: Model) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Measured poses for calibration: actuator positions, tool positions, orientations, guideways."""
 
+import copy
 import csv
 from collections.abc import Sequence
 from functools import cached_property
@@ -70,6 +71,10 @@ class Measurements:
     @cached_property
     def finite(self) -> np.ndarray:
         """Which rows hold numbers only, (N,)."""
+        arrays = [self.q, self.r] if self.R is None else [self.q, self.r, self.R]
+        with np.errstate(invalid="ignore", over="ignore"):
+            if all(np.isfinite(array.sum()) for array in arrays):
+                return np.ones(len(self), dtype=bool)
         good = np.isfinite(self.q).all(axis=1) & np.isfinite(self.r).all(axis=1)
         return np.asarray(good if self.R is None else good & np.isfinite(self.R).all(axis=(1, 2)))
 
@@ -82,7 +87,10 @@ class Measurements:
 
     def select(self, rows: Any) -> "Measurements":
         """The measurements of some rows (indices, a slice or a mask), with all guideways."""
-        return Measurements(self.q[rows], self.r[rows], None if self.R is None else self.R[rows], self.rails)
+        found = copy.copy(self)
+        found.__dict__ = {"q": self.q[rows], "r": self.r[rows], "R": None if self.R is None else self.R[rows]}
+        found.rails = self.rails
+        return found
 
 
 def _numbers(name: str, values: Any) -> np.ndarray:

@@ -116,14 +116,19 @@ def mean_rotation(R: np.ndarray) -> np.ndarray:
 
 
 def started_linear(links: Sequence[Link]) -> list[Link]:
-    """The same links with start values from their poses alone; directions of one arm are averaged."""
+    """The same links with start values from their poses alone; directions of one arm are averaged.
+
+    A plate that hardly turns does not show where its joints are: they keep their nominal places on it.
+    """
     starts = []
     for link in links:
-        chain = link.chain
-        if chain.R is not None and _turn(chain.R) < TURNS:
-            chain = replace(chain, R=None)
-        start = linear_start(chain)
-        starts.append(np.concatenate([start, np.zeros(len(link.start) - len(start))]))
+        R = link.chain.R
+        if R is not None and _turn(R) < TURNS:
+            start = linear_start(replace(link.chain, R=None))
+            start[1:4] += mean_rotation(R) @ link.start[7:10]
+            starts.append(np.concatenate([start, link.start[7:10]]))
+        else:
+            starts.append(linear_start(link.chain))
     found = []
     for link, start in zip(links, starts, strict=True):
         same = [other for k, other in zip(links, starts, strict=True) if k.names[4:7] == link.names[4:7]]

@@ -11,7 +11,7 @@ from itertools import permutations
 import numpy as np
 
 from gantrytau_optimica.calibration.closure import Chain
-from gantrytau_optimica.calibration.findings import CalibrationError
+from gantrytau_optimica.calibration.findings import CalibrationError, rows_in_words
 from gantrytau_optimica.calibration.linear_start import linear_start
 from gantrytau_optimica.calibration.models import Link
 from gantrytau_optimica.calibration.rotations import rotation_vector
@@ -74,12 +74,25 @@ def check_robot(
     mistake, left = min(trials, key=lambda trial: trial[1])
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
-            f"Measurements: found {mistake.words} in rows {rows[0]} to {rows[-1]} (links miss their lengths by "
+            f"Measurements: found {mistake.words} in {rows_in_words(rows)} (links miss their lengths by "
             f"{found * 1e3:.3g} mm in the median, {left * 1e3:.3g} mm with that undone); correct the columns of the "
             "measurements",
             kind=mistake.kind,
             rows=rows,
         )
+
+
+def explained_rows(
+    links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+) -> Iterator[tuple[Mistake, np.ndarray]]:
+    """Mistakes that explain some of these rows: nominal values fit them once it is undone; places of these rows."""
+    wrong = _misses(links, q, r, R) > NEAR
+    trials = [(m, _misses(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
+    best = np.argmin([left for _, left in trials], axis=0)
+    for k, (mistake, left) in enumerate(trials):
+        places = np.flatnonzero(wrong & (best == k) & (left < NEAR))
+        if places.size:
+            yield mistake, places
 
 
 def _undone(mistake: Mistake, q: np.ndarray, r: np.ndarray, R: np.ndarray | None):
@@ -90,21 +103,29 @@ def _undone(mistake: Mistake, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 
 def _miss(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
     """How far links are from their nominal lengths, median over poses of the worst link, m."""
+    return float(np.median(_misses(links, q, r, R)))
+
+
+def _misses(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+    """The same pose by pose, (N,)."""
     errors = []
     for link in links:
         chain = Chain("", q[:, link.arm], r, None if link.chain.R is None else R)
         y = np.linalg.norm(chain.vector(link.start), axis=1)
         errors.append(np.abs(y - link.start[0]))
-    return float(np.median(np.max(errors, axis=0)))
+    return np.max(errors, axis=0)
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """How nominal values fit measurements: miss, m; identified links without them; shift left after the best motion of
-    the frame, m; turn of that motion, rad.
+    """How nominal values fit measurements.
+
+    miss: of the links, in the frame of the measurements, m; left: of links that are identified without nominal values, m;
+    shift: of guideways after the best motion of the frame, m; turn: rotation vector of that motion.
     """
 
     miss: float
+    left: float
     shift: float
     turn: np.ndarray
 
@@ -113,10 +134,12 @@ def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray |
     """Nominal values beside measurements: in their frame, and in the frame that suits them best."""
     few = thinned(len(q), 1000)
     q, r, R = q[few], r[few], None if R is None else R[few]
-    nominal, found = [], []
+    nominal, found, left = [], [], []
     middle = q.mean(axis=0)
     for link in links:
-        x = linear_start(Chain("", q[:, link.arm], r))
+        chain = Chain("", q[:, link.arm], r)
+        x = linear_start(chain)
+        left.append(np.median(np.abs(np.linalg.norm(chain.vector(x), axis=1) - x[0])))
         offset = link.start[1:4] - (
             0 if link.chain.R is None or R is None else R.mean(axis=0) @ link.start[7:10]
         )
@@ -124,7 +147,7 @@ def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray |
             nominal.append(offset + (middle[link.arm] + s) * link.start[4:7])
             found.append(x[1:4] + (middle[link.arm] + s) * x[4:7])
     a, b = np.array(nominal), np.array(found)
-    left, _, right = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
-    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    U, _, V = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
+    turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
     shift = np.linalg.norm(b - b.mean(axis=0) - (a - a.mean(axis=0)) @ turn.T, axis=1).max()
-    return Fitting(_miss(links, q, r, R), float(shift), rotation_vector(turn))
+    return Fitting(_miss(links, q, r, R), float(max(left)), float(shift), rotation_vector(turn))

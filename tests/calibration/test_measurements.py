@@ -1,0 +1,105 @@
+"""Measurements as arrays and from files."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError
+from gantrytau_optimica import Measurements
+
+RNG = np.random.default_rng(0)
+Q, T = RNG.uniform(size=(12, 3)), RNG.uniform(size=(12, 3))
+U = RNG.normal(size=(12, 4))
+
+
+def write(path, header, table):
+    lines = [header, *(",".join(f"{x!r}" for x in row.tolist()) for row in table)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_file_says_what_the_arrays_say(tmp_path):
+    path = write(tmp_path / "m.csv", "q1,q2,q3,x,y,z,qw,qx,qy,qz", np.hstack([Q, T, U]))
+    read = Measurements.read(path)
+    assert np.array_equal(read.q, Q)
+    assert np.array_equal(read.r, T)
+    assert read.R is not None
+    assert np.einsum("nij,nkj->nik", read.R, read.R) == pytest.approx(np.tile(np.eye(3), (12, 1, 1)))
+    # a quaternion turns a vector as its matrix does: u v u* by hand
+    w, u = U[0, 0] / np.linalg.norm(U[0]), U[0, 1:] / np.linalg.norm(U[0])
+    v = np.array([1.0, 2.0, 3.0])
+    turned = v + 2 * w * np.cross(u, v) + 2 * np.cross(u, np.cross(u, v))
+    assert read.R[0] @ v == pytest.approx(turned)
+
+
+def test_positions_only_and_guideways(tmp_path):
+    path = write(tmp_path / "m.csv", "q1,q2,q3,x,y,z", np.hstack([Q, T]))
+    rail = np.column_stack([[0.5, 0.0, 1.0], [0.5, 0.0, 1.0], np.zeros(3), np.zeros(3)])
+    rails = [write(tmp_path / f"rail{k}.csv", "q,x,y,z", rail) for k in range(3)]
+    read = Measurements.read(path, rails)
+    assert read.R is None
+    assert read.rails is not None
+    assert np.array_equal(read.rails[0][:, 0], [0.0, 0.5, 1.0])  # sorted
+    assert "3 guideways" in repr(read)
+
+
+def test_arrays_cannot_be_changed_later():
+    q = Q.copy()
+    measurements = Measurements(q, T)
+    q[0, 0] = 9.0
+    assert measurements.q[0, 0] == Q[0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        measurements.r[0, 0] = 1.0
+
+
+def test_empty_cells_are_nan(tmp_path):
+    path = tmp_path / "m.csv"
+    path.write_text("q1,q2,q3,x,y,z\n" + "1,2,3,4,,6\n" + "1,2,3,4,5,6\n", encoding="utf-8")
+    assert [f.rows.tolist() for f in Measurements.read(path).findings if f.kind == "nan"] == [[0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "empty file"),
+        ("a,b,c\n1,2,3\n", "header a,b,c"),
+        ("q1,q2,q3,y,x,z\n1,2,3,4,5,6\n", "header q1,q2,q3,y,x,z"),
+        ("q1,q2,q3,x,y,z\n1,2,3,4,5\n", "line 2 has 5 cells"),
+        ("q1,q2,q3,x,y,z\n1,2,3,4,5,six\n", "line 2"),
+    ],
+)
+def test_files_that_are_no_measurements(tmp_path, text, words):
+    path = tmp_path / "m.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError, match=words):
+        Measurements.read(path)
+
+
+def test_files_that_are_not_there(tmp_path):
+    with pytest.raises(ModelError, match="no file"):
+        Measurements.read(tmp_path / "none.csv")
+    path = write(tmp_path / "m.csv", "q1,q2,q3,x,y,z", np.hstack([Q, T]))
+    wrong = write(tmp_path / "rail.csv", "s,x,y,z", np.hstack([Q[:, :1], T]))
+    with pytest.raises(ModelError, match="of a guideway"):
+        Measurements.read(path, [wrong] * 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((Q, T[:5]), "one row for each pose"),
+        ((Q[0], T[0]), "one row for each pose"),
+        ((Q, [["a", "b", "c"]]), "no array of numbers"),
+        ((Q, T, np.eye(3)), "rotation matrices"),
+        ((Q, T, None, [Q]), r"rails\[0\] of shape"),
+        ((Q, T, None, [np.ones((3, 4))]), "several points at one q"),
+    ],
+)
+def test_shapes_that_do_not_fit(arguments, words):
+    with pytest.raises(ModelError, match=words):
+        Measurements(*arguments)
+
+
+def test_guideways_in_millimetres_are_found():
+    rail = np.column_stack([np.linspace(0, 1, 10), 1e3 * np.linspace(0, 1, 10), np.zeros(10), np.zeros(10)])
+    spread = RNG.uniform(size=(12, 3))
+    assert [f.kind for f in Measurements(spread, spread, None, [rail] * 3).findings] == ["guideway"] * 3
