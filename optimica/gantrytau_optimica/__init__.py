@@ -3,10 +3,21 @@
 from gantrytau_optimica.archive.run_record import compare_records, run_record, write_record
 from gantrytau_optimica.archive.saved import MissingGuess, SavedOptimum
 from gantrytau_optimica.archive.saving import load_optimum, save_optimum
+from gantrytau_optimica.calibration.arm_fit import fit_arm
+from gantrytau_optimica.calibration.arms import read_arms
 from gantrytau_optimica.calibration.calibrating import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.cameras import single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices import LaserTracker, TMac
+from gantrytau_optimica.calibration.error_maps import error_map
 from gantrytau_optimica.calibration.findings import CalibrationError
+from gantrytau_optimica.calibration.gauges import LengthGauge
+from gantrytau_optimica.calibration.guideways import linearity
+from gantrytau_optimica.calibration.identifiability import identifiability
 from gantrytau_optimica.calibration.measurements import Measurements
+from gantrytau_optimica.calibration.orientation_errors import orientation_causes, orientation_errors
+from gantrytau_optimica.calibration.pose_selection import enough_poses, predict, select_poses
+from gantrytau_optimica.calibration.sensitivity import sensitivity
 from gantrytau_optimica.estimation.estimate import Estimate
 from gantrytau_optimica.estimation.estimating import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -35,6 +46,8 @@ __all__ = [
     "Estimate",
     "Experiment",
     "Free",
+    "LaserTracker",
+    "LengthGauge",
     "Measurements",
     "MissingGuess",
     "Optimization",
@@ -44,23 +57,37 @@ __all__ = [
     "Samples",
     "SavedOptimum",
     "Sensitivities",
+    "TMac",
     "TradeOff",
     "Way",
     "at",
     "calibrate",
     "compare_records",
+    "enough_poses",
+    "error_map",
     "estimate",
     "final",
+    "fit_arm",
+    "identifiability",
     "initial",
     "integral_of_squares",
+    "linearity",
     "link",
     "load_optimum",
     "optimize",
+    "orientation_causes",
+    "orientation_errors",
     "pareto",
+    "predict",
     "prepare",
+    "read_arms",
     "run_record",
     "save_optimum",
+    "select_poses",
     "sensitivities",
+    "sensitivity",
+    "single_camera",
+    "stereo_cameras",
     "sum_of_squares",
     "write_record",
 ]

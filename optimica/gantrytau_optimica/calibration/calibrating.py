@@ -41,7 +41,10 @@ def calibrate(
     _check_words(method=method, start=start, orientation=orientation, loss=loss)
     geometry = read_geometry(robot)
     if geometry.kind == "turning":
-        raise ModelError(f"calibrate: found {geometry.name}, expected a robot without turntables")
+        raise ModelError(
+            f"calibrate: found {geometry.name}, expected a robot without turntables; "
+            "fit the arms of one by [fit_arm(arm, q, r, R) for arm in read_arms(robot)]"
+        )
     _check_columns(geometry, measurements)
     check_model(model, geometry, measurements)
     findings = list(measurements.findings)

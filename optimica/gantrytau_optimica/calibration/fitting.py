@@ -51,27 +51,32 @@ class Fit:
         return self.group.errors(self.x) / (2 * lengths)
 
 
-def fit_group(group: Group, weights: np.ndarray | None = None) -> Fit:
+def fit_group(group: Group, weights: np.ndarray | None = None, truncated: float = 0.0) -> Fit:
     """The minimum from the start values of the group; what data hold worse than TAPE stays there.
 
-    weights: of the poses, (N,), or None.
+    weights: of the poses, (N,), or None; truncated: singular value below which directions are known not to be held.
     """
     all_weights = None if weights is None else [weights] * len(group.chains)
     noise = 0.0
     if group.prior:  # the weight of the prior follows from the noise that is left without it
         noise = _noise(minimise(group, problem(group, all_weights)), group)
     found = problem(group, all_weights, noise)
-    minimum = minimise(group, found)
+    minimum = minimise(group, found, truncated)
     if group.prior:
         found = problem(group, all_weights, _noise(minimum, group))
-        minimum = minimise(group, found)
+        minimum = minimise(group, found, truncated)
     smallest = _noise(minimum, group) / TAPE
-    if minimum.success and minimum.singular.min(initial=np.inf) > smallest:
-        return Fit(group, minimum, 0.0, weights)
+    if truncated or (minimum.success and minimum.singular.min(initial=np.inf) > smallest):
+        return Fit(group, minimum, truncated, weights)
     again = minimise(group, found, smallest)
     if again.success or not minimum.success:
         return Fit(group, again, smallest, weights)
     return Fit(group, minimum, 0.0, weights)
+
+
+def not_held(fit: Fit) -> float:
+    """The singular value below which directions of a like group are held worse than TAPE."""
+    return _noise(fit.minimum, fit.group) / TAPE
 
 
 def _noise(minimum: Minimum, group: Group) -> float:

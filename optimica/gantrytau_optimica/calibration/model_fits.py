@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.fitting import Fit, fit_group, fit_robust, with_prior
+from gantrytau_optimica.calibration.fitting import Fit, fit_group, fit_robust, not_held, with_prior
 from gantrytau_optimica.calibration.groups import Group
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import (
@@ -67,8 +67,9 @@ def _fit_rails(
     single = [link for link in links if link.chain.R is None]
     if not single:  # models 4 and 5 turn guideways as model 2 finds them
         single = started_linear([_without_plate(arm, links) for arm in range(len(data.rails))])
-    single = [_at(link, fit) for link, fit in zip(single, map(fit_group, grouped(single)), strict=True)]
-    placed = [_placed(link, data.rails[link.arm]) for link in single]
+    fits = [fit_group(group) for group in grouped(single)]
+    single = [_at(link, fit) for link, fit in zip(single, fits, strict=True)]
+    placed = [_placed(k, data.rails[k.arm], not_held(fit)) for k, fit in zip(single, fits, strict=True)]
     if model == 2:
         return _fit_groups(with_prior([fit.group.started(fit.x) for fit in placed], prior), loss)
     whole: list[Link] = []
@@ -84,10 +85,14 @@ def _fit_rails(
     return _fit_groups(with_prior(grouped(whole), prior), loss)
 
 
-def _placed(link: Link, rail: np.ndarray) -> Fit:
-    """The measured guideway where a link has it; how it is rolled is tried with some of the poses."""
+def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
+    """The measured guideway where a link has it; how it is rolled is tried with some of the poses.
+
+    truncated: as of the straight guideway.
+    """
     few = thinned(len(link.chain.q))
-    fits = [fit_group(grouped([trial])[0]) for trial in on_rail(_with_poses(link, few), rail)]
+    trials = on_rail(_with_poses(link, few), rail)
+    fits = [fit_group(grouped([trial])[0], truncated=truncated) for trial in trials]
     best = int(np.argmin([f.minimum.cost if np.isfinite(f.minimum.cost) else np.inf for f in fits]))
     if len(few) == len(link.chain.q):
         return fits[best]
