@@ -17,7 +17,6 @@ from gantrytau_optimica.calibration.identifiability import identifiability
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.orientation_errors import orientation_causes, orientation_errors
 from gantrytau_optimica.calibration.pose_selection import enough_poses, predict, select_poses
-from gantrytau_optimica.calibration.sensitivity import sensitivity
 from gantrytau_optimica.estimation.estimate import Estimate
 from gantrytau_optimica.estimation.estimating import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -85,7 +84,6 @@ __all__ = [
     "save_optimum",
     "select_poses",
     "sensitivities",
-    "sensitivity",
     "single_camera",
     "stereo_cameras",
     "sum_of_squares",
