@@ -9,6 +9,7 @@ from gantrytau_optimica.calibration.findings import Finding, rows_in_words
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
 FLAT = 2e-3  # extent across a line or plane by that along it, below which it is one
+BITS = 20  # a million places, in which few of 100,000 rows meet by chance
 SAMPLE = 2000  # rows that show how far all extend
 NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
 
@@ -59,17 +60,15 @@ def repeated_rows(table: np.ndarray) -> np.ndarray:
     """Places of rows of (N, k) that repeat an earlier row to the last bit."""
     if len(table) < 2:
         return np.zeros(0, dtype=int)
-    # one number for each row, alike for alike rows, so that one sort finds the candidates
-    keys = np.zeros(len(table))
-    for k in range(
-        table.shape[1]
-    ):  # not a product of matrices, whose rounding depends on the place of the row
-        keys += table[:, k] * np.cos(k + 1.0)
-    sorted_keys = np.sort(keys)
-    if not np.any(sorted_keys[1:] == sorted_keys[:-1]):
-        return np.zeros(0, dtype=int)
-    order = np.argsort(keys)
-    near = np.flatnonzero(np.diff(keys[order]) == 0.0)
+    # one number for each row, alike for alike rows, and only rows that share the first bits of it are sorted
+    keys = np.zeros(len(table), dtype=np.uint64)
+    for k in range(table.shape[1]):
+        bits = np.add(table[:, k], 0.0).view(np.uint64)  # of -0 as of 0
+        keys = (keys ^ bits) * np.uint64(0x9E3779B97F4A7C15)  # multiplicative hashing (Knuth)
+    places = (keys >> np.uint64(64 - BITS)).astype(np.intp)
+    shared = np.flatnonzero(np.bincount(places, minlength=1 << BITS)[places] > 1)
+    order = shared[np.argsort(keys[shared])]
+    near = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
     if not near.size:
         return near
     candidates = np.unique(np.concatenate([order[near], order[near + 1]]))
@@ -104,7 +103,8 @@ def _some(x: np.ndarray) -> np.ndarray:
 def _far(x: np.ndarray) -> np.ndarray:
     """Places of rows (N, k) that are too far from most for metres."""
     middle = np.median(_some(x), axis=0)
-    if max(np.abs(x.max(axis=0) - middle).max(), np.abs(x.min(axis=0) - middle).max()) < LARGEST / 2:
+    # column by column, as numpy is slow along the first axis
+    if max(max(x[:, k].max() - m, m - x[:, k].min()) for k, m in enumerate(middle)) < LARGEST / 2:
         return np.zeros(0, dtype=int)
     far = np.flatnonzero((np.abs(x - middle) > LARGEST / 2).any(axis=1))
     return np.arange(len(x)) if 2 * len(far) > len(x) else far

@@ -10,6 +10,7 @@ from gantrytau_optimica.calibration.guideway_points import between, slope
 from gantrytau_optimica.calibration.rotations import rotations
 
 ITERATIONS = 30
+BLOCK = 10_000  # poses, whose vectors stay in the cache
 REACHED = 1e-12  # m and rad, of a last Newton step
 
 
@@ -98,7 +99,11 @@ class CalibratedKinematics:
         r, R = (near if isinstance(near, tuple) else (near, None)) if near is not None else (None, None)
         r = np.broadcast_to(self.start_r if r is None else np.asarray(r, dtype=float), (len(q), 3))
         R = np.broadcast_to(self._R if R is None else np.asarray(R, dtype=float), (len(q), 3, 3))
-        found = self._newton(q, r, R) if self.turns else (self._three_spheres(q, r), R.copy())
+        if self.turns:
+            found = self._newton(q, r, R)
+        else:
+            parts = [slice(k, k + BLOCK) for k in range(0, len(q), BLOCK)]
+            found = np.concatenate([self._three_spheres(q[k], r[k]) for k in parts]), R.copy()
         return (found[0][0], found[1][0]) if single else found
 
     def jacobian(self, r, R=None) -> np.ndarray:

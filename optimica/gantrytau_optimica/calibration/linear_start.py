@@ -6,7 +6,7 @@ T.T = 2 A.T + 2 v.(q T) - (A.A - L^2) - q 2 A.v - q2 v.v,     and with a plate t
 
 import numpy as np
 
-from gantrytau_optimica.calibration.closure import Chain, triangle
+from gantrytau_optimica.calibration.closure import Chain, centre, triangle
 
 HELD = 1e-7  # of the largest singular value; what is held worse in the linear equations is left at zero
 
@@ -16,7 +16,7 @@ def linear_start(chain: Chain) -> np.ndarray:
 
     Where R is measured but hardly varies, B is left at zero, and A takes what R B adds.
     """
-    centre_q, centre_r = float(chain.q.mean()), chain.r.mean(axis=0)
+    centre_q, centre_r = centre(chain)
     U = triangle(chain, centre_q, centre_r)
     scale = np.linalg.norm(U, axis=0)
     U = U / np.where(scale > 0, scale, 1.0)
