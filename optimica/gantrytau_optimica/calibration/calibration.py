@@ -154,16 +154,16 @@ class Calibration:
     @cached_property
     def error_vectors(self) -> np.ndarray:
         """Measured less predicted positions of the held-out poses, (N, 3) in m."""
-        return self.measurements.r.take(self.held_out, axis=0) - self._predicted[0]
+        return self._held_out.r - self._predicted[0]
+
+    @cached_property
+    def _held_out(self) -> Measurements:
+        return self.measurements.select(self.held_out)
 
     @cached_property
     def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
-        R, rows = self.measurements.R, self.held_out
-        near = self.measurements.r.take(rows, axis=0)
-        six = self.chains.turns and R is not None
-        return self.chains.fk(
-            self.measurements.q.take(rows, axis=0), (near, R[rows]) if six and R is not None else near
-        )
+        q, r, R = self._held_out.q, self._held_out.r, self._held_out.R
+        return self.chains.fk(q, (r, R) if self.chains.turns and R is not None else r)
 
     @cached_property
     def errors(self) -> np.ndarray:
@@ -225,18 +225,19 @@ def _mean(values: np.ndarray) -> np.float64:
 def relative_distances(fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray) -> np.ndarray:
     """The largest closure error of each of some rows in robust standard deviations of its link, (rows,)."""
     links = rod_links(fits, measurements.rails)
-    parts = [_misses(links, measurements, rows[k : k + BLOCK]) for k in range(0, len(rows), BLOCK)]
+    whole = measurements.select(rows)
+    parts = [_misses(links, whole, slice(k, k + BLOCK)) for k in range(0, len(rows), BLOCK)]
     misses = np.concatenate(parts, axis=1)
     # of many rows some thousand tell their median well enough
     scales = 1.4826 * np.median(misses[:, :: max(1, len(rows) // 5000)], axis=1)
     return (misses / np.maximum(scales, 1e-12)[:, None]).max(axis=0)
 
 
-def _misses(links: Sequence[RodLink], measurements: Measurements, rows: np.ndarray) -> np.ndarray:
+def _misses(links: Sequence[RodLink], measurements: Measurements, rows: slice) -> np.ndarray:
     """How far links are from their lengths, (links, rows) in m."""
-    q, r, R = measurements.q.take(rows, axis=0), measurements.r.take(rows, axis=0).T, measurements.R
-    q, r = np.ascontiguousarray(q.T), np.ascontiguousarray(r)
-    found = np.empty((len(links), len(rows)))
+    q = np.ascontiguousarray(measurements.q[rows].T)
+    r, R = np.ascontiguousarray(measurements.r[rows].T), measurements.R
+    found = np.empty((len(links), r.shape[1]))
     for k, link in enumerate(links):
         y = r - link.guideway.across(q[link.arm])
         if R is not None and link.on_plate.any():

@@ -9,7 +9,7 @@ from gantrytau_optimica.calibration.findings import CalibrationError, Finding, r
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import Link, started_linear
-from gantrytau_optimica.calibration.plausibility import NEAR, compare, explained_rows
+from gantrytau_optimica.calibration.plausibility import NEAR, compare, explained_rows, miss
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates")
@@ -44,9 +44,9 @@ def check_count(links: Sequence[Link], rows: np.ndarray, findings: Sequence[Find
 
 def in_frame(geometry: Geometry, links: list[Link], data: Measurements, rows: np.ndarray):
     """Links whose start fits the frame of the measurements; CalibrationError for another robot."""
-    fitting = compare(links, data.q, data.r, data.R)
-    if fitting.miss < NEAR:
+    if miss(links, data.q, data.r, data.R) < NEAR:
         return links, []
+    fitting = compare(links, data.q, data.r, data.R)
     if fitting.left > NEAR / 10:
         raise CalibrationError(
             f"Measurements: found no links of constant length that fit {rows_in_words(rows)} (they miss it by "

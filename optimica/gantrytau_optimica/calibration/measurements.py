@@ -87,10 +87,21 @@ class Measurements:
 
     def select(self, rows: Any) -> "Measurements":
         """The measurements of some rows (indices, a slice or a mask), with all guideways."""
+        if isinstance(rows, np.ndarray) and rows.dtype != bool and is_all(rows, len(self)):
+            return self
         found = copy.copy(self)
         found.__dict__ = {"q": self.q[rows], "r": self.r[rows], "R": None if self.R is None else self.R[rows]}
         found.rails = self.rails
         return found
+
+
+def is_all(rows: np.ndarray, count: int) -> bool:
+    """Whether rising rows are all rows, which then need no copy."""
+    return (
+        len(rows) == count
+        and (count == 0 or (rows[0] == 0 and rows[-1] == count - 1))
+        and bool(np.all(np.diff(rows) == 1))
+    )
 
 
 def _numbers(name: str, values: Any) -> np.ndarray:

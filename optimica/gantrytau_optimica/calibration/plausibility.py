@@ -67,10 +67,10 @@ def check_robot(
     """
     few = thinned(len(q))
     q, r, R = q[few], r[few], None if R is None else R[few]
-    found = _miss(links, q, r, R)
+    found = miss(links, q, r, R)
     if found < NEAR / 10:
         return
-    trials = [(m, _miss(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
+    trials = [(m, miss(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
     mistake, left = min(trials, key=lambda trial: trial[1])
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
@@ -101,9 +101,10 @@ def _undone(mistake: Mistake, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
     return q[:, mistake.columns] * mistake.scale_q, signs * r[:, mistake.axes] * mistake.scale_r, turned
 
 
-def _miss(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
-    """How far links are from their nominal lengths, median over poses of the worst link, m."""
-    return float(np.median(_misses(links, q, r, R)))
+def miss(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
+    """How far links are from their nominal lengths, median over some of the poses of the worst link, m."""
+    few = thinned(len(q))
+    return float(np.median(_misses(links, q[few], r[few], None if R is None else R[few])))
 
 
 def _misses(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
@@ -150,4 +151,4 @@ def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray |
     U, _, V = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
     turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
     shift = np.linalg.norm(b - b.mean(axis=0) - (a - a.mean(axis=0)) @ turn.T, axis=1).max()
-    return Fitting(_miss(links, q, r, R), float(max(left)), float(shift), rotation_vector(turn))
+    return Fitting(miss(links, q, r, R), float(max(left)), float(shift), rotation_vector(turn))
