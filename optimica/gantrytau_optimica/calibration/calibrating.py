@@ -13,7 +13,7 @@ from gantrytau_optimica.calibration.judging import check_count, in_frame, judged
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.model_fits import fit_model
 from gantrytau_optimica.calibration.models import check_model, nominal_links, six_links, started_linear
-from gantrytau_optimica.calibration.plausibility import check_robot
+from gantrytau_optimica.calibration.plausibility import check_robot, misses_of
 
 
 def calibrate(
@@ -33,28 +33,29 @@ def calibrate(
     model: None takes the robot as it is, with a direction for each guideway; "parallel" holds their directions, equal,
     at the nominal value; 1 to 5 are the error models of Table 5.2 (see `models.py`). method: "ipopt" solves the same
     least squares by CasADi and Ipopt, as a check. start: "linear" needs no nominal values, only the structure of the
-    robot. orientation: of the turntables of an F1. prior: deviations about nominal values by name, in m, such as
-    {"plate_offset": 0.001}, or pairs (value, deviation). loss: "robust" leaves gross errors without weight. holdout:
+    robot. orientation: how quaternions of turntables of an F1 are free: "free" with any length, "unit", or "local", three
+    rotations each. prior: deviations about nominal values by name, in m, such as {"plate_offset": 0.001}, or pairs
+    (value, deviation). loss: "robust" leaves gross errors without weight. holdout:
     "second" validates with every second usable pose, None with the poses of the fit, else rows or a mask.
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
     _check_words(method=method, start=start, orientation=orientation, loss=loss)
     geometry = read_geometry(robot)
-    if geometry.kind == "turning":
-        raise ModelError(
-            f"calibrate: found {geometry.name}, expected a robot without turntables; "
-            "fit the arms of one by [fit_arm(arm, q, r, R) for arm in read_arms(robot)]"
-        )
     _check_columns(geometry, measurements)
     check_model(model, geometry, measurements)
     findings = list(measurements.findings)
     rows = usable_rows(findings, measurements)
     fitted, held_out = _split(rows, holdout, measurements)
+    if geometry.kind == "turning":
+        from gantrytau_optimica.calibration.turning import calibrate_turning
+
+        policy: Any = dict(method=method, start=start, orientation=orientation, prior=prior, loss=loss)
+        return calibrate_turning(geometry, measurements, rows, (fitted, held_out), **policy)
     data = measurements.select(fitted)
     links = nominal_links(geometry, data, six_links(model, geometry))
-    check_count(links, fitted, findings)
-    check_robot(links, data.q, data.r, data.R, rows)
-    nominal = links
+    check_count(max(len(link.start) for link in links), fitted, findings)
+    misses = misses_of(links)
+    check_robot(misses, data.q, data.r, data.R, rows)
     if start == "linear":
         links = started_linear(links)
     else:
@@ -66,7 +67,7 @@ def calibrate(
 
         fits = [solve(fit) for fit in fits]
     found = Calibration(geometry, measurements, model, fits, fitted, held_out, method, loss)
-    return replace(found, findings=(*findings, *judged(found, nominal)))
+    return replace(found, findings=(*findings, *judged(found, misses)))
 
 
 def _check_words(**words: str) -> None:
@@ -88,10 +89,11 @@ def _check_columns(geometry: Geometry, measurements: Measurements) -> None:
         raise ModelError(
             f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
         )
-    if measurements.q.shape[1] != len(geometry.arms):
+    expected = len(geometry.arms) + geometry.turntables
+    if measurements.q.shape[1] != expected:
         raise ModelError(
             f"calibrate: found measurements of {measurements.q.shape[1]} actuators for {geometry.name}, expected "
-            f"{len(geometry.arms)}, one for each guideway; check the columns q1, q2, ..."
+            f"{expected}, one for each guideway and turntable; check the columns q1, q2, ..."
         )
 
 

@@ -103,8 +103,8 @@ class Calibration:
     def _places(self, name: str) -> list[int]:
         aliases = [name, name[name.index("direction") :]] if "direction" in name else [name]
         for alias in aliases:
-            wanted = [alias] if alias in self.names else [f"{alias}[{k}]" for k in range(3)]
-            if all(n in self.names for n in wanted):
+            wanted = [n for n in self.names if n == alias or n.rpartition("[")[0] == alias]
+            if wanted:
                 lost = [n for n in wanted if n in self.undetermined]
                 if lost:
                     raise ModelError(
@@ -188,6 +188,19 @@ class Calibration:
     def angle_error(self) -> np.float64:
         """Mean of `angle_errors`, rad; NaN where no orientations were measured."""
         return _mean(self.angle_errors)
+
+    @property
+    def plate_turns(self) -> bool:
+        """Whether the links hold the orientation of the plate."""
+        return any(chain.R is not None for fit in self.fits for chain in fit.group.chains)
+
+    def link_errors(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m."""
+        found = []
+        for fit in self.fits:
+            for chain, e in zip(fit.group.chains, fit.distances().T, strict=True):
+                found.append((chain.name, chain.q, e))
+        return found
 
     def suspicious_rows(self, limit: float) -> np.ndarray:
         """Rows whose closure errors exceed `limit` robust standard deviations of a fit without them."""

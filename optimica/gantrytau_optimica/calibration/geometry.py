@@ -37,6 +37,7 @@ class Geometry:
     robot: Model
     kind: Literal["three", "six", "turning"]
     arms: tuple[ArmGeometry, ...]
+    turntables: int = 0
 
     @property
     def name(self) -> str:
@@ -61,9 +62,9 @@ def read_geometry(robot: Any) -> Geometry:
             f"calibrate: found {type(robot).__name__} without parameters arms[i].length, .offset and .direction, or "
             "arms[i].links[j] of these; expected a Gantry-Tau such as GantryTau(prototypes.L1)"
         )
-    turning = "turntables[0].axis" in values
+    turntables = _count(values, "turntables[{}].axis")
     arms = tuple(_three_link_arm(values, i) if three else _arm(values, i) for i in range(count))
-    return Geometry(robot, "three" if three else "turning" if turning else "six", arms)
+    return Geometry(robot, "three" if three else "turning" if turntables else "six", arms, turntables)
 
 
 def _three_link_arm(values: dict[str, Any], i: int) -> ArmGeometry:

@@ -9,7 +9,7 @@ from gantrytau_optimica.calibration.findings import CalibrationError, Finding, r
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import Link, started_linear
-from gantrytau_optimica.calibration.plausibility import NEAR, compare, explained_rows, miss
+from gantrytau_optimica.calibration.plausibility import NEAR, Misses, compare, explained_rows, miss, misses_of
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates")
@@ -29,12 +29,12 @@ def usable_rows(findings: Sequence[Finding], measurements: Measurements) -> np.n
     return np.flatnonzero(good)
 
 
-def check_count(links: Sequence[Link], rows: np.ndarray, findings: Sequence[Finding]) -> None:
+def check_count(parameters: int, rows: np.ndarray, findings: Sequence[Finding]) -> None:
     """CalibrationError for fewer fitted rows than a link has parameters and one more."""
-    needed = max(len(link.start) for link in links) + 1
+    needed = parameters + 1
     if len(rows) < needed:
         raise CalibrationError(
-            f"Measurements: found {len(rows)} poses to fit {needed - 1} parameters of each link, expected {needed} at the "
+            f"Measurements: found {len(rows)} poses to fit {parameters} parameters of each link, expected {needed} at the "
             "least; measure more poses, or give holdout=None",
             kind="too few poses",
             rows=rows,
@@ -44,7 +44,7 @@ def check_count(links: Sequence[Link], rows: np.ndarray, findings: Sequence[Find
 
 def in_frame(geometry: Geometry, links: list[Link], data: Measurements, rows: np.ndarray):
     """Links whose start fits the frame of the measurements; CalibrationError for another robot."""
-    if miss(links, data.q, data.r, data.R) < NEAR:
+    if miss(misses_of(links), data.q, data.r, data.R) < NEAR:
         return links, []
     fitting = compare(links, data.q, data.r, data.R)
     if fitting.left > NEAR / 10:
@@ -71,13 +71,13 @@ def in_frame(geometry: Geometry, links: list[Link], data: Measurements, rows: np
     return started_linear(links), [Finding("frame", rows, message)]
 
 
-def judged(found: Calibration, links: Sequence[Link]) -> list[Finding]:
+def judged(found: Calibration, misses: Misses) -> list[Finding]:
     """Rows with mistakes and outliers among all poses used, and numbers that data do not hold.
 
     CalibrationError for rows whose columns are swapped or in mm, unless a robust loss left them without weight.
     """
     suspicious = found.suspicious_rows(OUTLIER)
-    findings = _mistaken(found, links, suspicious) if suspicious.size else []
+    findings = _mistaken(found, misses, suspicious) if suspicious.size else []
     others = np.setdiff1d(suspicious, np.concatenate([suspicious[:0], *(f.rows for f in findings)]))
     if others.size:
         advice = "they had little weight" if found.loss == "robust" else "look at them, or take loss='robust'"
@@ -94,7 +94,7 @@ def judged(found: Calibration, links: Sequence[Link]) -> list[Finding]:
     return findings
 
 
-def _mistaken(found: Calibration, links: Sequence[Link], rows: np.ndarray) -> list[Finding]:
+def _mistaken(found: Calibration, misses: Misses, rows: np.ndarray) -> list[Finding]:
     data = found.measurements
     R = None if data.R is None else data.R[rows]
     findings = [
@@ -103,7 +103,7 @@ def _mistaken(found: Calibration, links: Sequence[Link], rows: np.ndarray) -> li
             rows[places],
             f"{mistake.words} in {rows_in_words(rows[places])}; correct these rows",
         )
-        for mistake, places in explained_rows(links, data.q[rows], data.r[rows], R)
+        for mistake, places in explained_rows(misses, data.q[rows], data.r[rows], R)
     ]
     if findings and found.loss != "robust":
         words = "; ".join(f.message for f in findings)

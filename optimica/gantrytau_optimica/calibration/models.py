@@ -57,12 +57,16 @@ def check_model(model: object, geometry: Geometry, measurements: Measurements) -
     """ModelError if there is no such model, or the robot or the measurements lack what it needs."""
     if isinstance(model, bool) or model not in MODELS:
         raise ModelError(f"calibrate: found model={model!r}, expected one of {', '.join(map(repr, MODELS))}")
+    if geometry.kind == "turning" and model is not None:
+        raise ModelError(
+            f"calibrate: found model={model!r} for {geometry.name}, expected None; those models have no turntables"
+        )
     if model in (3, 4, 5) and geometry.kind != "six":
         raise ModelError(
             f"calibrate: found {geometry.name} for model={model}, expected a robot with all six links; take "
             "SixLinkGantryTau, or model=1"
         )
-    if six_links(model, geometry) and measurements.R is None:
+    if (six_links(model, geometry) or geometry.kind == "turning") and measurements.R is None:
         raise ModelError(
             "calibrate: found measurements without R for six links, expected orientations of the plate; measure poses, or "
             "take model=1"

@@ -15,22 +15,26 @@ from gantrytau_optimica.calibration.rotations import rotation_vector
 
 
 class Named(Mapping[str, Any]):
-    """Values by name; of a vector `v` also the elements `v[0]` to `v[2]`, which are not listed."""
+    """Values by name; of a vector `v` also the elements `v[0]`, `v[1]` and so on, which are not listed."""
 
     def __init__(self, values: Mapping[str, Any]):
         self._values = dict(values)
+        self._elements = {
+            f"{name}[{k}]": float(x)
+            for name, value in self._values.items()
+            if np.ndim(value)
+            for k, x in enumerate(value)
+        }
 
     def __getitem__(self, name: str) -> Any:
         if name in self._values:
             return self._values[name]
-        vector, _, index = name.rpartition("[")
-        if vector in self._values and index in ("0]", "1]", "2]"):
-            return float(self._values[vector][int(index[0])])
+        if name in self._elements:
+            return self._elements[name]
         raise ModelError(f"parameters: there is no '{name}'{did_you_mean(name, self._values)}")
 
     def __contains__(self, name: object) -> bool:
-        vector, _, index = str(name).rpartition("[")
-        return name in self._values or (vector in self._values and index in ("0]", "1]", "2]"))
+        return name in self._values or name in self._elements
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)

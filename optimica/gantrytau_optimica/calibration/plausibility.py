@@ -4,9 +4,9 @@ Closure errors of nominal values are compared with those after each of a few mis
 median decides, so that outliers do not.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -22,6 +22,10 @@ POSES = 200
 AXES = "xyz"
 
 
+# from q (N, n), r (N, 3), R to how far the worst link of each pose is from its nominal length, (N,) in m
+Misses = Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]
+
+
 @dataclass(frozen=True)
 class Mistake:
     """Something that may have been done to q (N, n) and r (N, 3): its kind, words, and how it is undone."""
@@ -35,9 +39,20 @@ class Mistake:
     scale_r: float = 1.0
 
 
+def _orders(n: int) -> Iterator[tuple[int, ...]]:
+    """Orders of n columns: all of three, of more those that swap two."""
+    same = tuple(range(n))
+    if n <= 3:
+        yield from permutations(same)
+        return
+    yield same
+    for i, k in combinations(same, 2):
+        yield tuple(k if c == i else i if c == k else c for c in same)
+
+
 def _mistakes(n: int) -> Iterator[Mistake]:
     same, straight = tuple(range(n)), (0, 1, 2)
-    for columns in permutations(same):
+    for columns in _orders(n):
         for axes in permutations(straight):
             words = [f"q{k + 1} stands in column q{c + 1}" for k, c in enumerate(columns) if k != c]
             words += [f"{AXES[k]} stands in column {AXES[c]}" for k, c in enumerate(axes) if k != c]
@@ -58,19 +73,17 @@ def thinned(count: int, poses: int = POSES) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, min(count, poses)).astype(int))
 
 
-def check_robot(
-    links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None, rows: np.ndarray
-) -> None:
+def check_robot(misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None, rows: np.ndarray) -> None:
     """CalibrationError if undoing a mistake makes nominal values fit that did not.
 
-    links: with nominal values; q (N, n), r (N, 3), R: measured; rows: their numbers for the message.
+    misses: of nominal values; q (N, n), r (N, 3), R: measured; rows: their numbers for the message.
     """
     few = thinned(len(q))
     q, r, R = q[few], r[few], None if R is None else R[few]
-    found = miss(links, q, r, R)
+    found = miss(misses, q, r, R)
     if found < NEAR / 10:
         return
-    trials = [(m, miss(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
+    trials = [(m, miss(misses, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
     mistake, left = min(trials, key=lambda trial: trial[1])
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
@@ -83,11 +96,11 @@ def check_robot(
 
 
 def explained_rows(
-    links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+    misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> Iterator[tuple[Mistake, np.ndarray]]:
     """Mistakes that explain some of these rows: nominal values fit them once it is undone; places of these rows."""
-    wrong = _misses(links, q, r, R) > NEAR
-    trials = [(m, _misses(links, *_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
+    wrong = misses(q, r, R) > NEAR
+    trials = [(m, misses(*_undone(m, q, r, R))) for m in _mistakes(q.shape[1])]
     best = np.argmin([left for _, left in trials], axis=0)
     for k, (mistake, left) in enumerate(trials):
         places = np.flatnonzero(wrong & (best == k) & (left < NEAR))
@@ -101,20 +114,24 @@ def _undone(mistake: Mistake, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
     return q[:, mistake.columns] * mistake.scale_q, signs * r[:, mistake.axes] * mistake.scale_r, turned
 
 
-def miss(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
+def miss(misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
     """How far links are from their nominal lengths, median over some of the poses of the worst link, m."""
     few = thinned(len(q))
-    return float(np.median(_misses(links, q[few], r[few], None if R is None else R[few])))
+    return float(np.median(misses(q[few], r[few], None if R is None else R[few])))
 
 
-def _misses(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-    """The same pose by pose, (N,)."""
-    errors = []
-    for link in links:
-        chain = Chain("", q[:, link.arm], r, None if link.chain.R is None else R)
-        y = np.linalg.norm(chain.vector(link.start), axis=1)
-        errors.append(np.abs(y - link.start[0]))
-    return np.max(errors, axis=0)
+def misses_of(links: Sequence[Link]) -> Misses:
+    """How far links with linear guideways are from their start lengths."""
+
+    def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        errors = []
+        for link in links:
+            chain = Chain("", q[:, link.arm], r, None if link.chain.R is None else R)
+            y = np.linalg.norm(chain.vector(link.start), axis=1)
+            errors.append(np.abs(y - link.start[0]))
+        return np.max(errors, axis=0)
+
+    return misses
 
 
 @dataclass(frozen=True)
@@ -151,4 +168,4 @@ def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray |
     U, _, V = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
     turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
     shift = np.linalg.norm(b - b.mean(axis=0) - (a - a.mean(axis=0)) @ turn.T, axis=1).max()
-    return Fitting(miss(links, q, r, R), float(max(left)), float(shift), rotation_vector(turn))
+    return Fitting(miss(misses_of(links), q, r, R), float(max(left)), float(shift), rotation_vector(turn))

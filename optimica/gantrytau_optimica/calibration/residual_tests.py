@@ -16,13 +16,11 @@ def residual_tests(found: "Calibration") -> list[dict[str, Any]]:
     guideway do. probability: that noise alone gives as large a value; a small one points to an error of the model.
     """
     tests = []
-    for fit in found.fits:
-        distances = fit.distances()
-        for chain, e in zip(fit.group.chains, distances.T, strict=True):
-            if len(e) < 20:  # what the tests of normality need
-                continue
-            for name, value, probability in (_normal(e), _neighbours(e), _along(e, chain.q)):
-                tests.append({"link": chain.name, "test": name, "value": value, "probability": probability})
+    for link, q, e in found.link_errors():
+        if len(e) < 20:  # what the tests of normality need
+            continue
+        for name, value, probability in (_normal(e), _neighbours(e), _along(e, q)):
+            tests.append({"link": link, "test": name, "value": value, "probability": probability})
     return sorted(tests, key=lambda test: test["link"])
 
 
