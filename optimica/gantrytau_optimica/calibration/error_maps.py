@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import vectors
@@ -92,6 +91,8 @@ class ErrorMap:
         What is systematic a better model can take away. Poses that stand far apart show less of it.
         """
         count = min(NEIGHBOURS, len(self.r) - 1)
+        from scipy.spatial import KDTree
+
         tree = KDTree(self.r)
         product, square = 0.0, 0.0
         for first in range(0, len(self.r), BLOCK):

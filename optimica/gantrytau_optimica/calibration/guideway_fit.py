@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from gantrytau.errors import ModelError
 from gantrytau_optimica.calibration.findings import CalibrationError, Finding, rows_in_words
@@ -40,6 +39,8 @@ class Basis:
                 f"profile: found q from {q.min():g} to {q.max():g} m, expected positions within the measured {low:g} to "
                 f"{high:g} m"
             )
+        from scipy.interpolate import BSpline
+
         return BSpline.design_matrix(np.clip(q, low, high), self.knots, DEGREE).toarray()
 
     def others(self, q: Array, rising: Array) -> Array:

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.stats import f as fisher
 
 from gantrytau import Model
 from gantrytau.errors import ModelError
@@ -256,6 +255,8 @@ def _chance(explained: Array, rest: Array, unknowns: float, spare: float) -> flo
     noise = np.sum(rest**2) / spare
     if noise <= 0:
         return 0.0 if np.any(explained) else 1.0
+    from scipy.stats import f as fisher
+
     return float(fisher.sf(np.sum(explained**2) / unknowns / noise, unknowns, spare))
 
 
