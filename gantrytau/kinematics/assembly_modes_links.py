@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gantrytau.kinematics.obstacles import between_segments
+
 ALIKE = 2.0  # ratio of distances of joints, base by platform; above, and below its inverse, links form no parallelogram
 PARALLEL = (
     1e-9  # square of the sine of the angle of two links, and distance of two joints by the length of links
@@ -36,7 +38,7 @@ def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
     shared = np.minimum(at_base, at_platform) < PARALLEL * np.linalg.norm(u, axis=2)
     alike = (at_base < ALIKE * at_platform) & (at_platform < ALIKE * at_base)
     crossed = alike & ~shared & (_seen_along(a - b, a + u - b - v, u, v) < 0)
-    return LinkGeometry(crossed, np.where(shared, np.inf, _distance(a, b, u, v)).min(1))
+    return LinkGeometry(crossed, np.where(shared, np.inf, between_segments(a, a + u, b, b + v)).min(1))
 
 
 def _seen_along(first: np.ndarray, second: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -44,29 +46,6 @@ def _seen_along(first: np.ndarray, second: np.ndarray, u: np.ndarray, v: np.ndar
     mean = u / np.linalg.norm(u, axis=2)[..., None] + v / np.linalg.norm(v, axis=2)[..., None]
     size = np.maximum((mean * mean).sum(2), PARALLEL)  # links of opposite directions have none in common
     return (first * second).sum(2) - (first * mean).sum(2) * (second * mean).sum(2) / size
-
-
-def _distance(a: np.ndarray, b: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Least distances of links from a along u and from b along v, (k, 15) in m."""
-    s, t = _shortest(a - b, u, v)
-    between = (s > 0) & (s < 1) & (t > 0) & (t < 1)
-    across = np.linalg.norm(a - b + s[..., None] * u - t[..., None] * v, axis=2)
-    to_ends = [_to_segment(a, b, v), _to_segment(a + u, b, v), _to_segment(b, a, u), _to_segment(b + v, a, u)]
-    return np.min([np.where(between, across, np.inf), *to_ends], axis=0)
-
-
-def _shortest(w: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the lines a + s u and b + t v, w = a - b, are nearest to each other; NaN if they are parallel."""
-    uu, uv, vv, uw, vw = ((x * y).sum(2) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
-    wide = uu * vv - uv * uv
-    wide = np.where(wide < PARALLEL * uu * vv, np.nan, wide)
-    return (uv * vw - vv * uw) / wide, (uu * vw - uv * uw) / wide
-
-
-def _to_segment(point: np.ndarray, start: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Distance of points to the segments from `start` to `start + along`."""
-    share = ((point - start) * along).sum(2) / (along * along).sum(2)
-    return np.linalg.norm(point - start - np.clip(share, 0, 1)[..., None] * along, axis=2)
 
 
 def sides(base: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -2,37 +2,22 @@
 
 import numpy as np
 
-SMALL = 1e-6  # rad, below which series to second order are exact in double precision
-
-
-def skew(a: np.ndarray) -> np.ndarray:
-    """The matrix of a x, (3, 3)."""
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+from gantrytau.kinematics.rotations import skewed, turned
 
 
 def rotation(w: np.ndarray) -> np.ndarray:
     """exp([w]x), (3, 3) (Rodrigues)."""
-    angle, K = float(np.linalg.norm(w)), skew(w)
-    if angle < SMALL:
-        return np.eye(3) + K + K @ K / 2
-    return np.eye(3) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * K @ K
+    return rotations(np.asarray(w)[None])[0]
 
 
 def rotations(w: np.ndarray) -> np.ndarray:
     """exp([w]x) of many, (N, 3) -> (N, 3, 3)."""
-    angle = np.linalg.norm(w, axis=1)
-    safe = np.where(angle < SMALL, 1.0, angle)
-    first = np.where(angle < SMALL, 1.0, np.sin(safe) / safe)
-    second = np.where(angle < SMALL, 0.5, (1 - np.cos(safe)) / safe**2)
-    K = np.zeros((len(w), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
-    K -= K.transpose(0, 2, 1)
-    return np.eye(3) + first[:, None, None] * K + second[:, None, None] * (K @ K)
+    return turned(np.broadcast_to(np.eye(3), (len(w), 3, 3)), w)
 
 
 def left_jacobian(w: np.ndarray) -> np.ndarray:
     """J of exp([w + dw]x) = exp([J dw]x) exp([w]x) to first order, (3, 3)."""
-    angle, K = float(np.linalg.norm(w)), skew(w)
+    angle, K = float(np.linalg.norm(w)), skewed(w)
     if angle < 1e-4:  # the quotient below loses digits
         return np.eye(3) + K / 2 + K @ K / 6
     return np.eye(3) + (1 - np.cos(angle)) / angle**2 * K + (angle - np.sin(angle)) / angle**3 * K @ K
@@ -63,5 +48,5 @@ def turning(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     if cosine < -1 + 1e-12:  # opposite: half a turn about any axis across
         across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation(np.pi * across / np.linalg.norm(across))
-    K = skew(axis)
+    K = skewed(axis)
     return np.eye(3) + K + K @ K / (1 + cosine)
