@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gantrytau.commands import check, equations, fmu, library, optimize, simulate
+from gantrytau.commands import calibrate, check, equations, fmu, library, optimize, simulate
 from gantrytau.commands.reporting import Commands
 
 app = typer.Typer(
@@ -96,6 +96,9 @@ app.command(epilog="Example: gantrytau check 'GantryTau(D1)'")(check.check)
 app.command(
     epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"
 )(simulate.simulate)
+app.command(
+    epilog="Example: gantrytau calibrate measurements.csv --robot 'GantryTau(L1)' --set arms[0].length=1.52"
+)(calibrate.calibrate)
 app.command(
     epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"
 )(optimize.optimize)

@@ -3,11 +3,12 @@
 import inspect
 import typing
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gantrytau.commands import parameter_files
 from gantrytau.commands.choice import Choice, source_of
 from gantrytau.commands.loading import import_by_name, load, similar
 from gantrytau.commands.reporting import CommandError, note
@@ -70,10 +71,19 @@ def build(
     else:
         chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
-    for setting in settings:
-        name, value = split("--set", setting)
-        model = with_setting(model, name, number("--set", name, value))
+    for name, value in _settings(settings):
+        model = with_setting(model, name, value)
     return Chosen(model, chosen.prototype)
+
+
+def _settings(settings: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`."""
+    for setting in settings:
+        if setting.endswith(parameter_files.SUFFIX) and "=" not in setting:
+            yield from parameter_files.read("--set", Path(setting)).items()
+        else:
+            name, value = split("--set", setting)
+            yield name, number("--set", name, value)
 
 
 def _wanted(choice: Choice, text: str, prototype: str | None) -> str | None:

@@ -27,8 +27,9 @@ Settings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        metavar="NAME=VALUE",
-        help="Set a parameter (m=2.5, 'offset=[1,2,3]') or a start value (x.start=0.1). Repeatable.",
+        metavar="NAME=VALUE|FILE",
+        help="Set a parameter (m=2.5, 'offset=[1,2,3]'), a start value (x.start=0.1), or all values of a file "
+        "(calibrated.toml). Repeatable.",
         show_default=False,
     ),
 ]

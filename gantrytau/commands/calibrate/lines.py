@@ -1,0 +1,58 @@
+"""Rows of measurements, which count from 0, as lines of the file in which the user looks for them."""
+
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau.commands.reporting import CommandError
+
+
+def lines_of(file: Path) -> np.ndarray:
+    """The line of each row of a CSV file with a header; empty lines hold no row."""
+    with file.open(newline="", encoding="utf-8-sig") as opened:
+        reader = csv.reader(opened)
+        found = [reader.line_num for row in reader if "".join(row).strip()]
+    return np.array(found[1:], dtype=int)
+
+
+def read(file: Path, rails: Sequence[Path]) -> tuple[Any, np.ndarray]:
+    """Measurements and their lines; CommandError for files that cannot be read."""
+    from gantrytau.errors import ModelError
+    from gantrytau_optimica import Measurements
+
+    try:
+        return Measurements.read(file, rails=list(rails) or None), lines_of(file)
+    except UnicodeDecodeError as error:
+        raise CommandError(
+            f"{file}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
+        ) from error
+    except csv.Error as error:
+        raise CommandError(f"{file}: cannot be read as CSV ({error})") from error
+    except ModelError as error:
+        raise CommandError(str(error)) from error
+
+
+def in_lines(message: str, said: Sequence[np.ndarray], lines: np.ndarray) -> str:
+    """A message with lines in place of rows; said: the rows that it may speak of.
+
+    A few rows that it does not name are added at its end.
+    """
+    from gantrytau_optimica.calibration.findings import rows_in_words
+
+    words = {
+        rows_in_words(rows): rows_in_words(lines[rows]).replace("row", "line", 1)
+        for rows in said
+        if len(rows) and max(rows) < len(lines)
+    }
+    if not words:
+        return message
+    longest = sorted(words, key=len, reverse=True)
+    pattern = re.compile("|".join(rf"\b{re.escape(word)}(?!\d| more|, \d| and \d)" for word in longest))
+    spoken, count = pattern.subn(lambda found: words[found[0]], message)
+    if not count and 0 < len(said[0]) < len(lines) / 4:
+        spoken += f" ({words[rows_in_words(said[0])]})"
+    return spoken
