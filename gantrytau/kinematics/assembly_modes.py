@@ -12,7 +12,7 @@ import numpy as np
 from gantrytau.kinematics.assembly_modes_checks import checked_hexapod, specialities
 from gantrytau.kinematics.assembly_modes_links import PAIRS, link_geometry, sides, signs
 from gantrytau.kinematics.study import pose
-from gantrytau.kinematics.study_poses import exact_poses, link_errors
+from gantrytau.kinematics.study_poses import ExactPoses, exact_poses, link_errors
 from gantrytau.kinematics.study_roots import MODES, Roots, all_roots, placed
 
 REAL = 1e-6  # imaginary part of z of length 1: a complex pair nearer to each other than that counts as real
@@ -25,7 +25,9 @@ class AssemblyModes:
 
     r: (k, 3), position of the platform, in m; R: (k, 3, 3), its rotation; complex both, real ones without
     imaginary part. real, regular: (k,); singular modes are where several meet, or where the links do not hold the
-    platform, and known to some 1e-6 only. complete: all 40 are there. error: (k,), what links are wrong by, in m.
+    platform, and known to some 1e-6 only. complete: all 40 are there. error: (k,), what links are wrong by, in m:
+    rounding, of real modes some 1e-16, of complex ones far away 1e-16 |r|^2 / L; `exact` has the same modes with `.r .R
+    .error` in the longest numbers of the machine (np.clongdouble), on x86 with 1e-12 m up to some 500 m away.
     feasible: (k,), real, no links crossed, links `diameter` apart; crossed: pairs of links per mode; clearance:
     (k,), least distance of two links, in m, NaN for complex modes. group: (k,), 1 or -1, side of the plane
     through the base joints, 0 for complex modes; the largest component of its normal is positive. sign: (k,), 1 or
@@ -38,6 +40,7 @@ class AssemblyModes:
     regular: np.ndarray
     complete: bool
     error: np.ndarray
+    exact: ExactPoses
     feasible: np.ndarray
     crossed: tuple[tuple[tuple[int, int], ...], ...]
     clearance: np.ndarray
@@ -82,15 +85,17 @@ def assembly_modes(
     *normal, size = placed(base, platform, lengths)
     roots = all_roots(*normal)
     z, real = _real_ones(roots)
-    r, R = pose(z)
-    r = r * size + base.mean(0) - R @ platform.mean(0)
-    r, R, error = _settled(r, R, real, roots.regular, base, platform, lengths)
-    order = _order(r, real, base, platform, R)
-    r, R, real, error, regular = r[order], R[order], real[order], error[order], roots.regular[order]
+    exact = _exact(z, roots.regular, base, platform, lengths, size)
+    order = _order(exact.r.astype(complex), real, base, platform, exact.R.astype(complex))
+    exact, real, regular = ExactPoses(*(a[order] for a in exact)), real[order], roots.regular[order]
+    r, R = exact.r.astype(complex), exact.R.astype(complex)
+    error = link_errors(r.astype(np.clongdouble), R.astype(np.clongdouble), base, platform, lengths).astype(
+        float
+    )
     complete = len(r) == MODES and bool(regular.all())
     findings = (*specialities(base, platform, lengths), *_outcome(roots, real))
     return AssemblyModes(
-        r=r, R=R, real=real, regular=regular, complete=complete, error=error, findings=findings,
+        r=r, R=R, real=real, regular=regular, complete=complete, error=error, exact=exact, findings=findings,
         **_of_links(r, R, real, base, platform, diameter),
     )  # fmt: skip
 
@@ -102,13 +107,14 @@ def _real_ones(roots: Roots) -> tuple[np.ndarray, np.ndarray]:
     return np.where(real[:, None], z.real, z), real
 
 
-def _settled(r, R, real, regular, base, platform, lengths):
-    """Poses with exact links, and their errors; singular ones stay where they are."""
+def _exact(z, regular, base, platform, lengths, size) -> ExactPoses:
+    """Poses of roots in long numbers; singular roots stay where they are."""
+    r, R = pose(z.astype(np.clongdouble))
+    r = r * size + base.mean(0) - R @ platform.mean(0)
     error = link_errors(r, R, base, platform, lengths)
     if regular.any():
-        r, R = r.copy(), R.copy()
-        r[regular], R[regular], error[regular] = exact_poses(r[regular], R[regular], base, platform, lengths)
-    return r, R, error
+        r[regular], R[regular], error[regular] = exact_poses(z[regular], base, platform, lengths, size)
+    return ExactPoses(r, R, error)
 
 
 def _order(r, real, base, platform, R) -> np.ndarray:

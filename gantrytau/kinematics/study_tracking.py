@@ -105,7 +105,7 @@ def _corrected(
     """Points after two steps of Newton, and whether those contract as they must near a regular root."""
     sizes = []
     for _ in range(2):
-        step = _newton_step(homotopy.forms(z, t)[0], z, patch)
+        step = newton_step(homotopy.forms(z, t)[0], z, patch)
         z = z + step
         sizes.append(np.linalg.norm(step, axis=1))
     first, second = sizes
@@ -116,7 +116,7 @@ def _corrected(
 def polished(target: np.ndarray, z: np.ndarray, *, steps: int = 3) -> np.ndarray:
     """Points z (n, 8) after steps of Newton on the quadrics (7, 8, 8), of length 1."""
     for _ in range(steps):
-        z = z + _newton_step(_applied(target, z), z, z.conj())
+        z = z + newton_step(_applied(target, z), z, z.conj())
         z = z / np.linalg.norm(z, axis=1)[:, None]
     return z
 
@@ -131,10 +131,14 @@ def _applied(target: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.einsum("nc,rcd->nrd", z, target)
 
 
-def _newton_step(forms: np.ndarray, z: np.ndarray, patch: np.ndarray) -> np.ndarray:
+def newton_step(forms: np.ndarray, z: np.ndarray, patch: np.ndarray) -> np.ndarray:
+    """Steps (n, 8) for points z, with forms Q z (n, 7, 8), across the rows conj(z) of a patch (n, 8).
+
+    Of longer numbers only what is left of the quadrics is used as it is: the rest is the slope.
+    """
     left = np.zeros((len(z), 8, 1), complex)
     left[:, :7] = forms @ z[:, :, None]
-    return -solved(_bordered(2 * forms, patch), left)[:, :, 0]
+    return -solved(_bordered(2 * forms, patch).astype(complex), left)[:, :, 0]
 
 
 def _bordered(forms: np.ndarray, patch: np.ndarray) -> np.ndarray:
