@@ -387,8 +387,8 @@ assert predicted["random", 20] > 1.3 * predicted["d-optimal", 20]
 assert predicted["random", 40] > 0.9 * predicted["d-optimal", 20]
 
 # %% [markdown]
-# Twenty chosen poses are worth forty random ones, if guideways are straight. For ours, noise no longer counts after ten poses:
-# what is left are bends of 0.1 mm. More poses change little; measuring the guideways does more.
+# Twenty chosen poses are worth forty random ones, if guideways are straight. For ours, noise no longer counts after ten
+# poses: what is left are bends of 0.1 mm. More poses change little; measuring the guideways does more.
 
 # %%
 print({n: f"{1e6 * error:.0f} um" for n, error in happened_bent.items()})
