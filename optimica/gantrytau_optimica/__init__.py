@@ -34,12 +34,16 @@ from gantrytau_optimica.optimization import (
 from gantrytau_optimica.optimize import Prepared, optimize, prepare
 from gantrytau_optimica.optimum import Optimum
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.procedure.files import load_plan
+from gantrytau_optimica.procedure.plan import CalibrationPlan
+from gantrytau_optimica.procedure.planning import plan_calibration
 from gantrytau_optimica.studies.pareto import TradeOff, pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 
 __all__ = [
     "Calibration",
     "CalibrationError",
+    "CalibrationPlan",
     "Corner",
     "Deviation",
     "Estimate",
@@ -73,10 +77,12 @@ __all__ = [
     "linearity",
     "link",
     "load_optimum",
+    "load_plan",
     "optimize",
     "orientation_causes",
     "orientation_errors",
     "pareto",
+    "plan_calibration",
     "predict",
     "prepare",
     "read_arms",

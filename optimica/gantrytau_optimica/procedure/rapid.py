@@ -1,0 +1,184 @@
+"""A plan as a robot program in RAPID (ABB): joint targets, moves in joint coordinates, a trigger for the device.
+
+Lengths in mm and angles in degrees. Numbers of RAPID are single precision: 0.1 um of a metre. Lines have 80 ASCII
+characters at most, names 32.
+"""
+
+import re
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau_optimica.procedure.choice import CRITERION
+from gantrytau_optimica.procedure.verdict import um
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.procedure.plan import CalibrationPlan
+
+WIDTH = 80
+AXES = 6  # of robax and of extax
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+RESERVED = frozenset(
+    [
+        "module",
+        "endmodule",
+        "proc",
+        "endproc",
+        "const",
+        "pers",
+        "var",
+        "local",
+        "task",
+        "func",
+        "endfunc",
+        "trap",
+        "endtrap",
+        "if",
+        "then",
+        "else",
+        "endif",
+        "for",
+        "from",
+        "to",
+        "step",
+        "do",
+        "endfor",
+        "while",
+        "endwhile",
+        "test",
+        "case",
+        "default",
+        "return",
+        "true",
+        "false",
+        "not",
+        "and",
+        "or",
+        "xor",
+        "div",
+        "mod",
+        "with",
+        "goto",
+        "raise",
+        "retry",
+        "error",
+        "undo",
+        "exit",
+    ]
+)
+
+
+def rapid_program(
+    plan: "CalibrationPlan",
+    name: str,
+    *,
+    speed: float,
+    settle: float,
+    measure: float,
+    carts: Literal["robax", "extax"],
+    trigger: str,
+    tool: str,
+) -> str:
+    """See `CalibrationPlan.program`."""
+    if carts not in ("robax", "extax"):
+        raise ModelError(
+            f"program: found carts={carts!r}, expected 'robax' or 'extax', the axes of a joint target that move"
+        )
+    names = [("name", name), ("tool", tool), *([] if trigger == "TPWrite" else [("trigger", trigger)])]
+    for what, word in names:
+        _check_name(what, word)
+    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
+        if not (np.isfinite(value) and value >= least):
+            unit = "m/s above 0" if what == "speed" else "s, not negative"
+            raise ModelError(f"program: found {what}={value!r}, expected a number in {unit}")
+    lines = [f"MODULE {name}", *_comments(plan, carts)]
+    lines += [
+        f"  CONST speeddata speedCalibration:=[{_number(speed * 1e3, 3)},20,{_number(speed * 1e3, 3)},20];"
+    ]
+    for number in range(1, len(plan.q)):  # the last is home again
+        lines += _target(_label(plan, number), plan.q[number - 1], plan.carts, carts)
+    lines += ["", f"  PROC {_procedure(name)}()"]
+    count, done = int(plan.measured.sum()), 0
+    for k, measured in enumerate(plan.measured):
+        label = _label(plan, 1 if k == len(plan.q) - 1 else k + 1)
+        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {tool};")
+        if measured:
+            done += 1
+            lines += _trigger(trigger, f"{label}, {done} of {count}", settle, measure)
+    lines += ["  ENDPROC", "ENDMODULE", ""]
+    return "\n".join(lines)
+
+
+def _procedure(name: str) -> str:
+    return f"Run{name}"[:32]
+
+
+def _check_name(what: str, word: str) -> None:
+    if not NAME.fullmatch(word) or word.lower() in RESERVED:
+        raise ModelError(
+            f"program: found {what}={word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
+            "characters at most, no reserved word"
+        )
+
+
+def _label(plan: "CalibrationPlan", number: int) -> str:
+    """Name of the target of a row of the program, counted from 1, as in poses.csv."""
+    if number == 1:
+        return "pHome"
+    return f"p{number:03d}" if plan.measured[number - 1] else f"via{number:03d}"
+
+
+def _target(label: str, q: np.ndarray, count: int, carts: str) -> list[str]:
+    values = [_number(x * 1e3, 4) for x in q[:count]] + [_number(np.degrees(x), 5) for x in q[count:]]
+    unused = ["0"] * AXES if carts == "extax" else ["9E9"] * AXES
+    moving = values + ["0" if carts == "robax" else "9E9"] * (AXES - len(values))
+    robax, extax = (moving, unused) if carts == "robax" else (unused, moving)
+    return [f"  CONST jointtarget {label}:=", f"    [[{','.join(robax)}],", f"     [{','.join(extax)}]];"]
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _trigger(trigger: str, words: str, settle: float, measure: float) -> list[str]:
+    told = f'    TPWrite "Measure {words}";'
+    pulse = [] if trigger == "TPWrite" else [f"    PulseDO \\PLength:=0.2, {trigger};"]
+    return [
+        f"    WaitTime \\InPos, {_number(settle, 3)};",
+        told,
+        *pulse,
+        f"    WaitTime {_number(measure, 3)};",
+    ]
+
+
+def _comments(plan: "CalibrationPlan", carts: str) -> list[str]:
+    unused = "unused robax 0, extax 9E9" if carts == "robax" else "carts are external axes, unused extax 9E9"
+    said = [
+        f"Calibration of {plan.robot_name}: {int(plan.measured.sum())} poses to measure, "
+        f"{int((~plan.measured).sum())} only passed (home at begin and end).",
+        f"Joint targets: carts in mm, turntables in degrees; {unused}. Moves are linear in these axes and were checked "
+        "on all "
+        "of their way; do not change order, targets or kind of move. Rows of poses.csv have the same numbers.",
+        f"Expected error of the tool after calibration {um(plan.verdict.error)}, wanted {um(plan.verdict.wanted)}: "
+        f"{'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
+        f"Poses: {CRITERION}.",
+        f"Nominal parameters in m ({plan.kind}):",
+        *_parameters(plan),
+    ]
+    return [line for words in said for line in _wrapped(words)] + [""]
+
+
+def _parameters(plan: "CalibrationPlan") -> Sequence[str]:
+    return [
+        f"{name} = " + ", ".join(_number(float(x), 7) for x in np.atleast_1d(value))
+        for name, value in plan.parameters.items()
+    ]
+
+
+def _wrapped(words: str) -> list[str]:
+    plain = words.encode("ascii", "replace").decode()
+    return textwrap.wrap(plain, WIDTH, initial_indent="  ! ", subsequent_indent="  !   ")

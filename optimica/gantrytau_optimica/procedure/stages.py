@@ -1,0 +1,103 @@
+"""Stages of a long procedure, kept on file: what was finished, and for which question, is not computed again.
+
+A stage is a frozen record; it is written whole or not at all, with a digest of everything that it depends on. Found with
+another digest, or not readable, it is made anew.
+"""
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gantrytau.result_files import replacing
+
+Record = TypeVar("Record")
+VERSION = "1"  # of what the stages compute; another one makes all anew
+Progress = Callable[[str, int, int], None]
+
+
+def digest(*things: Any) -> str:
+    """One number for arrays, records, numbers and words, alike for alike ones on every run."""
+    found = hashlib.sha256()
+    _feed(found, (VERSION, things))
+    return found.hexdigest()
+
+
+def _feed(found: Any, thing: Any) -> None:
+    if isinstance(thing, np.ndarray) and thing.dtype != object:
+        found.update(f"array {thing.dtype.str} {thing.shape};".encode())
+        found.update(np.ascontiguousarray(thing).tobytes())
+    elif isinstance(thing, (list, tuple, np.ndarray)):
+        found.update(f"sequence {len(thing)};".encode())
+        for each in thing:
+            _feed(found, each)
+    elif isinstance(thing, Mapping):
+        _feed(found, [[name, thing[name]] for name in sorted(thing)])
+    elif is_dataclass(thing) and not isinstance(thing, type):
+        found.update(f"{type(thing).__qualname__};".encode())
+        _feed(found, [[field.name, getattr(thing, field.name)] for field in fields(thing)])
+    elif hasattr(thing, "__dict__") and not isinstance(thing, type):  # an obstacle of the user's own
+        found.update(f"{type(thing).__qualname__};".encode())
+        _feed(found, vars(thing))
+    else:
+        found.update(f"{type(thing).__name__} {thing!r};".encode())
+
+
+class Stages:
+    """Finished stages in a folder, or nowhere where that is None; progress(stage, done, of) is told of each."""
+
+    def __init__(self, folder: Path | None, progress: Progress | None = None):
+        self.folder = folder
+        self.progress: Progress = progress or (lambda stage, done, of: None)
+
+    def of(
+        self, name: str, kind: type[Record], depends: str, make: Callable[[], Record], *, tell: bool = True
+    ) -> Record:
+        """The record of a stage: from its file if that was made for the same digest, else made and filed."""
+        found = self._filed(name, kind, depends)
+        if found is None:
+            if tell:
+                self.progress(name, 0, 1)
+            found = make()
+            if self.folder is not None:
+                _file(self.folder, name, found, depends)
+        if tell:
+            self.progress(name, 1, 1)
+        return found
+
+    def _filed(self, name: str, kind: type[Record], depends: str) -> Record | None:
+        if self.folder is None or not (path := _path(self.folder, name)).is_file():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                if str(archive["digest"]) != depends:
+                    return None
+                words = json.loads(str(archive["words"]))
+                arrays = {key[1:]: archive[key] for key in archive.files if key.startswith(".")}
+            return kind(**arrays, **{key: _frozen(value) for key, value in words.items()})
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+            return None  # damaged, or of another version
+
+
+def _path(folder: Path, name: str) -> Path:
+    return folder / "stages" / f"{name}.npz"
+
+
+def _file(folder: Path, name: str, record: Any, depends: str) -> None:
+    path = _path(folder, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    values = {field.name: getattr(record, field.name) for field in fields(record)}
+    arrays = {f".{key}": value for key, value in values.items() if isinstance(value, np.ndarray)}
+    words = {key: value for key, value in values.items() if not isinstance(value, np.ndarray)}
+    with replacing(path) as partial:
+        contents: dict[str, Any] = dict(arrays, digest=np.array(depends), words=np.array(json.dumps(words)))
+        np.savez(partial, **contents)
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(each) for each in value) if isinstance(value, list) else value

@@ -1,0 +1,168 @@
+"""Whether the planned calibration will do, and what is missing if not: decided by the error of the tool."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau import GantryTauError
+from gantrytau_optimica.calibration.devices import Device
+from gantrytau_optimica.calibration.pose_selection import enough_poses, predict
+from gantrytau_optimica.procedure.candidates import Candidates
+from gantrytau_optimica.procedure.choice import Choice, device_noise, expected_error, poses_of
+from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.settling import SettledWorkspace
+from gantrytau_optimica.procedure.trials import Trials
+
+SYSTEMATIC = 0.7  # of the error that averaged readings leave: then it is not noise
+HIDDEN = 0.7  # of the safe places, below which the place of the device is worth a word
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """good: whether every simulated robot keeps the wanted error (m) of the tool in the mean over the workspace.
+
+    error: of the worst of them, m; reasons: sentences with the numbers, and what to do.
+    """
+
+    good: bool
+    error: float
+    wanted: float
+    reasons: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{'good' if self.good else 'not good enough'}: {' '.join(self.reasons)}"
+
+
+def decide(
+    fleet: Fleet,
+    device: Device,
+    places: SettledWorkspace,
+    candidates: Candidates,
+    choice: Choice,
+    trials: Trials,
+    *,
+    poses: int,
+    wanted: float,
+    tape: float,
+    seed: int,
+) -> Verdict:
+    """The verdict on a plan."""
+    good = bool(trials.worst <= wanted)
+    count = len(choice.rows)
+    said = [_told(trials, count, wanted)]
+    if trials.failed:
+        said.append(_failed(trials, count))
+    elif not good and trials.averaged >= SYSTEMATIC * trials.worst:
+        said.append(_systematic(device, trials))
+    elif not good:
+        said.append(_noise(fleet, device, candidates, choice, trials, wanted=wanted, tape=tape, seed=seed))
+    said += _remarks(device, places, candidates, count, poses, choice, trials)
+    return Verdict(good, trials.worst, wanted, tuple(said))
+
+
+def um(length: float) -> str:
+    """A length in micrometres or millimetres, whichever reads better."""
+    return f"{length * 1e6:.3g} um" if length < 1e-3 else f"{length * 1e3:.3g} mm"
+
+
+def _told(trials: Trials, count: int, wanted: float) -> str:
+    robots = f"{len(trials)} simulated robots" if len(trials) > 1 else "the simulated robot"
+    if trials.failed:
+        return f"Of {robots} {trials.failed} could not be calibrated with {count} poses."
+    before = f"from {um(float(trials.before.mean()))} before"
+    return (
+        f"With {count} poses the tool of {robots} errs by {um(float(trials.after.mean()))} in the mean over the "
+        f"workspace, of the worst robot by {um(trials.worst)} ({before}); wanted are {um(wanted)}."
+    )
+
+
+def _failed(trials: Trials, count: int) -> str:
+    note = next(note for note in trials.notes if note)
+    return (
+        f"The first message: {note}. Plan more than {count} poses, or measure the robot better by hand first."
+    )
+
+
+def _systematic(device: Device, trials: Trials) -> str:
+    return (
+        f"{um(trials.averaged)} remain even when 25 readings of each pose are averaged, so that the error is systematic "
+        f"in the {type(device).__name__} and more poses do not help: calibrate the device itself, place it nearer to the "
+        "middle of the workspace, or take a better one."
+    )
+
+
+def _noise(
+    fleet: Fleet,
+    device: Device,
+    candidates: Candidates,
+    choice: Choice,
+    trials: Trials,
+    *,
+    wanted: float,
+    tape: float,
+    seed: int,
+) -> str:
+    """How many poses would be enough, or which other device or place."""
+    usable = poses_of(fleet, candidates, candidates.usable)
+    noise, angle = max(choice.noise, 1e-9), choice.noise_angle
+    chosen = poses_of(fleet, candidates, choice.rows)
+    now = predict(fleet.robot, chosen, at=usable, noise=noise, angle=angle, tape=tape).error
+    goal = wanted * now / trials.worst
+    try:
+        rows = enough_poses(fleet.robot, usable, goal, noise=noise, angle=angle, tape=tape, seed=seed)
+        if len(rows) > len(choice.rows):
+            return f"The rest is noise of the device: plan about {len(rows)} poses."
+        return f"The rest is noise of the device: plan more than {len(choice.rows)} poses."
+    except GantryTauError:
+        pass
+    safe = candidates.safe
+    every = device_noise(device, candidates.r[safe], candidates.R[safe])
+    best = expected_error(fleet, candidates, safe, noise=every, tape=tape).error
+    if best * trials.worst / choice.error <= wanted < np.inf and len(safe) > len(candidates.usable):
+        return (
+            f"All {len(usable.q)} visible places together are not enough, all {len(safe)} safe ones would be: put the "
+            "device where it sees more of the workspace."
+        )
+    factor = trials.worst / wanted
+    return (
+        f"All {len(usable.q)} visible places together are not enough: take a device with {factor:.2g} times less noise than "
+        f"{um(choice.noise)} per axis, or average several readings of each pose."
+    )
+
+
+def _remarks(
+    device: Device,
+    places: SettledWorkspace,
+    candidates: Candidates,
+    count: int,
+    poses: int,
+    choice: Choice,
+    trials: Trials,
+) -> list[str]:
+    safe, usable = len(candidates.safe), len(candidates.usable)
+    found = []
+    if count < poses:
+        found.append(
+            f"Only {count} of {poses} poses can be reached without a collision: smaller obstacles or margins, or another "
+            "home, give more."
+        )
+    if usable < HIDDEN * safe:
+        found.append(
+            f"The {type(device).__name__} sees {usable} of {safe} safe places in all robots; another place for it would "
+            "show more."
+        )
+    if safe < 0.5 * len(candidates.q):
+        found.append(
+            f"Only {safe} of {len(candidates.q)} places are safe whatever the tape error; measure the robot better by "
+            "hand, or make margins and obstacles smaller, to use more of the workspace."
+        )
+    if not places.settled and len(places.spacings) > 1:
+        found.append("The grid of the workspace has not settled; give spacing= for a finer one.")
+    if not trials.failed and trials.in_frame.mean() > 2 * choice.error:
+        found.append(
+            f"Errors are {trials.in_frame.mean() / choice.error:.2g} times those predicted from noise alone "
+            f"({um(choice.error)}): part of them is systematic."
+        )
+    if trials.unseen.any():
+        found.append(f"In {np.count_nonzero(trials.unseen)} robots some poses were not seen.")
+    return found
