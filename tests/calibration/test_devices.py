@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from gantrytau import ModelError
 from gantrytau.kinematics.obstacles import Capsule
@@ -225,6 +226,45 @@ def test_what_cameras_see():
     assert device.measure(r, TO_CAMERA).seen.tolist() == [True, False, False, False]
 
 
+def test_a_lens_does_not_fold_the_world_back_into_its_image():
+    """Beyond the largest radius of its polynomial, x - 0.3 x3 at x = 1.05, the image would come back to the middle."""
+    camera = Camera(np.zeros(3), UPRIGHT, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
+    assert camera.border == pytest.approx(1 / 0.9)
+    x = np.linspace(0.0, 3.0, 301)
+    image = camera.project(np.column_stack([x, 0 * x, 0 * x + 1.0]))
+    assert np.isnan(image[:, 0]).tolist() == (x > np.sqrt(1 / 0.9)).tolist()
+    assert np.all(np.diff(image[: int(np.sum(x < 1.05)), 0]) > 0)
+    assert Camera(np.zeros(3), UPRIGHT).border == np.inf
+    device = replace(single_camera([-2.5, 0, 0], [0, 0, 0]), facing=None)
+    beside = np.column_stack([np.full(400, -1.5), np.linspace(1.0, 10.0, 400), np.zeros(400)])
+    assert not device.sees(beside, TO_CAMERA).any()  # 45 deg and more off the axis of a lens of 24
+
+
+@pytest.mark.parametrize("noise", [0.1, 2.0])
+@pytest.mark.parametrize("base", [0.0, 0.8])
+def test_poses_are_those_that_fit_the_images_best(noise, base):
+    """Against least squares with differences, of scipy, from the true pose."""
+    device = replace(stereo_cameras([-2.5, 0, 0], [0, 0, 0], base=base), noise=noise)
+    r, R = cube(12, 0.4), TO_CAMERA @ turn([0.2, 0.3, 0.3])
+    read = device.measure(r, R, seed=1)
+    for k in np.flatnonzero(read.seen):
+
+        def missed(v, r=r[k], images=read.readings[k]):
+            points = r + v[:3] + device.pattern @ (R @ turn(v[3:])).T
+            return np.concatenate([c.project(points) for c in device.believed]).reshape(-1) - images
+
+        best = least_squares(missed, np.zeros(6), x_scale=1e-3, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        spread = np.sqrt(np.diag(device.covariance(r[k], R)[0])[:3].sum())
+        assert np.linalg.norm(r[k] + best.x[:3] - read.r[k]) < 0.01 * spread  # of its noise
+
+
+def test_no_poses_give_no_readings():
+    for device in (LaserTracker(), TMac(), stereo_cameras([-2.5, 0, 0], [0, 0, 0]), Wires(anchors=np.eye(3))):
+        read = device.measure(np.zeros((0, 3)))
+        assert read.r.shape == (0, 3)
+        assert len(read.readings) == 0
+
+
 # gauges
 
 
@@ -256,6 +296,14 @@ def test_wires_find_the_point_where_their_lengths_meet():
     assert Wires(anchors=anchors, obstacles=[ball([0.5, 0.0, 0.5], 0.1)]).sees([0.0, 0.0, 1.0]) is np.False_
 
 
+def test_wires_do_not_tell_where_a_point_in_the_plane_of_their_anchors_is():
+    anchors = [[-1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]
+    read = Wires(anchors=anchors).measure([[0.2, 0.3, 0.0], [0.2, 0.3, 1e-9], [1.0, 0, 0], [0.2, 0.3, 1.0]])
+    assert np.isnan(read.r).all(axis=1).tolist() == [True, True, True, False]
+    assert np.isfinite(read.readings).all(axis=1).tolist() == [True, True, False, True]  # too near an anchor
+    assert read.r[3] == pytest.approx([0.2, 0.3, 1.0], abs=1e-4)  # five standard deviations
+
+
 # messages
 
 
@@ -273,6 +321,38 @@ def test_wires_find_the_point_where_their_lengths_meet():
             "found range_noise=-1e-06, expected .* 0 leaves this error out",
         ),
         (lambda: TMac(rotation_noise=np.nan), "TMac: found rotation_noise=nan"),
+        (
+            lambda: LaserTracker(range_noise=cast(Any, [1e-6, 1e-6])),
+            "found range_noise=.* expected a number that is",
+        ),
+        (lambda: LaserTracker(r="here"), "LaserTracker: found r='here', expected three finite numbers"),
+        (lambda: LaserTracker(R=None), "LaserTracker: found R=None, expected a rotation matrix"),
+        (lambda: LaserTracker(scale=np.nan), "LaserTracker: found scale=nan, expected a finite number"),
+        (
+            lambda: LaserTracker(nearest=5.0, farthest=1.0),
+            r"found \(nearest, farthest\)=\(5.0, 1.0\), expected \(least, largest\) in m",
+        ),
+        (lambda: LaserTracker(elevation=cast(Any, 0.5)), r"found elevation=0.5, expected \(least, largest\)"),
+        (
+            lambda: LaserTracker(acceptance=-1.0),
+            "found acceptance=-1.0, expected a number .* negative in rad",
+        ),
+        (
+            lambda: LaserTracker(obstacles=cast(Any, ball([0, 0, 0], 1.0))),
+            "found obstacles=Capsule.* expected a sequence",
+        ),
+        (lambda: LaserTracker().sees([0, 0, 1.0], bars=cast(Any, [1])), "bars: found list, expected Bars"),
+        (lambda: Bars("a", "b", 0.1), "Bars: found ends 'a' and 'b', expected arrays of numbers"),
+        (lambda: LengthGauge(face=[0, 0, 0]), "LengthGauge: found face=.* expected a direction"),
+        (
+            lambda: Wires(anchors=np.eye(3), scale=[0, 0]),
+            r"found scale=\[0, 0\], expected .* of shape \(3,\)",
+        ),
+        (lambda: Wires(anchors=np.eye(3), longest=0.01), r"found \(shortest, longest\)=\(0.1, 0.01\)"),
+        (
+            lambda: Camera([0, 0, 0], np.eye(3), size=cast(Any, 3)),
+            r"found size=3, expected \(width, height\)",
+        ),
         (lambda: LaserTracker().measure([0.0, 1.0]), r"found r of shape \(2,\)"),
         (
             lambda: LaserTracker().measure(np.zeros((2, 3)), frame="robot"),

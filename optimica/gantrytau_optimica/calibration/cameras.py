@@ -14,11 +14,12 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.devices import Array, Device, Measured, _rotation
+from gantrytau_optimica.calibration.devices import Array, Device, Measured, _rotation, numbers
 from gantrytau_optimica.calibration.sight import Bars, clear
 
-ROUNDS = 40  # steps from the true pose, each of which leaves some hundredth of the error
-SETTLED = 1e-10  # m and rad
+ROUNDS = 20  # steps from the true pose; three or four are enough where the pattern is seen well
+RIDGE = 1e-13  # of the squares of slopes: a pattern that is seen from its edge does not tell all of its pose
+SETTLED = 1e-8  # m and rad; a thousandth of it is left
 BLOCK = 1024  # poses at once: more take memory and no less time
 LEAST_POINTS = 4  # three leave up to four poses
 LENS_ERROR = 0.033  # of k1, for all that is wrong with a camera: fitted, see stereo_cameras
@@ -44,19 +45,35 @@ class Camera:
     distortion: Any = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self):
+        size = numbers(self.size)
+        if size.shape != (2,) or not np.all(size > 0):
+            raise ModelError(f"Camera: found size={self.size!r}, expected (width, height) in pixels above 0")
         width, height = self.size
+        focal = numbers(self.focal)
         centre = ((width - 1) / 2, (height - 1) / 2) if self.centre is None else self.centre
         for name, value, count in (
-            ("r", self.r, 3), ("focal", np.ones(2) * self.focal, 2), ("centre", centre, 2),
+            ("r", self.r, 3), ("focal", np.repeat(focal, 2) if focal.ndim == 0 else focal, 2), ("centre", centre, 2),
             ("distortion", self.distortion, 5),
         ):  # fmt: skip
-            found = np.asarray(value, dtype=float)
+            found = numbers(value)
             if found.shape != (count,) or not np.all(np.isfinite(found)):
                 raise ModelError(f"Camera: found {name}={value!r}, expected {count} finite numbers")
             object.__setattr__(self, name, found)
         if not np.all(self.focal > 0):
             raise ModelError(f"Camera: found focal={self.focal!r}, expected pixels above 0")
         object.__setattr__(self, "R", _rotation("Camera", self.R))
+
+    @property
+    def border(self) -> float:
+        """Square of x and y at depth 1, up to which the lens images one direction to one point; often infinite.
+
+        Beyond the first zero of d(rho (1 + k1 s + k2 s2 + k3 s3)) / d rho with s = rho2 the polynomial, which describes a
+        lens only inside, folds the world back into the image.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+        folds = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
+        return float(folds.min(initial=np.inf))
 
     @classmethod
     def looking(cls, r: Any, at: Any, *, up: Any = (0.0, 0.0, 1.0), **lens: Any) -> "Camera":
@@ -72,7 +89,7 @@ class Camera:
         return cls(r, np.column_stack([a / np.linalg.norm(a) for a in axes]), **lens)
 
     def project(self, points: Any) -> Array:
-        """Image points (..., 2) in pixels of points (..., 3) in m in the world; NaN behind the camera."""
+        """Image points (..., 2) in pixels of points (..., 3) in m in the world; NaN behind it and beyond `border`."""
         x, y, _ = self._flat(np.asarray(points, dtype=float))
         return self._distorted(x, y)
 
@@ -97,10 +114,12 @@ class Camera:
         return self._distorted(x, y), local @ self.R.T
 
     def _flat(self, points: Array) -> tuple[Array, Array, Array]:
-        """Coordinates x and y at depth 1, and depth in m, of points in the world; NaN behind the camera."""
+        """Coordinates x and y at depth 1, and depth in m, of points in the world; NaN where it has no image."""
         local = (points - self.r) @ self.R
-        depth = np.where(local[..., 2] > STRAIGHT_AHEAD, local[..., 2], np.nan)
-        return local[..., 0] / depth, local[..., 1] / depth, depth
+        x, y, depth = np.moveaxis(local, -1, 0)
+        ahead = (depth > STRAIGHT_AHEAD) & (x * x + y * y < self.border * depth * depth)
+        depth = np.where(ahead, depth, np.nan)
+        return x / depth, y / depth, depth
 
     def _distorted(self, x: Array, y: Array) -> Array:
         """Image points in pixels of x and y at depth 1."""
@@ -197,7 +216,7 @@ class Cameras(Device):
     def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
         points = self._points(r, R)
         true = np.concatenate([camera.project(points) for camera in self.cameras], axis=1)
-        readings = (true + self.noise * random.standard_normal(true.shape)).reshape(len(r), -1)
+        readings = (true + self.noise * random.standard_normal(true.shape)).reshape(len(r), true.shape[1] * 2)
         names = tuple(
             f"camera {c + 1} point {k + 1} {axis} [pixel]"
             for c in range(len(self.cameras)) for k in range(len(self.pattern)) for axis in "xy"
@@ -211,17 +230,17 @@ class Cameras(Device):
         imaged = np.flatnonzero(np.isfinite(readings).all(axis=1))
         for first in range(0, len(imaged), BLOCK):
             part = imaged[first : first + BLOCK]
-            # errors are small, so the slopes of the first round serve for all, three times as quick as new ones
-            rows = self._images(r[part], R[part])[1]
-            inverse = np.linalg.solve(rows.transpose(0, 2, 1) @ rows, rows.transpose(0, 2, 1))
             for _ in range(ROUNDS):
-                points = self._points(r[part], R[part])
-                images = np.concatenate([c.project(points) for c in self.believed], axis=1)
-                missed = readings[part] - images.reshape(len(part), -1)
-                step = np.einsum("nij,nj->ni", inverse, missed)
+                images, rows = self._images(r[part], R[part])
+                missed, rows = (readings[part] - images)[:, :, None], np.nan_to_num(rows)
+                normal = rows.transpose(0, 2, 1) @ rows
+                least = RIDGE * np.trace(normal, axis1=1, axis2=2) + np.finfo(float).tiny
+                right = rows.transpose(0, 2, 1) @ missed
+                step = np.linalg.solve(normal + least[:, None, None] * np.eye(6), right)[:, :, 0]
                 r[part] += step[:, :3]
                 R[part] = turned(R[part], step[:, 3:])
-                if np.all(np.abs(step) < SETTLED):
+                part = part[np.any(np.abs(step) >= SETTLED, axis=1)]  # nor NaN, of what is not imaged
+                if not part.size:
                     break
         return r, R
 

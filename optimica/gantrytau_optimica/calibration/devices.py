@@ -59,6 +59,13 @@ class Device:
         self._vector("r", self.r)
         self._vector("target", self.target)
         object.__setattr__(self, "R", _rotation(type(self).__name__, self.R))
+        if not isinstance(self.obstacles, Sequence) or not all(
+            hasattr(o, "distance") for o in self.obstacles
+        ):
+            raise ModelError(
+                f"{type(self).__name__}: found obstacles={self.obstacles!r}, expected a sequence of Box, Cylinder and "
+                "others of gantrytau.kinematics; put a single one in a list"
+            )
         if self.facing is not None:
             facing = self._vector("facing", self.facing)
             size = float(np.linalg.norm(facing))
@@ -120,20 +127,34 @@ class Device:
         return np.arccos(np.clip(cosine, -1.0, 1.0))
 
     def _vector(self, name: str, value: Any) -> Array:
-        found = np.asarray(value, dtype=float)
+        found = numbers(value)
         if found.shape != (3,) or not np.all(np.isfinite(found)):
             raise ModelError(f"{type(self).__name__}: found {name}={value!r}, expected three finite numbers")
         object.__setattr__(self, name, found)
         return found
 
-    def _not_negative(self, *names: str) -> None:
+    def _not_negative(self, *names: str, remedy: str = "; 0 leaves this error out") -> None:
         for name in names:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
+            found = numbers(value := getattr(self, name))
+            if found.shape != () or not (np.isfinite(found) and found >= 0):
                 raise ModelError(
-                    f"{type(self).__name__}: found {name}={value!r}, expected a number that is not negative; "
-                    "0 leaves this error out"
+                    f"{type(self).__name__}: found {name}={value!r}, expected a number that is not negative{remedy}"
                 )
+
+    def _relative(self, name: str, *shapes: tuple[int, ...]) -> None:
+        """Check a relative error: a number, or an array of one of the shapes."""
+        found = numbers(value := getattr(self, name))
+        if found.shape not in ((), *shapes) or not np.all(np.isfinite(found)):
+            many = "".join(f", or an array of shape {shape}" for shape in shapes)
+            raise ModelError(f"{type(self).__name__}: found {name}={value!r}, expected a finite number{many}")
+
+    def _range(self, name: str, value: Any, unit: str) -> None:
+        """Check two limits; the upper one may be infinite."""
+        found = numbers(value)
+        if found.shape != (2,) or not found[0] < found[1]:
+            raise ModelError(
+                f"{type(self).__name__}: found {name}={value!r}, expected (least, largest) in {unit}"
+            )
 
     def _poses(self, r: Any, R: Any) -> tuple[Array, Array, bool]:
         found = poses(r, np.eye(3) if R is None else R, type(self).__name__)
@@ -170,6 +191,10 @@ class LaserTracker(Device):
         self._not_negative(
             "range_noise", "range_noise_per_metre", "transverse_noise", "transverse_noise_per_metre"
         )
+        self._relative("scale")
+        self._range("(nearest, farthest)", (self.nearest, self.farthest), "m")
+        self._range("elevation", self.elevation, "rad")
+        self._not_negative("acceptance", remedy=" in rad")
 
     def covariance(self, r: Any, R: Any = None) -> Array:
         """Covariance of the measured position in the world at poses r (N, 3), R (N, 3, 3), (N, 3, 3) in m2."""
@@ -249,6 +274,14 @@ class TMac(LaserTracker):
         return Measured(position, rotation, found.readings, found.names, found.seen)
 
 
+def numbers(value: Any) -> Array:
+    """The value as an array of floats; NaN where it is no number at all, which no check lets pass."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return np.full((), np.nan)
+
+
 def _polar(points: Array) -> tuple[Array, Array, Array]:
     """Range in m, azimuth from x and elevation from the xy plane in rad, (N,) each."""
     flat = np.hypot(points[:, 0], points[:, 1])
@@ -272,14 +305,14 @@ def _like(seen: Array, values: Array) -> Array:
 
 
 def _rotation(what: str, R: Any) -> Array:
-    found = np.asarray(R, dtype=float)
+    found = numbers(R)
     if (
         found.shape != (3, 3)
         or not np.allclose(found @ found.T, np.eye(3), atol=ORTHONORMAL)
         or np.linalg.det(found) < 0
     ):
+        shown = found.round(6).tolist() if found.ndim else repr(R)
         raise ModelError(
-            f"{what}: found R={np.round(found, 6).tolist()}, expected a rotation matrix (3, 3); its columns are the axes "
-            "of the device in the world"
+            f"{what}: found R={shown}, expected a rotation matrix (3, 3); its columns are the axes of the device in the world"
         )
     return found

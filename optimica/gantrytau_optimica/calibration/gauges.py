@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.devices import Array, Device, Measured
+from gantrytau_optimica.calibration.devices import Array, Device, Measured, numbers
 from gantrytau_optimica.calibration.sight import Bars, clear
 
-ROUNDS = 6  # Newton steps of a trilateration, which converges quadratically
+ROUNDS = 12  # Newton steps of a trilateration, which converges quadratically
+SETTLED = 1e-9  # m, what the last of them may be
+TOLD = 1e-3  # of a metre, by which some distance changes for each metre that the target moves, whereto it be
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +34,10 @@ class LengthGauge(Device):
     def __post_init__(self):
         super().__post_init__()
         self._not_negative("reach", "noise")
-        if not self.stroke[0] < self.stroke[1]:
-            raise ModelError(f"LengthGauge: found stroke={self.stroke!r}, expected (least, largest) in m")
-        if self.face is not None:
-            self._vector("face", self.face)
+        self._relative("scale")
+        self._range("stroke", self.stroke, "m")
+        if self.face is not None and not np.any(self._vector("face", self.face)):
+            raise ModelError(f"LengthGauge: found face={self.face!r}, expected a direction")
 
     def _lengths(self, points: Array, R: Array) -> Array:
         """Readings without errors, (N,); a face that the axis never meets gives infinity."""
@@ -63,8 +65,9 @@ class Wires(Device):
     """Draw wires or telescoping bars from anchors to the target: distances, and from three on the position.
 
     anchors: (m, 3) in m in the axes of the device; readings: m distances in m. With three and more the position follows
-    by least squares, on the side of the anchors where the tool is, which is known to who fastens them. noise: standard
-    deviation in m, 20 um; scale: relative error of the distances, a number or (m,), systematic. shortest, longest: m.
+    by least squares, on the side of the anchors where the tool is, which is known to who fastens them; it is NaN where
+    distances do not tell it, as near the plane of the anchors. noise: standard deviation in m, 20 um; scale: relative
+    error of the distances, a number or (m,), systematic. shortest, longest: m.
     """
 
     _: KW_ONLY
@@ -77,13 +80,15 @@ class Wires(Device):
     def __post_init__(self):
         super().__post_init__()
         self._not_negative("noise", "shortest")
-        anchors = np.atleast_2d(np.asarray(self.anchors, dtype=float))
+        self._range("(shortest, longest)", (self.shortest, self.longest), "m")
+        anchors = np.atleast_2d(numbers(self.anchors))
         if anchors.ndim != 2 or anchors.shape[1] != 3 or not np.all(np.isfinite(anchors)):
             raise ModelError(f"Wires: found anchors of shape {anchors.shape}, expected (m, 3)")
         if len(anchors) > 2 and np.linalg.matrix_rank(anchors - anchors.mean(axis=0), tol=1e-6) < 2:
             raise ModelError(
                 "Wires: found all anchors on one line, expected a triangle; move one off the line"
             )
+        self._relative("scale", (len(anchors),))
         object.__setattr__(self, "anchors", anchors)
 
     def _within(self, points: Array, R: Array) -> Array:
@@ -111,12 +116,18 @@ class Wires(Device):
         return np.linalg.norm(points[:, None] - self.anchors, axis=2)
 
     def _position(self, points: Array, readings: Array) -> Array:
-        """Gauss-Newton on all distances, from the side where the tool is."""
-        for _ in range(ROUNDS):
-            away = points[:, None] - self.anchors
-            distances = np.linalg.norm(away, axis=2)
-            rows = away / distances[:, :, None]
-            normal = rows.transpose(0, 2, 1) @ rows
-            right = rows.transpose(0, 2, 1) @ (readings - distances)[:, :, None]
-            points = points + np.linalg.solve(normal, right)[:, :, 0]
-        return points
+        """Gauss-Newton on all distances, from the side where the tool is; NaN where it does not settle."""
+        told = np.ones(len(points), dtype=bool)
+        rows, step = np.zeros((len(points), *self.anchors.shape)), np.zeros_like(points)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for _ in range(ROUNDS):
+                away = points[:, None] - self.anchors
+                distances = np.linalg.norm(away, axis=2)
+                rows = away / distances[:, :, None]
+                told = np.isfinite(rows).all(axis=(1, 2))
+                inverse = np.linalg.pinv(np.where(told[:, None, None], rows, 0.0))
+                step = (inverse @ (readings - distances)[:, :, None])[:, :, 0]
+                points = points + np.where(told[:, None], step, np.nan)
+            told &= np.linalg.svd(np.where(told[:, None, None], rows, 0.0), compute_uv=False)[:, -1] > TOLD
+            told &= np.linalg.norm(step, axis=1) < SETTLED
+        return np.where(told[:, None], points, np.nan)

@@ -25,7 +25,12 @@ class Bars:
     radius: float
 
     def __post_init__(self):
-        start, end = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
+        try:
+            start, end = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
+        except (TypeError, ValueError):
+            raise ModelError(
+                f"Bars: found ends {self.start!r} and {self.end!r}, expected arrays of numbers"
+            ) from None
         if start.shape != end.shape or start.ndim not in (2, 3) or start.shape[-1] != 3:
             raise ModelError(
                 f"Bars: found ends of shapes {start.shape} and {end.shape}, expected (N, k, 3) for both, or (k, 3)"
@@ -57,6 +62,8 @@ def clear(eye: Array, points: Array, obstacles: Sequence[Obstacle], bars: Bars |
     """Whether nothing stands between eye (3,) and each of points (N, 3), both in m in the world, (N,)."""
     free = np.ones(len(points), dtype=bool)
     if bars is not None:
+        if not isinstance(bars, Bars):
+            raise ModelError(f"bars: found {type(bars).__name__}, expected Bars(start, end, radius)")
         free &= ~bars.hide(eye, points)
     for obstacle in obstacles:
         free &= segment_distance(obstacle, np.broadcast_to(eye, points.shape), points) > 0
