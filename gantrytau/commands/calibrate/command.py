@@ -1,23 +1,29 @@
 """`gantrytau calibrate`: its argument says whether a measurement is planned or made use of."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gantrytau.commands.calibrate import results, wording
-from gantrytau.commands.calibrate.measured import Measured, calibrated
+from gantrytau.commands import parameter_files
+from gantrytau.commands.calibrate import finishing, planning, results
+from gantrytau.commands.calibrate.example import EXAMPLE
+from gantrytau.commands.calibrate.finishing import Choice
+from gantrytau.commands.calibrate.measured import Measured
+from gantrytau.commands.calibrate.planned import Planned
 from gantrytau.commands.calibrate.policy import policy, rail_files
 from gantrytau.commands.choice import source_of
 from gantrytau.commands.models import build
 from gantrytau.commands.options import Json, PrototypeName, Settings
-from gantrytau.commands.reporting import CommandError, as_json, reporting
+from gantrytau.commands.reporting import CommandError, reporting
 
 Source = Annotated[
     Path | None,
     typer.Argument(
         metavar="FILE",
-        help="Measured poses, as measurements.csv with the header q1,q2,...,x,y,z[,qw,qx,qy,qz] in m and rad.",
+        help="Measured poses, as measurements.csv with the header q1,q2,...,x,y,z[,qw,qx,qy,qz] in m and rad; or a cell to "
+        "be planned, as cell.toml.",
         show_default=False,
     ),
 ]
@@ -75,35 +81,75 @@ def calibrate(
     prior: Prior = None,
     robust: Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")] = False,
     holdout: Annotated[
-        str,
-        typer.Option(metavar="second|none", help="Which poses validate: every second, or those of the fit."),
-    ] = "second",
+        str | None,
+        typer.Option(
+            metavar="second|none",
+            help="Which poses validate: every second, or those of the fit.",
+            show_default="second; of a plan all are fitted after that",
+        ),
+    ] = None,
     output: Output = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Print the file of a cell, to begin with.")
+    ] = False,
     json: Json = False,
 ) -> None:
-    """Calibrate a robot with measured poses: parameters, how sure they are, and the error that is left.
+    """Calibrate a robot: plan what to measure (cell.toml), then find its parameters (measurements.csv).
 
-    Writes a report (HTML and JSON) and calibrated.toml, which all commands take: --set calibrated.toml.
+    cell.toml says what the tape measure knows of robot, obstacles and device: poses that are safe and visible, a robot
+    program in a collision-free order, and a verdict go into a folder. Interrupted, the same command goes on where it was.
+
+    measurements.csv gives the parameters, how sure they are, and the error that is left: a report (HTML and JSON), and
+    calibrated.toml, which all commands take: --set calibrated.toml. The plan in its folder, or --robot, says of which robot.
     """
     with reporting(json, source_of(robot) if robot else None):
+        if example:
+            typer.echo(EXAMPLE, nl=False)
+            return
         if file is None:
-            raise CommandError("found no FILE, expected measurements: gantrytau calibrate measurements.csv")
-        how = policy(model, method, start, orientation, holdout, prior, robust)
+            raise CommandError(
+                "found no FILE, expected measurements, gantrytau calibrate measurements.csv, or a cell to be planned: "
+                "gantrytau calibrate --example > cell.toml"
+            )
+        if file.suffix.lower() == parameter_files.SUFFIX:
+            _refuse_others(
+                file, dict(robot=robot, rails=rails, model=model, prior=prior, set=set_, prototype=prototype)
+            )
+            planning.plan(file, output, json)
+            return
+        how = policy(model, method, start, orientation, holdout or "second", prior, robust)
         folder = output or results.folder_beside(file)
         results.rehearse(folder)
-        if robot is None:
-            raise CommandError(
-                f"{file}: found no robot for these measurements; name it with its nominal values, as "
-                f"gantrytau calibrate {file} --robot 'GantryTau(L1)'"
-            )
+        choice = _robot(file, robot, prototype, set_ or ())
         measured = Measured.read(file, rail_files(rails))
-        chosen = build(robot, prototype, set_ or ())
-        found = calibrated(chosen.model, measured, how, json)
+        finishing.finish(choice, measured, how, folder, validate=holdout is None, json=json)
+
+
+def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> Choice:
+    """The robot that is named, or that of the plan beside the measurements."""
+    if robot is not None:
+        chosen = build(robot, prototype, settings)
         name = f"{chosen.name}({chosen.prototype})" if chosen.prototype else robot
-        written = results.write(found, folder, name, file)
-        if json:
-            typer.echo(as_json(wording.summary(found, measured, name, written)))
-        else:
-            wording.show(found, measured, written)
+        return Choice(chosen.model, name, None)
+    planned = Planned.beside(file)
+    if planned is None:
+        raise CommandError(
+            f"{file}: found no plan beside it that says of which robot it is; name the robot with its nominal values, as "
+            f"gantrytau calibrate {file} --robot 'GantryTau(L1)'"
+        )
+    if settings or prototype:
+        raise CommandError(
+            f"{file}: the plan beside it says what the robot is ({planned.cell.name}); leave --set and --prototype out, "
+            "or give --robot"
+        )
+    return Choice(planned.cell.robot, planned.cell.name, planned)
+
+
+def _refuse_others(file: Path, options: dict[str, object]) -> None:
+    """CommandError for options that say what the file of a cell says."""
+    if given := [f"--{name}" for name, value in options.items() if value]:
+        raise CommandError(
+            f"{file} says what is planned, found {', '.join(given)} too; leave it out, or write it there"
+        )

@@ -50,7 +50,7 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
     if not found.success:
         fail(
             f"{measured.file}: the search for parameters did not settle within {found.iterations} steps; look at the "
-            "measurements, try --robust, or --start linear; nothing was written",
+            "measurements, measure more poses, or try --robust or --start linear\nNothing was written",
             FAULT,
             json,
             kind="SolveError",

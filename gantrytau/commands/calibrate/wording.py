@@ -1,5 +1,6 @@
 """What `gantrytau calibrate` prints of a calibration."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,14 @@ def summary(found: Any, measured: Measured, robot: str, files: list[str]) -> dic
     return {"measurements": str(measured.file), **numbers, "files": files}
 
 
-def show(found: Any, measured: Measured, files: list[str]) -> None:
-    """Error, findings and parameters, readable in a terminal."""
+def show(
+    found: Any, measured: Measured, files: list[str], notes: Sequence[str], verdict: Mapping[str, Any]
+) -> None:
+    """Verdict, error, findings and parameters, readable in a terminal."""
+    if verdict:
+        typer.echo(f"{'Good' if verdict['good'] else 'NOT GOOD ENOUGH'}: {verdict['verdict']}")
     errors = found.errors[np.isfinite(found.errors)] * 1e6
-    kept = "not fitted" if found.held_out is not found.rows else "of the fit itself"
+    kept = "of the fit itself" if np.array_equal(found.held_out, found.rows) else "not fitted"
     typer.echo(
         f"{found.geometry.name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
         f"{measured.file.name}, in {found.iterations} steps"
@@ -38,6 +43,8 @@ def show(found: Any, measured: Measured, files: list[str]) -> None:
     if np.isfinite(found.angle_error):
         typer.echo(f"Angle error: {np.degrees(found.angle_error) * 1e3:.4g} mdeg in the mean")
     typer.echo(f"Noise of {found.noise * 1e6:.4g} um in each measured coordinate explains what is left")
+    for note in notes:
+        typer.echo(note)
     if not found.findings:
         typer.echo("Nothing doubtful was found in the measurements")
     for finding in found.findings:

@@ -1,0 +1,96 @@
+"""The end of a calibration: parameters found, compared with what was wanted, written and told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gantrytau.commands.calibrate import results, wording
+from gantrytau.commands.calibrate.measured import Measured, calibrated
+from gantrytau.commands.calibrate.planned import Planned
+from gantrytau.commands.reporting import FAULT, as_json, note
+from gantrytau.model import Model
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The robot with its nominal values, its name on the command line, and the plan by which it is measured, or None."""
+
+    robot: Model
+    name: str
+    planned: Planned | None
+
+
+def finish(
+    choice: Choice, measured: Measured, policy: dict[str, Any], folder: Path, *, validate: bool, json: bool
+) -> None:
+    """Calibrate, write and print; leaves with exit code 1 where the error is larger than wanted.
+
+    validate: for a plan, which asks for few poses, fit all of them once half of them have foretold the others.
+    """
+    planned, rest, told = choice.planned, {}, []
+    if planned is not None:
+        measured, words = planned.placed(measured)
+        told += [f"frame: {words}"] if words else []
+        missing = planned.missing(measured)
+        if missing:
+            rest = {"missing": missing, "program": str(planned.write_rest(measured))}
+            told.append(_missing(missing, rest["program"]))
+            if not json:
+                note(told.pop())  # also when the rest does not suffice
+    found, error = _found(choice, measured, policy, validate and planned is not None, json)
+    written = results.write(found, folder, choice.name, measured.file)
+    verdict = {} if planned is None else _verdict(float(error), planned)
+    if json:
+        numbers = wording.summary(found, measured, choice.name, written)
+        typer.echo(as_json({**numbers, **rest, **verdict, "notes": told}))
+    else:
+        wording.show(found, measured, written, told, verdict)
+    if verdict and not verdict["good"]:
+        raise typer.Exit(FAULT)
+
+
+def _found(
+    choice: Choice, measured: Measured, policy: dict[str, Any], both: bool, json: bool
+) -> tuple[Any, float]:
+    """The calibration, and its error in poses that were not fitted, if there are enough of them."""
+    if not both:
+        found = calibrated(choice.robot, measured, policy, json)
+        return found, found.error
+    from gantrytau_optimica import CalibrationError
+
+    whole = dict(policy, holdout=None)
+    found = calibrated(choice.robot, measured, whole, json)
+    try:
+        half = calibrated_quietly(choice.robot, measured, policy)
+    except CalibrationError:  # too few for that
+        return found, found.error
+    return found, half.error
+
+
+def calibrated_quietly(robot: Model, measured: Measured, policy: dict[str, Any]) -> Any:
+    """The calibration without words about it."""
+    from gantrytau_optimica import calibrate
+
+    return calibrate(robot, measured.data, **policy)
+
+
+def _missing(numbers: list[int], program: str) -> str:
+    shown = ", ".join(map(str, numbers[:12])) + (", ..." if len(numbers) > 12 else "")
+    return (
+        f"{len(numbers)} planned poses are not measured, numbers {shown} of poses.csv; the program of these is {program}: "
+        "measure them, add their lines, and give the same command again"
+    )
+
+
+def _verdict(error: float, planned: Planned) -> dict[str, Any]:
+    wanted = planned.cell.wanted
+    good = bool(error <= wanted)
+    words = (
+        f"{error * 1e6:.4g} um in the mean of poses that were not fitted, {wanted * 1e6:.4g} um were wanted"
+    )
+    if not good:
+        words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
+    found: dict[str, Any] = {"good": good, "validation_error_m": error, "wanted_m": wanted, "verdict": words}
+    return found if good else {**found, "error": words}
