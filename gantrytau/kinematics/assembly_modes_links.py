@@ -30,6 +30,17 @@ def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
 
     Pairs that share a joint do not count.
     """
+    a, b, u, v, shared, crossed = _pairs(base, ends)
+    return LinkGeometry(crossed, np.where(shared, np.inf, between_segments(a, a + u, b, b + v)).min(1))
+
+
+def crossings(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Pairs of links that cross, (k, 15); base joints (6, 3) or (k, 6, 3), as in `link_geometry`."""
+    return _pairs(base, ends)[5]
+
+
+def _pairs(base: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Per pair of links: base joints and vectors along both (k, 15, 3), whether they share a joint, whether they cross."""
     i, j = PAIRS.T
     starts = np.broadcast_to(base, ends.shape)
     a, b = starts[:, i], starts[:, j]
@@ -38,7 +49,7 @@ def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
     shared = np.minimum(at_base, at_platform) < PARALLEL * np.linalg.norm(u, axis=2)
     alike = (at_base < ALIKE * at_platform) & (at_platform < ALIKE * at_base)
     crossed = alike & ~shared & (_seen_along(a - b, a + u - b - v, u, v) < 0)
-    return LinkGeometry(crossed, np.where(shared, np.inf, between_segments(a, a + u, b, b + v)).min(1))
+    return a, b, u, v, shared, crossed
 
 
 def _seen_along(first: np.ndarray, second: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -7,9 +7,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.assembly_modes import assembly_modes
-from gantrytau.kinematics.assembly_modes_links import link_geometry
 from gantrytau.kinematics.closed_form import meeting
-from gantrytau.kinematics.geometry import Geometry
 from gantrytau.kinematics.linked import LinkedRobot, SixLinks, ThreeLinks, TurningLinks
 from gantrytau.kinematics.newton import solve_lengths
 from gantrytau.kinematics.poses import Poses, answered
@@ -47,10 +45,14 @@ def of_joints(robot: LinkedRobot, q: np.ndarray, one: bool, limits: np.ndarray) 
             f"Kinematics.configurations: found q of {len(q)} rows, expected one for a robot with six links, as the number "
             "of solutions differs from pose to pose; ask for one after the other"
         )
+    if not np.isfinite(q).all():
+        return []
     geometry = robot.geometry
     modes = assembly_modes(geometry.cart_joints(q)[0], geometry.on_plate, geometry.length)
     r, R = np.real(modes.r[modes.real]), np.real(modes.R[modes.real])
     home_r, home_R, _ = robot.fk(q)
+    if np.isnan(home_r).any():  # nothing on the branch
+        home_r, home_R = robot.home.r, robot.home.R
     away = np.linalg.norm(r - home_r, axis=1) + np.linalg.norm(R - home_R, axis=(1, 2))
     return [configuration(robot, q, r[k][None], R[k][None], one, limits) for k in np.argsort(away)]
 
@@ -74,15 +76,8 @@ def configuration(robot: LinkedRobot, q, r, R, one: bool, limits: np.ndarray) ->
     """A solution with what can be said of it."""
     with np.errstate(invalid="ignore"):
         inside = ((q >= limits[:, 0]) & (q <= limits[:, 1])).all(axis=1)
-        feasible = inside & np.isfinite(r).all(axis=1) & ~crossed(robot.geometry, q, r, R)
+        feasible = inside & np.isfinite(r).all(axis=1) & ~robot.crossed(q, r, R)
     return Configuration(*answered(one, q, np.array(r), np.array(R), feasible))
-
-
-def crossed(geometry: Geometry, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """(N,), whether two links cross."""
-    if len(geometry.length) == 3:  # single links all end in the tool
-        return np.zeros(len(q), dtype=bool)
-    return np.any(link_geometry(geometry.cart_joints(q), geometry.plate_joints(r, R)).crossed, axis=1)
 
 
 def _of_turntables(robot: TurningLinks, at: Poses, limits: np.ndarray) -> list[Configuration]:

@@ -112,6 +112,27 @@ class Geometry:
                 by_joints[:, links, column] = -np.sum(u[:, links] * moved, axis=2)
         return length, u, by_pose, by_joints
 
+    def reach(self) -> tuple[np.ndarray, np.ndarray]:
+        """How far the tool can be from a point on the cart at s = 0, for each link: points (m, 3), distances (m,) in m."""
+        around = self.offset[self.arm]
+        reach = self.length + np.linalg.norm(self.on_plate, axis=1)
+        if not self.turntables:
+            return around + self.on_cart, reach
+        tables = np.zeros(len(self.offset))
+        np.add.at(
+            tables, [t.arm for t in self.turntables], [np.linalg.norm(t.offset) for t in self.turntables]
+        )
+        return around, reach + np.linalg.norm(self.on_cart, axis=1) + tables[self.arm]
+
+    def could_reach(self, r: np.ndarray) -> np.ndarray:
+        """Whether each link is as long as the tool is far from its guideway, in any orientation, (N,); not with NaN."""
+        around, reach = self.reach()
+        v = self.direction[self.arm]
+        v = v / np.linalg.norm(v, axis=1, keepdims=True)
+        gap = r[:, None] - around
+        away = gap - (gap * v).sum(-1, keepdims=True) * v
+        return ((away**2).sum(-1) <= reach**2 * (1 + 1e-12)).all(axis=1)
+
     def mean_arms(self) -> tuple[np.ndarray, np.ndarray]:
         """Each arm as one link: mean joint on the plate (3, 3), mean length (3,)."""
         on_plate = np.stack([self.on_plate[self.links_of(arm)].mean(axis=0) for arm in range(3)])

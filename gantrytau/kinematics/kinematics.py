@@ -102,8 +102,9 @@ class Kinematics:
     def fk(self, q: Any, near: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """Poses r (N, 3), R (N, 3, 3) of actuator coordinates; (3,) and (3, 3) for one.
 
-        near: a position r, or (r, R): the branch near it (three links) or where the iteration starts; by default the
-        branch of the start of the model.
+        near: a position r, or (r, R): the branch near it (three links), or where an iteration starts that takes what it
+        finds, among the poses that ik answers with q. By default the branch of the start of the model, NaN where there is
+        nothing on it: tool on the other side of the carts, or links that cross.
         """
         q, one = vectors(q, len(self.joints), "q", "Kinematics.fk")
         if near is not None:

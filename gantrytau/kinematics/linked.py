@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.kinematics.assembly_modes_links import crossings
 from gantrytau.kinematics.closed_form import (
     InverseOfThreeLinks,
     forward_of_three_links,
@@ -89,6 +90,26 @@ class LinkedRobot:
         on_plate, length = self.geometry.mean_arms()
         return self.geometry.mean_joints(q) - on_plate @ np.swapaxes(R, 1, 2), length
 
+    @cached_property
+    def crosses_at_home(self) -> bool:
+        """Whether links cross in the start of the model, so that crossed links say nothing."""
+        return bool(self.crossed(self.home.q[None], self.home.r[None], self.home.R[None])[0])
+
+    def crossed(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """(N,), whether two links cross; single links all end in the tool."""
+        if len(self.geometry.length) == 3:
+            return np.zeros(len(q), dtype=bool)
+        ends = self.geometry.plate_joints(r, R)
+        return np.any(crossings(self.geometry.cart_joints(q), ends), axis=1)
+
+    def on_branch(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """(N,), whether the tool is on the side of the carts where it is at home, and no links cross that did not there."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            same = np.equal(self.ahead_of(q, r, R), self.ahead)
+            if not self.crosses_at_home:
+                same &= ~self.crossed(q, r, R)
+            return same
+
     def single_links(self, q: np.ndarray, R: np.ndarray) -> np.ndarray:
         """The tool (N, 3), were each arm one link; over the plane of the carts where they do not meet."""
         centres, length = self.spheres(q, R)
@@ -105,6 +126,14 @@ class LinkedRobot:
         away = d - along[:, :, None] * v
         square = (self.geometry.length**2 - np.sum(away * away, axis=2)) / vv
         return along - np.asarray(sides)[self.geometry.arm] * np.sqrt(np.maximum(square, 0.0))
+
+    def pose_from(self, q: np.ndarray, r: np.ndarray, R: np.ndarray, keep: bool):
+        """r, R and iterations of (4.30) from a pose; keep: NaN for what is not on the branch."""
+        _, r, R, iterations = solve_lengths(self.geometry, q, r, R, range(6))
+        if keep:
+            other = ~self.on_branch(q, r, R)
+            r[other], R[other] = np.nan, np.nan
+        return r, R, iterations
 
     def mean_carts(self, each: np.ndarray) -> np.ndarray:
         """(N, 3), the means over the links of each arm."""
@@ -167,21 +196,30 @@ class SixLinks(LinkedRobot):
 
     def follow(self, r, sides):
         """Coordinates q, orientation and iterations of a tool at r: Newton in q and three rotations."""
-        R = self.repeated(len(r))
+        q, R, iterations = (
+            np.full_like(r, np.nan),
+            np.full((len(r), 3, 3), np.nan),
+            np.zeros(len(r), dtype=int),
+        )
+        near = self.geometry.could_reach(r)  # iterations take longest where there is nothing to find
+        r = r[near]
+        turned = self.repeated(len(r))
         A = self.geometry.cart_joints(np.zeros((len(r), 3)))
-        start = self.mean_carts(self.carts(r, R, A, sides))
-        q, _, R, iterations = solve_lengths(self.geometry, start, r, R, (3, 4, 5, 6, 7, 8))
+        start = self.mean_carts(self.carts(r, turned, A, sides))
+        found, _, turned, iterations[near] = solve_lengths(
+            self.geometry, start, r, turned, (3, 4, 5, 6, 7, 8)
+        )
         with np.errstate(invalid="ignore"):
-            other = (self.sides_of(q, r, R) * np.asarray(sides) <= 0).any(axis=1)
-        q[other], R[other] = np.nan, np.nan
+            other = (self.sides_of(found, r, turned) * np.asarray(sides) <= 0).any(axis=1)
+        found[other], turned[other] = np.nan, np.nan
+        q[near], R[near] = found, turned
         return q, R, iterations
 
     def fk(self, q, near=None):
         """r, R and iterations, by (4.30) from `near`, or from the pose of single links at the orientation at home."""
         R = self.repeated(len(q), None if near is None else near[1])
         r = self.single_links(q, R) if near is None else near[0]
-        _, r, R, iterations = solve_lengths(self.geometry, q, r, R, range(6))
-        return r, R, iterations
+        return self.pose_from(q, r, R, keep=near is None)
 
     def jacobian(self, r, R=None):
         """dq/dr (N, 3, 3) with the orientation that follows; with R (N, 3, 6), the mean over the links of an arm (4.15)."""
@@ -207,7 +245,18 @@ class TurningLinks(LinkedRobot):
                 "(3, 3) or (N, 3, 3), such as kinematics.home.R"
             )
         sides = self.sides if sides is None else sides
-        q = self.five_degrees(r, R, sides)
+        q, iterations = np.full((len(r), 6), np.nan), np.zeros(len(r), dtype=int)
+        rows = np.flatnonzero(self.geometry.could_reach(r))
+        # where arms are so bent that (4.25) starts too far away, the angles at home may be nearer
+        for start in (self.five_degrees, self.turned_as_at_home):
+            place, turn = r[rows], R[rows]
+            q[rows], count = self._arm_by_arm(start(place, turn, sides), place, turn, sides)
+            iterations[rows] += count
+            rows = rows[np.isnan(q[rows, 0])]
+        return q, iterations
+
+    def _arm_by_arm(self, q, r, R, sides):
+        """Coordinates q and iterations of (4.27) from a start; NaN rows where an arm is not on its side."""
         iterations = np.zeros(len(r), dtype=int)
         for arm in range(3):
             free = [6 + k for k in self.geometry.columns_of(arm)]
@@ -216,6 +265,12 @@ class TurningLinks(LinkedRobot):
         with np.errstate(invalid="ignore"):
             q[(self.sides_of(q, r, R) * np.asarray(sides) <= 0).any(axis=1)] = np.nan
         return q, iterations
+
+    def turned_as_at_home(self, r, R, sides):
+        """Coordinates q (N, 6) with turntables as at home, and carts where each arm, one link, meets the plate."""
+        q = np.zeros((len(r), 6))
+        q[:, 3:] = self.home.q[3:]
+        return self.with_carts(q, r, R, sides)
 
     def five_degrees(self, r, R, sides):
         """Coordinates q (N, 6) as if the links of an arm were parallel and of one length (4.25)."""
@@ -255,8 +310,7 @@ class TurningLinks(LinkedRobot):
     def fk(self, q, near=None):
         """r, R and iterations: the pose of five degrees (4.26) or `near`, then (4.30)."""
         r, R = self.pose_of_five_degrees(q) if near is None else near
-        _, r, R, iterations = solve_lengths(self.geometry, q, r, R, range(6))
-        return r, R, iterations
+        return self.pose_from(q, r, R, keep=near is None)
 
     def pose_of_five_degrees(self, q):
         """The pose in which arms are nearest to parallelograms (4.26): differences of joints fitted, then spheres."""

@@ -13,9 +13,12 @@ import numpy as np
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.linked import Home
-from gantrytau.kinematics.rotations import of_quaternion, quaternions, skewed
+from gantrytau.kinematics.newton import limited, solved
+from gantrytau.kinematics.rotations import of_quaternion, quaternions, rotations, skewed
 
-BLOCK = 256  # poses of one call
+BLOCK = 16  # poses of one call: far more cost than the call, few enough that Ctrl-C is soon heard where none is in reach
+MOST = 30  # iterations from `near`
+CLOSE = 1e-11  # of a joint, in m or rad, relative to its size: what the iteration of the inverse leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,27 +32,62 @@ class ModelFunctions:
 
     def ik(self, r, R=None, sides=None):
         """Joints q and iterations (none are counted: they run inside the functions)."""
-        return _over_poses(self._inverse, [self._pose(r, R)])[0], np.zeros(len(r), dtype=int)
+        return self._joints_of(self._pose(r, R)), np.zeros(len(r), dtype=int)
 
     def fk(self, q, near=None):
-        """r, R and iterations."""
+        """r, R and iterations; near: (r, R) where Newton on the inverse starts, else the branch of the start values."""
         if near is not None:
-            raise ModelError(
-                f"Kinematics: found near= for {self.dae.name}, whose forward kinematics has no closed form, expected none; "
-                "choose the branch by start values of the model"
-            )
+            return self._forward_from(self._pose(near[0], near[1] if len(self.joints) == 6 else None), q)
         found = _over_poses(self._forward, list(q.T[:, :, None]))
         if self._turns:
             R = found[1].reshape(-1, 3, 3).transpose(0, 2, 1)
         else:
             R = np.array(np.broadcast_to(np.eye(3), (len(q), 3, 3)))
+            R[np.isnan(found[0][:, 0])] = np.nan
         return found[0], R, np.zeros(len(q), dtype=int)
+
+    def _forward_from(self, x: np.ndarray, q: np.ndarray):
+        """Poses of which the inverse is q, from poses x (N, 3 or 6) near them; NaN where Newton does not end."""
+        x, iterations = np.array(x), np.zeros(len(q), dtype=int)
+        rows = np.flatnonzero(np.isfinite(x).all(axis=1) & np.isfinite(q).all(axis=1))
+        x[np.setdiff1d(np.arange(len(q)), rows)] = np.nan
+        for _ in range(MOST):
+            error = q[rows] - self._joints_of(x[rows])
+            ended = ~(np.abs(error) > CLOSE * (1 + np.abs(q[rows]))).any(axis=1)
+            x[rows[np.isnan(error).any(axis=1)]] = np.nan
+            rows, error = rows[~ended], error[~ended]
+            if not rows.size:
+                break
+            x[rows] += limited(solved(self._slopes_of(x[rows]), error))
+            iterations[rows] += 1
+        x[rows] = np.nan
+        R = self._orientation(x)
+        return x[:, :3], R, iterations
+
+    def _orientation(self, x: np.ndarray) -> np.ndarray:
+        """Orientations of poses as the inverse takes them."""
+        if len(self.joints) == 6:
+            with np.errstate(invalid="ignore"):
+                scalar = np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
+            return rotations(np.column_stack([scalar, x[:, 3:]]))
+        if self._turns:
+            return _over_poses(self._following, [x])[0].reshape(-1, 3, 3).transpose(0, 2, 1)
+        R = np.array(np.broadcast_to(np.eye(3), (len(x), 3, 3)))
+        R[np.isnan(x[:, 0])] = np.nan
+        return R
+
+    def _joints_of(self, x: np.ndarray) -> np.ndarray:
+        return _over_poses(self._inverse, [x])[0]
+
+    def _slopes_of(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of the joints by the elements of poses, (N, n, 3 or 6)."""
+        found = _over_poses(self._slopes, [x])[0]
+        return found.reshape(len(x), x.shape[1], -1).transpose(0, 2, 1)
 
     def jacobian(self, r, R=None):
         """dq/dpose (N, n, 3), with six joints (N, n, 6)."""
-        pose = self._pose(r, R)
-        found = _over_poses(self._slopes, [pose])[0].reshape(len(r), pose.shape[1], -1).transpose(0, 2, 1)
-        if R is None or pose.shape[1] == 3:
+        found = self._slopes_of(self._pose(r, R))
+        if R is None or found.shape[2] == 3:
             return found
         q = quaternions(R)
         # a rotation vector turns the quaternion (w, v) by half of (w I - [v]x) in its last three elements
@@ -65,6 +103,11 @@ class ModelFunctions:
         """Position and orientation, column after column, from the joints one by one."""
         wanted = [f"{self.tool}.r"] + ([f"{self.tool}.R"] if self._turns else [])
         return _dense(self.dae.function(list(self.joints), wanted))
+
+    @cached_property
+    def _following(self) -> ca.Function:
+        """Orientation, column after column, that follows from a position."""
+        return _dense(self.dae.function([f"{self.tool}.r"], [f"{self.tool}.R"]))
 
     @cached_property
     def _slopes(self) -> ca.Function:
@@ -111,7 +154,16 @@ def _dense(function: ca.Function) -> ca.Function:
 
 
 def _over_poses(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
-    """Results (N, k) of a function for arguments (N, l), a block of poses in one call."""
+    """Results (N, k) of a function for arguments (N, l); NaN where one is not finite, which CasADi would report."""
+    known = np.all([np.isfinite(argument).all(axis=1) for argument in arguments], axis=0)
+    found = [np.full((len(known), function.numel_out(i)), np.nan) for i in range(function.n_out())]
+    for result, part in zip(found, _in_blocks(function, [a[known] for a in arguments]), strict=True):
+        result[known] = part
+    return found
+
+
+def _in_blocks(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
+    """The same for finite arguments, a block of poses in one call."""
     count = len(arguments[0])
     whole = count - count % BLOCK
     found = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]

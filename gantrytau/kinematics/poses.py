@@ -19,8 +19,14 @@ class Poses:
 
 
 def vectors(value: object, size: int, name: str, place: str) -> tuple[np.ndarray, bool]:
-    """(N, size) of (size,) or (N, size), and whether it was one; ModelError for any other shape."""
+    """(N, size) of (size,) or (N, size), and whether it was one; infinite numbers as NaN.
+
+    ModelError for any other shape.
+    """
     array = _numbers(value, name, place)
+    with np.errstate(invalid="ignore", over="ignore"):
+        if not np.isfinite(array.sum()):
+            array = np.where(np.isinf(array), np.nan, array)
     if array.shape == (size,):
         return array[None], True
     if array.ndim == 2 and array.shape[1] == size:
@@ -62,8 +68,11 @@ def answered(one: bool, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
 
 def _numbers(value: object, name: str, place: str) -> np.ndarray:
     try:
-        return np.asarray(value, dtype=float)
+        array = np.asarray(value)
+        if not np.iscomplexobj(array):
+            return np.asarray(array, dtype=float)
     except (TypeError, ValueError):
-        raise ModelError(
-            f"{place}: found {name} = {value!r}, expected an array of numbers; give one row a pose"
-        ) from None
+        pass
+    raise ModelError(
+        f"{place}: found {name} = {value!r}, expected an array of numbers, not complex; give one row a pose"
+    )

@@ -39,8 +39,13 @@ def about(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def of_quaternion(q: np.ndarray) -> np.ndarray:
     """Rotation of a unit quaternion, scalar first, (3, 3)."""
-    u = skewed(np.asarray(q[1:]))
-    return np.eye(3) + 2 * q[0] * u + 2 * (u @ u)
+    return rotations(np.asarray(q)[None])[0]
+
+
+def rotations(q: np.ndarray) -> np.ndarray:
+    """Rotations of unit quaternions (N, 4), scalar first: (N, 3, 3)."""
+    u = skewed(q[:, 1:])
+    return np.eye(3) + 2 * q[:, 0, None, None] * u + 2 * (u @ u)
 
 
 def quaternions(R: np.ndarray) -> np.ndarray:

@@ -119,7 +119,7 @@ class Examiner:
         self.geometry: Geometry = self.linked.geometry
         self.carts = len(self.geometry.offset)
         self.strokes = _strokes(self.kinematics, self.carts, limits.strokes)
-        self.around, self.reach = _reach(self.geometry)
+        self.around, self.reach = self.geometry.reach()
         self._axes = self._joint_axes() if math.isfinite(limits.ball_joint) else None
 
     def __call__(self, r: ArrayLike, R: ArrayLike | None = None) -> Examined:
@@ -148,21 +148,6 @@ class Examiner:
 
     def _joints_and_orientation(self, r: np.ndarray, R: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Actuators (N, n), NaN rows out of reach, and the orientation (N, 3, 3) that is given or follows."""
-        q, turned = np.full((len(r), len(self.kinematics.joints)), np.nan), self.linked.repeated(len(r))
-        near = self._could_reach(r)  # iterations take longest where there is nothing to find
-        if near.any():
-            q[near], turned[near] = self._solved(r[near], None if R is None else R[near])
-        return q, turned
-
-    def _could_reach(self, r: np.ndarray) -> np.ndarray:
-        """Whether each link is as long as the tool is far from its guideway, in any orientation, (N,)."""
-        v = self.geometry.direction[self.geometry.arm]
-        v = v / np.linalg.norm(v, axis=1, keepdims=True)
-        gap = r[:, None] - self.around
-        away = gap - (gap * v).sum(-1, keepdims=True) * v
-        return ((away**2).sum(-1) <= self.reach**2 * (1 + 1e-12)).all(axis=1)
-
-    def _solved(self, r: np.ndarray, R: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         if R is None and isinstance(self.linked, SixLinks):
             q, R, _ = self.linked.follow(r, self.linked.sides)
             return q, R
@@ -231,18 +216,6 @@ class Examiner:
                 apart = between_segments(start[:, i], end[:, i], start[:, j], end[:, j])
                 least = np.minimum(least, apart - 2 * self.limits.link_radius)
         return least - self.limits.clearance
-
-
-def _reach(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """How far the tool can be from a point on the cart at s = 0, for each link: points (m, 3), distances (m,) in m."""
-    around = geometry.offset[geometry.arm]
-    reach = geometry.length + np.linalg.norm(geometry.on_plate, axis=1)
-    if not geometry.turntables:
-        return around + geometry.on_cart, reach
-    arms = [table.arm for table in geometry.turntables]
-    tables = np.zeros(len(geometry.offset))
-    np.add.at(tables, arms, [np.linalg.norm(table.offset) for table in geometry.turntables])
-    return around, reach + np.linalg.norm(geometry.on_cart, axis=1) + tables[geometry.arm]
 
 
 def _pairs(geometry: Geometry) -> list[tuple[int, int]]:

@@ -274,6 +274,7 @@ def test_a_translated_model_is_as_good():
     [
         (lambda k: k.ik([1.0, 2.0]), r"ik: found r of shape \(2,\), expected \(3,\) or \(N, 3\)"),
         (lambda k: k.ik(["a", "b", "c"]), "expected an array of numbers"),
+        (lambda k: k.ik(np.zeros((4, 3), dtype=complex)), "expected an array of numbers, not complex"),
         (lambda k: k.ik(np.zeros((4, 3)), np.zeros((2, 3, 3))), r"expected \(3, 3\) or \(4, 3, 3\)"),
         (lambda k: k.ik(np.zeros((4, 3)), 1.01 * np.eye(3)), "no rotations, in rows 0, 1, 2, 3"),
         (lambda k: k.ik(np.zeros((4, 3)), np.diag([1.0, -1.0, -1.0])), "three links cannot turn"),
@@ -289,6 +290,54 @@ def test_a_translated_model_is_as_good():
 def test_what_cannot_be_answered_is_told(three, call, words):
     with pytest.raises(ModelError, match=words):
         call(three)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("which", ["three", "six"])
+def test_poses_that_are_no_numbers_disturb_nobody(which, request):
+    kinematics = request.getfixturevalue(which)
+    q = joints_near_home(kinematics, 4)
+    r, _ = kinematics.fk(q)
+    for spoilt in (np.nan, np.inf, -np.inf):
+        there, joints = r.copy(), q.copy()
+        there[1, 2] = joints[2, 0] = spoilt
+        lost = [False, True, False, False]
+        assert np.isnan(kinematics.ik(there)).all(axis=1).tolist() == lost
+        assert np.isnan(kinematics.jacobian(there)).all(axis=(1, 2)).tolist() == lost
+        assert np.isnan(kinematics.state(there)).any(axis=1).tolist() == lost
+        assert np.isnan(kinematics.ball_joint_angles(there)).any(axis=(1, 2)).tolist() == lost
+        assert np.isnan(kinematics.fk(joints)[0]).all(axis=1).tolist() == [False, False, True, False]
+        found = kinematics.configurations(q=joints[2])
+        assert not any(c.feasible for c in found)
+
+
+def test_the_forward_kinematics_of_six_links_stays_on_its_branch(six):
+    """Carts so far apart that Newton finds other ways to assemble the links, too."""
+    q = joints_near_home(six, 3000, spread=2.0)
+    robot = six.linked()
+    found, turns = six.fk(q)
+    freely, free_turns = six.fk(q, near=(robot.single_links(q, robot.repeated(3000)), six.home.R))
+    there = np.isfinite(found[:, 0])
+    np.testing.assert_array_equal(found[there], freely[there])
+    behind = np.isfinite(freely[:, 0]) & (six.state(freely, free_turns, q)[:, 3] != robot.ahead)
+    assert behind.any()
+    assert not (there & behind).any()
+    assert not robot.crossed(q, found, turns)[there].any()
+
+
+def test_no_iterations_where_links_are_too_short(six):
+    """A link is too short for a tool farther from its guideway than the link and its joint on the plate are long."""
+    r = six.home.r + np.random.default_rng(3).uniform(-3.0, 3.0, (2000, 3))
+    geometry = six.linked().geometry
+    v = geometry.direction[geometry.arm] / np.linalg.norm(geometry.direction[geometry.arm], axis=1)[:, None]
+    start = geometry.offset[geometry.arm] + geometry.on_cart
+    away = np.linalg.norm(np.cross(r[:, None] - start, v), axis=2)
+    short = (away > geometry.length + np.linalg.norm(geometry.on_plate, axis=1)).any(axis=1)
+    assert 0 < short.sum() < 2000
+    q = six.ik(r)
+    assert np.isnan(q[short]).all()
+    assert not six.iterations_by_pose[short].any()
+    assert six.iterations_by_pose[~short].all()
 
 
 def test_solutions_of_six_links_are_asked_for_one_by_one(six):

@@ -133,6 +133,48 @@ def test_out_of_reach_is_a_row_of_nan(f1):
     assert np.isnan(f1.fk(q)[0]).all(axis=1).tolist() == [False, True]
 
 
+def test_poses_of_bent_arms_are_found_from_a_second_start(f1):
+    """With ball joints at 55 degrees or more, (4.25) may start too far away; the angles at home do then."""
+    random = np.random.default_rng(5)
+    spread = np.array([0.3, 0.3, 0.3, 0.18, 0.18, 0.18])
+    q = f1.home.q + random.uniform(-1, 1, (20_000, 6)) * spread
+    r, R = f1.fk(q)
+    reached = np.all(f1.state(r, R, q)[:, :3] == f1.linked().sides, axis=1)
+    assert reached.sum() > 19_990
+    found = f1.ik(r[reached], R[reached])
+    assert np.isfinite(found).all()
+    bent = f1.ball_joint_angles(r[reached], R[reached], q[reached]).max(axis=(1, 2))
+    other = np.abs(found - q[reached]).max(axis=1) > 1e-7
+    assert other.mean() < 2e-3  # arms of three links have two solutions on one side there
+    assert bent[other].min() > LIMIT
+
+
+def test_links_of_the_branch_do_not_cross(f1):
+    random = np.random.default_rng(6)
+    q = f1.home.q + random.uniform(-1, 1, (3000, 6)) * np.array([1.0, 1.0, 1.0, 0.6, 0.6, 0.6])
+    r, R = f1.fk(q)
+    freely, turns = f1.fk(q, near=f1.fk_of_five_degrees(q))
+    there, robot = np.isfinite(r[:, 0]), f1.linked()
+    crossed = np.isfinite(freely[:, 0]) & robot.crossed(q, freely, turns)
+    assert crossed.any()
+    assert not (there & crossed).any()
+    assert robot.on_branch(q, r, R)[there].all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_poses_that_are_no_numbers_disturb_nobody(f1):
+    r, R = poses(f1, 3)
+    expected = f1.ik(r, R)
+    for spoilt in (np.nan, np.inf):
+        there = r.copy()
+        there[1, 0] = spoilt
+        q = f1.ik(there, R)
+        assert np.isnan(q[1]).all()
+        np.testing.assert_array_equal(q[[0, 2]], expected[[0, 2]])
+        assert f1.configurations(r=there[1], R=R[1]) == f1.configurations(q=q[1]) == []
+        assert np.isnan(f1.fk(q)[0][1]).all()
+
+
 def test_what_cannot_be_answered_is_told(f1):
     r, R = f1.home.r, f1.home.R
     with pytest.raises(ModelError, match="found no orientation R, expected one"):

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import GantryTauError
 from gantrytau.errors import ModelError
-from gantrytau.kinematics import Kinematics
+from gantrytau.kinematics import Kinematics, assembly_modes
 from gantrytau.kinematics.rotations import turned
 from gantrytau_models import DeltaRobot, GantryTau, Pendulum, StewartPlatform, prototypes
 
@@ -31,6 +31,44 @@ def test_a_delta_robot_there_and_back(delta):
 
 def test_a_delta_robot_out_of_reach(delta):
     assert np.isnan(delta.ik([[0.0, 0.0, -9.0]])).all()
+
+
+def test_poses_that_are_no_numbers_are_nan_without_a_word(delta, capfd):
+    r = np.array([delta.home.r, [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0], delta.home.r])
+    lost = [False, True, True, False]
+    q = delta.ik(r)
+    assert np.isnan(q).all(axis=1).tolist() == lost
+    assert np.isnan(delta.jacobian(r)).all(axis=(1, 2)).tolist() == lost
+    for near in (None, r):
+        found, turns = delta.fk(q, near=near)
+        assert np.isnan(found).all(axis=1).tolist() == lost
+        assert np.isnan(turns).all(axis=(1, 2)).tolist() == lost
+    assert capfd.readouterr() == ("", "")
+
+
+def test_near_chooses_among_the_assembly_modes_of_a_stewart_platform():
+    kinematics = Kinematics(StewartPlatform(), tool="platform")
+    values = kinematics.dae.table.values
+    base, plate = (
+        np.array([[values[f"legs[{k}].{end}_offset[{i}]"] for i in range(3)] for k in range(6)])
+        for end in ("base", "platform")
+    )
+    q = kinematics.home.q + np.random.default_rng(0).uniform(-0.03, 0.03, 6)
+    r, R = assembly_modes(base, plate, q).poses
+    assert len(r) == 16
+    found, turns = kinematics.fk(np.tile(q, (16, 1)), near=(r + 0.01, R))
+    np.testing.assert_allclose(found, r, atol=1e-9)
+    np.testing.assert_allclose(turns, R, atol=1e-9)
+    assert 0 < kinematics.iterations < 8
+    assert np.isnan(kinematics.fk(50.0 * q, near=(r[0], R[0]))[0]).all()
+
+
+def test_near_of_a_delta_robot_is_where_newton_starts(delta):
+    q = delta.home.q + np.random.default_rng(4).uniform(-0.2, 0.2, (5, 3))
+    r, R = delta.fk(q)
+    found, turns = delta.fk(q, near=r + 0.02)
+    np.testing.assert_allclose(found, r, atol=1e-9)
+    np.testing.assert_allclose(turns, R, atol=1e-9)
 
 
 def test_the_legs_of_a_stewart_platform():
@@ -88,8 +126,6 @@ def test_models_without_what_is_needed(make, words):
 def test_what_only_links_answer_is_told(delta):
     with pytest.raises(ModelError, match="expected a Gantry-Tau robot"):
         delta.state(delta.home.r)
-    with pytest.raises(ModelError, match="found near= for DeltaRobot"):
-        delta.fk(delta.home.q, near=delta.home.r)
     with pytest.raises(ModelError, match="found 3 joints and an orientation R"):
         delta.ik(delta.home.r, np.eye(3))
 
