@@ -35,7 +35,9 @@ def read_toml(option: str, file: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise CommandError(f"{where}: there is no such file; check its path") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise CommandError(f"{where}: cannot be read as TOML ({error})") from error
+        raise CommandError(
+            f'{where}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
+        ) from error
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

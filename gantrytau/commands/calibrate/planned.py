@@ -39,7 +39,7 @@ class Planned:
 
         cell = cells.read(folder / CELL)
         try:
-            return Planned(load_plan(folder, cell.robot, cell.limits), cell, folder)
+            return Planned(load_plan(folder), cell, folder)
         except ModelError as error:
             raise CommandError(f"{folder}: the plan cannot be used: {error}") from error
 
@@ -91,9 +91,12 @@ class Planned:
         """Write the plan of the poses that are missing, in a folder of its own; its program."""
         options = dict(self.cell.program)
         name = f"{options.pop('name', PROGRAM)[: 32 - len(REST)]}{REST}"
+        from gantrytau_optimica import load_plan
+
         folder = self.folder / REST.lower()
+        plan = load_plan(self.folder, self.cell.robot, self.cell.limits)
         try:
-            self.plan.remaining(measured.data).write(folder, name=name, **options)
+            plan.remaining(measured.data).write(folder, name=name, **options)
         except OSError as error:
             raise CommandError(f"Cannot write into {folder}: {error.strerror}") from error
         return folder / f"{name}.mod"

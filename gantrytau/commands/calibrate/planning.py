@@ -139,6 +139,7 @@ def _in_the_file(message: str, file: Path) -> str:
     found = re.match(r"plan_calibration\.(\w+): ", message)
     if found:
         message = f"{places.get(found[1], found[1])}: {message[found.end() :]}"
+    message = message.removeprefix("plan_calibration: ").replace("(facing=)", "(device.facing)")
     message = re.sub(r"^program: found (\w+)=", r"program.\1: found ", message)
     return f"{file}: {message}".replace("; give home= in m and rad,", "; give plan.home in m and rad,")
 

@@ -1,0 +1,382 @@
+"""`gantrytau calibrate cell.toml`: plan, measure, calibrate; interrupted, wrong and incomplete."""
+
+import csv
+import json
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from gantrytau.cli import app
+from gantrytau.commands.calibrate.example import EXAMPLE
+from gantrytau.kinematics import Kinematics
+from gantrytau_models import GantryTau, prototypes
+from gantrytau_optimica import LaserTracker
+from gantrytau_optimica.procedure import planning as procedure
+
+FAULT, MISUSE, INTERRUPTED = 1, 2, 130
+SMALL = {"poses": "poses = 20", "robots": "robots = 2\nspacing = 0.25"}
+FILES = ["plan.html", "workspace.png", "poses.csv", "Calibration.mod", "plan.json", "plan.toml"]
+TAPE = 0.005  # m, as the example says
+
+
+def with_lines(**lines):
+    """The example with some of its lines replaced, by the key at their beginning."""
+    text = EXAMPLE
+    for key, line in {**SMALL, **lines}.items():
+        text, count = re.subn(
+            rf"^(# )?{key} = .*$", line.replace("\\", r"\\"), text, count=1, flags=re.MULTILINE
+        )
+        assert count == 1, key
+    return text
+
+
+def true_robot():
+    """An L1 that a tape measure cannot tell from the nominal one: joints and lengths off by its deviation."""
+    off = TAPE * np.random.default_rng(4).standard_normal((3, 4))
+    arms = [
+        replace(arm, length=arm.length + d[0], offset=tuple(np.add(arm.offset, d[1:])))
+        for arm, d in zip(prototypes.L1.arms, off, strict=True)
+    ]
+    return GantryTau(replace(prototypes.L1, arms=tuple(arms)))
+
+
+def read_poses(folder):
+    """Numbers (k,) and actuators (k, 3) of the poses to be measured."""
+    with (folder / "poses.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["measured"] == "1"]
+    return [int(row["number"]) for row in rows], np.array(
+        [[float(row[f"q{k}"]) for k in (1, 2, 3)] for row in rows]
+    )
+
+
+def measure(folder, rows: Any = slice(None), *, axes=None, change=lambda table: table):
+    """Write what a tracker with its own axes, turned by 143 degrees, reads of the true robot at planned poses."""
+    _, q = read_poses(folder)
+    r, R = Kinematics(true_robot()).fk(q)
+    c, s = np.cos(2.5), np.sin(2.5)
+    own = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) if axes is None else axes
+    tracker = LaserTracker((4.5, 2.9, -0.7), own, target=(0.05, 0.0, 0.0), facing=(1.0, 0.0, 0.0))
+    found = tracker.measure(r, R, seed=5, frame="device")
+    table = change(np.hstack([q, found.r])[rows])
+    file = folder / "measurements.csv"
+    with file.open("w", newline="") as opened:
+        csv.writer(opened).writerows([["q1", "q2", "q3", "x", "y", "z"], *table.tolist()])
+    return file
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """The folder of a plan, what the command printed, and the plan as a record."""
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "cell.toml").write_text(with_lines())
+    spoken = CliRunner().invoke(app, ["calibrate", str(folder / "cell.toml")])
+    assert spoken.exit_code == 0, spoken.output
+    printed = CliRunner().invoke(app, ["calibrate", str(folder / "cell.toml"), "--json"])
+    return folder / "cell-plan", spoken, json.loads(printed.stdout)
+
+
+@pytest.fixture
+def folder(planned, tmp_path):
+    """A copy of the folder of the plan, to be written to."""
+    import shutil
+
+    return shutil.copytree(planned[0], tmp_path / "cell-plan")
+
+
+def test_the_example_is_planned(planned):
+    folder, spoken, record = planned
+    assert record["good"] is True
+    assert record["poses"] == 20
+    assert record["error_m"] < record["wanted_m"] == pytest.approx(200e-6)
+    assert record["files"] == [str(folder / name) for name in FILES]
+    assert all((folder / name).stat().st_size > 0 for name in FILES)
+    assert "verdict    good" in spoken.stdout
+    assert "with the header q1,q2,q3,x,y,z, then: gantrytau calibrate" in spoken.stdout
+    assert spoken.stderr.splitlines()[0] == "workspace of the robot ..."  # progress
+    assert "MoveAbsJ" in (folder / "Calibration.mod").read_text()
+    assert len(read_poses(folder)[0]) == 20
+
+
+def test_from_a_tape_measure_to_the_true_robot(planned, folder, answer, run):
+    file = measure(folder)
+    found = answer("calibrate", file)
+    assert found["good"] is True
+    assert found["robot"] == "GantryTau(L1)"
+    assert found["poses_fitted"] == 20
+    assert found["validation_error_m"] < 100e-6  # of 16 um of noise at 5 m; half of 20 poses fitted
+    assert found["notes"] == [
+        "frame: positions are in another frame than the plan; they were laid over the poses that it expects"
+    ]
+    assert found["findings"] == []
+    for i in range(3):
+        true = true_robot().modifications["arms"][i]["length"]
+        name = f"arms[{i}].length"
+        assert abs(found["parameters"][name] - true) < 5 * found["deviations"][name] < 5e-4
+        assert abs(prototypes.L1.arms[i].length - true) > 10 * abs(found["parameters"][name] - true)
+    spoken = run("calibrate", file)
+    assert spoken.exit_code == 0
+    assert spoken.stdout.startswith("Good: ")
+    assert "200 um were wanted" in spoken.stdout
+
+
+def test_the_calibrated_robot_is_right_wherever_it_goes(folder, answer):
+    answer("calibrate", measure(folder))
+    text = (folder / "measurements-calibrated" / "calibrated.toml").read_text()
+    import tomllib
+
+    robot = Kinematics(GantryTau(prototypes.L1, **tomllib.loads(text)))
+    true = Kinematics(true_robot())
+    r = np.array([0.5, 2.9, -0.7]) + np.random.default_rng(1).uniform(-0.4, 0.4, (50, 3))
+    q = true.ik(r)
+    apart = [np.linalg.norm(x[:, None] - x, axis=2) for x in (robot.fk(q)[0], r)]  # whatever the frame
+    assert np.abs(apart[0] - apart[1]).max() < 100e-6
+    nominal = Kinematics(GantryTau(prototypes.L1)).fk(q)[0]
+    assert np.abs(np.linalg.norm(nominal[:, None] - nominal, axis=2) - apart[1]).max() > 1e-3
+
+
+def test_missing_poses_are_told_and_planned_again(folder, run, answer):
+    numbers, q = read_poses(folder)
+    left = [2, 3, 11]
+    file = measure(folder, [k for k in range(20) if k not in left])
+    found = answer("calibrate", file)
+    assert found["missing"] == [numbers[k] for k in left]
+    assert found["poses_fitted"] == 17
+    assert found["program"] == str(folder / "rest" / "CalibrationRest.mod")
+    again, rest = read_poses(folder / "rest")
+    assert len(again) == 3
+    assert np.abs(np.sort(rest, axis=0) - np.sort(q[left], axis=0)).max() < 1e-9
+    spoken = run("calibrate", file)
+    assert (
+        f"3 planned poses are not measured, numbers {numbers[2]}, {numbers[3]}, {numbers[11]} of"
+        in spoken.stderr
+    )
+
+
+def test_too_few_poses_still_say_which_are_missing(folder, run):
+    found = run("calibrate", measure(folder, slice(0, 5)))
+    assert found.exit_code == FAULT
+    assert "15 planned poses are not measured" in found.stderr
+    assert "found 5 usable poses, expected 8" in found.stderr
+    assert (folder / "rest" / "CalibrationRest.mod").is_file()
+    assert not (folder / "measurements-calibrated").exists()
+
+
+def swapped(table):
+    return table[:, [1, 0, 2, 3, 4, 5]]
+
+
+def in_millimetres(table):
+    return table * [1e3, 1e3, 1e3, 1, 1, 1]
+
+
+def other_poses(table):
+    return table + np.array([0.01, 0.02, -0.01, 0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (swapped, "q1 stands in column q2, q2 stands in column q1"),
+        (in_millimetres, "they are in mm, expected m"),
+        (other_poses, "q1, q2, ... must be those of poses.csv"),
+    ],
+)
+def test_actuators_that_are_not_those_of_the_plan(folder, fails, change, words):
+    message = fails(MISUSE, "calibrate", measure(folder, change=change))
+    assert words in message
+    assert "--robot 'GantryTau(L1)'" in message
+    assert not (folder / "rest").exists()
+
+
+def test_swapped_axes_are_not_taken_for_another_frame(folder, fails):
+    mirrored = measure(folder, change=lambda table: table[:, [0, 1, 2, 4, 3, 5]])
+    assert "measurements-calibrated" not in fails(FAULT, "calibrate", mirrored)
+    assert not (folder / "measurements-calibrated").exists()
+
+
+def test_less_than_wanted_is_told(folder, run):
+    file = measure(folder)
+    text = (folder / "plan.toml").read_text()
+    (folder / "plan.toml").write_text(text.replace('error = "0.2 mm"', 'error = "5 um"'))
+    spoken, printed = run("calibrate", file), run("calibrate", file, "--json")
+    assert (spoken.exit_code, printed.exit_code) == (FAULT, FAULT)
+    assert spoken.stdout.startswith("NOT GOOD ENOUGH: ")
+    assert "5 um were wanted" in json.loads(printed.stdout)["error"]
+
+
+def test_a_plan_that_is_not_good_says_so(run, folder, tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text(with_lines(error='error = "1 um"'))
+    found = run(
+        "calibrate", file, "--output", folder, "--json"
+    )  # on top of the stages that do not ask for it
+    assert found.exit_code == FAULT
+    record = json.loads(found.stdout)
+    assert record["good"] is False
+    assert "wanted" in record["error"]
+    assert len(record["files"]) == len(FILES)
+
+
+def test_interrupted_it_goes_on_where_it_was(planned, run, tmp_path, monkeypatch):
+    file = tmp_path / "cell.toml"
+    file.write_text(with_lines())
+    whole, simulated = procedure.simulated, iter(range(10))
+
+    def pressed(*arguments, **policy):
+        if next(simulated) == 1:
+            raise KeyboardInterrupt
+        return whole(*arguments, **policy)
+
+    monkeypatch.setattr(procedure, "simulated", pressed)
+    found = run("calibrate", file)
+    assert found.exit_code == INTERRUPTED
+    assert "Interrupted in the stage 'simulated calibrations, 1 of 2 done'" in found.stderr
+    assert "the same command goes on from there" in found.stderr
+    assert not (tmp_path / "cell-plan" / "plan.json").exists()
+
+    def again(*arguments, **policy):
+        raise AssertionError("this stage was finished")
+
+    monkeypatch.setattr(procedure, "simulated", whole)
+    monkeypatch.setattr(procedure, "settled_workspace", again)
+    assert run("calibrate", file).exit_code == 0
+    one, other = (json.loads((f / "plan.json").read_text()) for f in (planned[0], tmp_path / "cell-plan"))
+    assert one == other
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (dict(tape='tap = "5 mm"'), "robot.tap: there is no such key; did you mean 'tape'?"),
+        (dict(tape=""), "robot.tape: found nothing, expected a length in m"),
+        (
+            dict(tape='tape = "5 deg"'),
+            'robot.tape: found "5 deg", expected a length in m; units are m, cm, mm, um',
+        ),
+        (dict(tape="tape = true"), "robot.tape: found True, expected a length in m"),
+        (dict(tape="tape = 0"), "robot.tape: found 0, expected a length in m above 0"),
+        (dict(tape='tape = "1.2.3 mm"'), "expected a number and its unit"),
+        (dict(poses="poses = 4.5"), "goal.poses: found 4.5, expected a whole number"),
+        (dict(poses="poses = 0"), "expected a whole number of at least 1"),
+        (
+            dict(strokes="strokes = [0, 1600]"),
+            "limits.strokes[1]: found 1600, expected a length in m or an angle",
+        ),
+        (dict(strokes="strokes = [0, 1600]"), 'write "1600 mm" if it is in mm'),
+        (
+            dict(strokes="strokes = [0, 1, 2]"),
+            "limits.strokes: found [0, 1, 2], expected [., .] or [[., .], [., .], ...]",
+        ),
+        (dict(strokes="stroke = [0, 1]"), "limits.stroke: there is no such key; did you mean 'strokes'?"),
+        (
+            dict(ball_joint="ball_joint = 50"),
+            'limits.ball_joint: found 50, expected an angle in rad, up to 6.28; write "50 deg"',
+        ),
+        (
+            dict(clearance="clearance = -0.1"),
+            "limits.clearance: found -0.1, expected a length in m of at least 0",
+        ),
+        (dict(low="low = [2.0, 2.3, -1.6]"), "limits.obstacles[0]: Box: found low"),
+        (dict(low="corner = [2.0, 2.3, -1.6]"), "limits.obstacles[0].corner: there is no such key"),
+        (dict(kind='kind = "bax"'), "limits.obstacles[0].kind: found \"bax\"; did you mean 'box'?"),
+        (
+            dict(kind=""),
+            "limits.obstacles[0].kind: found nothing, expected a text in quotes: box, cylinder, capsule",
+        ),
+        (dict(radius='radius = "60 deg"'), "limits.plate[0].radius"),
+        (dict(facing="facing = [0, 0, 0]"), "device: LaserTracker: found facing"),
+        (dict(facing="facing = [0, 1]"), "device.facing: found [0, 1], expected [., ., .], each a number"),
+        (dict(model='model = "GantryTau(X1)"'), "robot.model: --prototype X1: there is no such robot"),
+        (dict(model="model = 3"), "robot.model: found 3, expected a text in quotes"),
+        (dict(carts='carts = "axes"'), 'program.carts: found "axes"; there is robax, extax.'),
+        (dict(error='errors = "1 mm"'), "goal.errors: there is no such key; did you mean 'error'?"),
+        (dict(home='limit = "x"'), "plan.limit: there is no such key"),
+    ],
+)
+def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
+    file = tmp_path / "cell.toml"
+    file.write_text(with_lines(**lines))
+    message = fails(MISUSE, "calibrate", file)
+    assert message.startswith(f"{file}: ")
+    assert words in message
+    assert [path.name for path in tmp_path.iterdir()] == ["cell.toml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[goal]", "[goals]", "[goals]: there is no such table; did you mean 'goal'?"),
+        ("[robot]", "[[robot]]", "robot: found"),
+        ("[device]", "[[device]]", "device: found"),
+        ("[[limits.plate]]", "[limits.plate]", "limits.plate: found"),
+        ('# "arms[0].length" = 2.061', '"arms[0].lenght" = 2.0', "values: arms[0].lenght: "),
+        ('# "arms[0].length" = 2.061', '"arms[0].length" = "2 s"', 'values.arms[0].length: found "2 s"'),
+        ('# "arms[0].length" = 2.061', "arms[0].length = 2.0", 'names as "arms[0].length" stand in quotes'),
+        ('# "arms[0].length" = 2.061', "arms.length = 2.0", "write the name in quotes"),
+        ("[robot]", "robot", "cannot be read as TOML"),
+    ],
+)
+def test_tables_that_cannot_be_read(fails, tmp_path, old, new, words):
+    file = tmp_path / "cell.toml"
+    assert old in EXAMPLE
+    file.write_text(EXAMPLE.replace(old, new))
+    assert words in fails(MISUSE, "calibrate", file)
+
+
+def test_a_table_that_is_missing(fails, tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text('[robot]\nmodel = "GantryTau(L1)"\ntape = 0.005\n')
+    assert "found no table [goal], expected one; `gantrytau calibrate --example`" in fails(
+        MISUSE, "calibrate", file
+    )
+    assert "there is no such file" in fails(MISUSE, "calibrate", tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (dict(tape="tape = 5"), "robot.tape: found 5.0, expected a length in m"),
+        (dict(poses="poses = 4"), "goal.poses: found 4, expected a whole number from 8"),
+        (dict(home="home = [0.5, 0.5]"), "plan.home: found [0.5, 0.5], expected 3 finite numbers"),
+        (dict(facing="facing = [-1, 0, 0]"), "turn the target (device.facing) towards it"),
+    ],
+)
+def test_cells_that_cannot_be_planned(fails, tmp_path, lines, words):
+    file = tmp_path / "cell.toml"
+    file.write_text(with_lines(**lines))
+    message = fails(FAULT, "calibrate", file)
+    assert message.startswith(f"{file}: ")
+    assert words in message
+    assert "plan_calibration" not in message
+
+
+def test_options_that_the_file_of_a_cell_replaces(fails, folder, tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text(with_lines())
+    assert "found --robot, --model too; leave it out" in fails(
+        MISUSE, "calibrate", file, "--robot", "GantryTau(L1)", "--model", "1"
+    )
+    assert "leave --set and --prototype out" in fails(
+        MISUSE, "calibrate", measure(folder), "--set", "arms[0].length=2.0"
+    )
+
+
+def test_a_robot_of_a_file_is_found_from_the_folder_of_the_plan(folder, answer, tmp_path):
+    (tmp_path / "robots.py").write_text(
+        "from gantrytau_models import GantryTau, prototypes\nrobot = GantryTau(prototypes.L1)\n"
+    )
+    (tmp_path / "cell.toml").write_text(with_lines(model='model = "robots.py:robot"'))
+    record = answer("calibrate", tmp_path / "cell.toml", "--output", folder)
+    assert record["good"] is True
+    found = answer("calibrate", measure(folder))
+    assert found["robot"] == f"{tmp_path / 'robots.py'}:robot"
+
+
+def test_the_example_is_printed(run):
+    found = run("calibrate", "--example")
+    assert found.exit_code == 0
+    assert found.stdout == EXAMPLE
