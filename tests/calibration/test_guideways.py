@@ -1,10 +1,12 @@
 """Guideways with known bends, waves and backlash: what is found of them, and how sure it is."""
 
 import re
+from typing import Any, cast
 
 import matplotlib
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError
 from gantrytau_optimica.calibration.findings import CalibrationError
@@ -186,6 +188,56 @@ def test_the_spectrum_is_the_fit_of_the_wave(found):
     assert np.isnan(found.spectrum(8.0)).all()  # a wave that is longer than the guideway is a bend
 
 
+@pytest.mark.parametrize("lash", [-BACKLASH, 5e-6])
+@pytest.mark.parametrize("pitch", [0.005, 0.05])
+def test_other_pitches_and_backlash_of_either_sign(lash, pitch):
+    off = []
+    for seed in range(12):
+        q, points, rising = there_and_back(seed)
+        wave = np.cos(2 * np.pi * q / pitch - 0.7) - np.cos(2 * np.pi * q / PITCH - 0.7)
+        points = points + np.outer(WAVE * wave - (lash - BACKLASH) / 2 * rising, axes()[0])
+        f = linearity(q, points, pitch=pitch)
+        off.append(standardised([f.backlash], [f.backlash_error], lash))
+        off.append(standardised(waves(f).amplitude[0, :1], waves(f).amplitude_error[0, :1], WAVE))
+    assert np.abs(off).max() < 4
+    assert np.std(off) == pytest.approx(1.0, abs=0.45)  # of 24: three standard deviations of it
+
+
+def test_the_frame_of_the_points_is_of_no_matter():
+    q, points, _ = there_and_back(3)
+    R = Rotation.from_rotvec([0.3, -1.2, 2.0]).as_matrix()
+    here, there = linearity(q, points, pitch=PITCH), linearity(q, points @ R.T + 5.0, pitch=PITCH, up=R[:, 2])
+    assert there.error == pytest.approx(here.error, abs=1e-13)  # rounding of metres
+    assert there.backlash == pytest.approx(here.backlash, abs=1e-13)
+
+
+def test_repeated_points_keep_their_direction_though_the_encoder_jitters():
+    q, points, rising = there_and_back(4)
+    q = np.repeat(q, 3)
+    jitter = q + 1e-7 * np.random.default_rng(0).standard_normal(len(q))
+    found = linearity(jitter, np.repeat(points, 3, axis=0), pitch=PITCH)
+    assert np.array_equal(found.rising, np.repeat(rising, 3))
+    assert found.backlash == pytest.approx(BACKLASH, abs=4 * 5e-7)  # of 400 points of 5 um
+
+
+def test_a_third_of_stray_points_is_found():
+    q, points, _ = there_and_back(2)
+    stray = np.sort(np.random.default_rng(1).permutation(400)[:120])
+    points[stray] += 1e-3
+    found = linearity(q, points, pitch=PITCH, loss="robust")
+    assert [f.rows.tolist() for f in found.findings] == [stray.tolist()]
+    assert found.noise == pytest.approx(np.full(3, NOISE), rel=0.15)  # 280 points: 4 %
+
+
+def test_a_gap_is_no_bend(tmp_path):
+    q, points, _ = there_and_back(6)
+    measured = (q < 0.5) | (q > 1.5)
+    found = linearity(q[measured], points[measured], pitch=PITCH)
+    assert found.noise == pytest.approx(np.full(3, NOISE), rel=0.2)  # some 200 points
+    assert found.straightness.max() < 200e-6
+    found.plot(file=tmp_path / "gap.png")
+
+
 # what data do not hold
 
 
@@ -254,6 +306,29 @@ def test_nan_outliers_and_scale_are_found_with_their_rows():
             CalibrationError,
             "move by 0.001 m for each m of q, .* give both in m",
         ),
+        (
+            lambda q, p: linearity(1000 * q, 1000 * p, pitch=1000 * PITCH),
+            CalibrationError,
+            "found a guideway of 1993 m, expected some metres; give q, points and pitch in m",
+        ),
+        (
+            lambda q, p: linearity(np.where(np.arange(400) == 7, 50.0, q), p, pitch=PITCH),
+            CalibrationError,
+            r"found points up to 4\d\.\d m beside a straight line in row 7, expected those of one guideway",
+        ),
+        (
+            lambda q, p: linearity(q, p, up=(0.0, 1.0)),
+            ModelError,
+            r"found up=\[0.0, 1.0\], expected a direction",
+        ),
+        (lambda q, p: linearity("q", p), ModelError, "found q, points or pitch that hold no numbers"),
+        (
+            lambda q, p: linearity(q, p, pitch=PITCH, harmonics=cast(Any, 1.5)),
+            ModelError,
+            "found harmonics=1.5",
+        ),
+        (lambda q, p: linearity(q, p, intervals=cast(Any, 2.5)), ModelError, "found intervals=2.5"),
+        (lambda q, p: linearity(q, p).profile([np.nan]), ModelError, "profile: found q from nan to nan m"),
         (
             lambda q, p: linearity(q[:20], p[:20], intervals=30),
             CalibrationError,

@@ -313,6 +313,6 @@ def _rotation(what: str, R: Any) -> Array:
     ):
         shown = found.round(6).tolist() if found.ndim else repr(R)
         raise ModelError(
-            f"{what}: found R={shown}, expected a rotation matrix (3, 3); its columns are the axes of the device in the world"
+            f"{what}: found R={shown}, expected a rotation matrix (3, 3), its columns the axes of the device in the world"
         )
     return found

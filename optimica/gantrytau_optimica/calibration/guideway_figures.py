@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gantrytau_optimica.calibration.guideways import Linearity
 
 MICRO = 1e6  # um in a m
+UNKNOWN = 3.0  # standard errors of the smooth part by the noise: where it is measured they are below one
 
 
 def draw_errors(found: "Linearity", file: str | os.PathLike[str] | None) -> "Figure":
@@ -22,6 +23,7 @@ def draw_errors(found: "Linearity", file: str | os.PathLike[str] | None) -> "Fig
     figure, panels = panels_of(len(found.noise), file)
     line = np.linspace(found.q.min(), found.q.max(), 501)
     smooth, doubt = found.profile(line)
+    smooth[doubt > UNKNOWN * found.noise] = np.nan  # in a gap without points
     names = ("along the axis", "across, to the side", "across, upwards")
     for axis, name, error, curve, band in zip(panels, names, found.error.T, smooth.T, doubt.T, strict=False):
         axis.plot(found.q, MICRO * error, ".", markersize=3, label="measured")

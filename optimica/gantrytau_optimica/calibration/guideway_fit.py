@@ -19,6 +19,11 @@ ROUNDS = 5  # of looking for stray points
 EXACT = 1e-9  # m, below which nothing is stray
 BLOCK = 64  # waves that are compared at once
 STRAY = 5.0  # robust standard deviations, beyond which a point does not fit
+MOVED = 1e-4  # m, more than a backlash: less, as a jittering encoder shows, is no change of direction
+LONGEST = 100.0  # m, of a guideway; longer ones were given in mm
+ASTRAY = 0.02  # of the length, off a straight line: no bend but a wrong number
+APART = 1e-6  # of columns of length one: the least that they may differ
+ABSOLUTE = 20  # rounds of weights that make the sum of squares one of sizes
 SCALE = 0.05  # a guideway that measures another length by more than this is worth a question
 
 
@@ -34,7 +39,7 @@ class Basis:
     def smooth(self, q: Array) -> Array:
         """Splines at q, (N, k); ModelError beyond the knots."""
         low, high = self.knots[0], self.knots[-1]
-        if q.size and (q.min() < low - 1e-9 or q.max() > high + 1e-9):
+        if q.size and not (q.min() >= low - 1e-9 and q.max() <= high + 1e-9):
             raise ModelError(
                 f"profile: found q from {q.min():g} to {q.max():g} m, expected positions within the measured {low:g} to "
                 f"{high:g} m"
@@ -59,18 +64,24 @@ def checked(
     q: Any, points: Any, pitch: float | None, harmonics: int, loss: str
 ) -> tuple[Array, Array, Array, list[Finding]]:
     """Positions, points (N, d), their rows in the data as given, and findings; errors as of `linearity`."""
-    q, points = np.asarray(q, dtype=float), np.asarray(points, dtype=float)
+    try:
+        q, points = np.asarray(q, dtype=float), np.asarray(points, dtype=float)
+        number = None if pitch is None else float(pitch)
+    except (TypeError, ValueError):
+        raise ModelError(
+            "linearity: found q, points or pitch that hold no numbers, expected some in m"
+        ) from None
     points = points[:, None] if points.ndim == 1 else points
     if q.ndim != 1 or points.shape not in ((len(q), 3), (len(q), 1)):
         raise ModelError(
             f"linearity: found q of shape {q.shape} and points of shape {points.shape}, expected (N,) and (N, 3), or (N,) "
             "for lengths along the axis"
         )
-    if pitch is not None and not pitch > 0:
+    if number is not None and not 0 < number < np.inf:
         raise ModelError(f"linearity: found pitch={pitch!r}, expected a length above 0 in m")
     if loss not in ("linear", "robust"):
         raise ModelError(f"linearity: found loss={loss!r}, expected 'linear' or 'robust'")
-    if harmonics < 1:
+    if not isinstance(harmonics, int | np.integer) or harmonics < 1:
         raise ModelError(
             f"linearity: found harmonics={harmonics!r}, expected 1 or more; leave pitch out for no waves"
         )
@@ -87,7 +98,34 @@ def checked(
             kind="too few points",
             rows=rows,
         )
+    _refuse_wrong_numbers(q[rows], points[rows], rows)
     return q[rows], points[rows], rows, findings
+
+
+def _refuse_wrong_numbers(q: Array, points: Array, rows: Array) -> None:
+    """CalibrationError for millimetres, and for rows that are far off the straight line through most of the others."""
+    order, half = np.argsort(q, kind="stable"), len(q) // 2
+    before, after = order[: len(q) - half], order[half:]
+    step = np.where(q[after] > q[before], q[after] - q[before], np.nan)
+    direction = np.nanmedian((points[after] - points[before]) / step[:, None], axis=0)
+    ahead = points - q[:, None] * direction
+    off = np.linalg.norm(ahead - np.median(ahead, axis=0), axis=1)
+    stroke = float(np.subtract(*np.quantile(q, (0.9, 0.1))))
+    length = float(np.linalg.norm(direction)) * stroke
+    if min(length, stroke) > LONGEST:
+        raise CalibrationError(
+            f"linearity: found a guideway of {np.ptp(q):.4g} m, expected some metres; give q, points and pitch in m",
+            kind="millimetres",
+            rows=rows,
+        )
+    astray = off > ASTRAY * length + EXACT
+    if np.any(astray) and length > 0:
+        raise CalibrationError(
+            f"linearity: found points up to {off.max():.3g} m beside a straight line in {rows_in_words(rows[astray])}, "
+            "expected those of one guideway; correct them, or leave them out",
+            kind="outliers",
+            rows=rows[astray],
+        )
 
 
 def approach(q: Array, rising: Any, rows: Array, given: int) -> Array:
@@ -100,21 +138,29 @@ def approach(q: Array, rising: Any, rows: Array, given: int) -> Array:
                 "expected one for each row"
             )
         return found[rows]
-    step = np.sign(np.diff(q, prepend=np.nan))
-    step[~np.isfinite(step)] = 0.0
-    moved = np.maximum.accumulate(
-        np.where(step != 0, np.arange(len(q)), 0)
-    )  # repeated points keep their direction
-    step = step[moved]
-    return np.where(step == 0, step[np.argmax(step != 0)], step)
+    return _directions(q)
+
+
+def _directions(q: Array) -> Array:
+    """1 where q was last rising, -1 where falling, by MOVED from where it turned, (N,); the first ones as the next."""
+    found, side, turn = np.zeros(len(q)), 0.0, q[0]
+    for k, place in enumerate(q):
+        if side * (place - turn) > 0:
+            turn = place  # on in the same direction
+        elif abs(place - turn) > MOVED:
+            side, turn = float(np.sign(place - turn)), place
+        found[k] = side
+    return np.where(found == 0, found[np.argmax(found != 0)], found)
 
 
 def axes_along(along: Array, up: Array) -> Array:
     """Rows along a unit vector, to the side and upwards, (d, d)."""
     if along.size == 1:
         return np.sign(along)[:, None]
+    if up.shape != (3,) or not np.isfinite(up).all() or not np.any(up):
+        raise ModelError(f"linearity: found up={up.tolist()}, expected a direction (3,)")
     side = np.cross(up, along)
-    if np.linalg.norm(side) < 1e-3 * np.linalg.norm(up) or not np.any(up):
+    if np.linalg.norm(side) < 1e-3 * np.linalg.norm(up):
         side = np.cross([1.0, 0.0, 0.0], along)  # a guideway that is itself upright
     side /= np.linalg.norm(side)
     return np.stack([along, side, np.cross(along, side)])
@@ -122,7 +168,7 @@ def axes_along(along: Array, up: Array) -> Array:
 
 def _intervals(q: Array, pitch: float | None, intervals: int | None) -> int:
     if intervals is not None:
-        if intervals < 1:
+        if not isinstance(intervals, int | np.integer) or intervals < 1:
             raise ModelError(f"linearity: found intervals={intervals!r}, expected 1 or more")
         return intervals
     longest = MOST_INTERVALS if pitch is None else np.ptp(q) / (PITCHES_PER_INTERVAL * pitch)
@@ -131,9 +177,21 @@ def _intervals(q: Array, pitch: float | None, intervals: int | None) -> int:
 
 def basis_of(q: Array, rising: Array, pitch: float | None, harmonics: int, intervals: int | None) -> Basis:
     """The columns of the fit, splines over as many intervals as asked for, or as the points allow."""
-    inner = np.linspace(q.min(), q.max(), _intervals(q, pitch, intervals) + 1)
-    knots = np.concatenate([np.full(DEGREE, inner[0]), inner, np.full(DEGREE, inner[-1])])
-    return Basis(knots, bool(np.any(rising > 0) and np.any(rising < 0)), pitch, harmonics)
+    both = bool(np.any(rising > 0) and np.any(rising < 0))
+    basis = Basis(np.empty(0), both, pitch, harmonics)
+    for count in range(_intervals(q, pitch, intervals), 0, -1):
+        inner = np.linspace(q.min(), q.max(), count + 1)
+        knots = np.concatenate([np.full(DEGREE, inner[0]), inner, np.full(DEGREE, inner[-1])])
+        basis = Basis(knots, both, pitch, harmonics)
+        if intervals is not None or _apart(basis.others(q, rising)):
+            break
+    return basis
+
+
+def _apart(columns: Array) -> bool:
+    """Whether columns can be told apart at the measured points: splines in a long gap cannot."""
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+    return len(columns) > columns.shape[1] and np.linalg.svd(scaled, compute_uv=False)[-1] >= APART
 
 
 def scale_findings(size: float, rows: Array) -> list[Finding]:
@@ -153,8 +211,7 @@ def scale_findings(size: float, rows: Array) -> list[Finding]:
 def refuse_hidden(basis: Basis, q: Array, rising: Array, rows: Array) -> None:
     """CalibrationError where the columns of the fit cannot be told apart at the measured points."""
     others, waves = basis.others(q, rising), basis.waves(q)
-    scaled = others / np.maximum(np.linalg.norm(others, axis=0), 1e-12)
-    if len(q) <= others.shape[1] + waves.shape[1] or np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-6:
+    if len(q) <= others.shape[1] + waves.shape[1] or not _apart(others):
         raise CalibrationError(
             f"linearity: {len(q)} points cannot determine {others.shape[1] + waves.shape[1]} unknowns, expected more "
             "points, without long gaps; or take fewer intervals",
@@ -209,7 +266,10 @@ def fitted(columns: Array, error: Array) -> tuple[Array, Array, Array]:
 
 def fitting(columns: Array, points: Array) -> Array:
     """Which points fit a curve through those that do, (N,)."""
-    fits = np.ones(len(points), dtype=bool)
+    left = _left_by_most(columns, points)
+    fits = np.all(np.abs(left) <= STRAY * np.maximum(1.4826 * np.median(np.abs(left), axis=0), EXACT), axis=1)
+    if np.count_nonzero(fits) <= columns.shape[1]:
+        fits = np.ones(len(points), dtype=bool)
     for _ in range(ROUNDS):  # one stray point bends the curve near it and makes its neighbours look stray
         left = points - columns @ np.linalg.lstsq(columns[fits], points[fits], rcond=None)[0]
         usual = 1.4826 * np.median(np.abs(left[fits]), axis=0)  # 1.4826: of normal noise
@@ -217,6 +277,18 @@ def fitting(columns: Array, points: Array) -> Array:
         if np.array_equal(before, fits) or np.count_nonzero(fits) <= columns.shape[1]:
             break
     return fits
+
+
+def _left_by_most(columns: Array, points: Array) -> Array:
+    """What a curve leaves that makes the sum of sizes least, not of squares, so that a third of stray points is no harm."""
+    basis = np.linalg.qr(columns)[0]
+    left = points - basis @ (basis.T @ points)
+    for _ in range(ABSOLUTE):
+        usual = np.maximum(np.median(np.abs(left), axis=0), EXACT)
+        weights = 1 / np.sqrt(np.sum((left / usual) ** 2, axis=1) + 1e-4)
+        normal = (basis * weights[:, None]).T @ basis
+        left = points - basis @ np.linalg.solve(normal, (basis * weights[:, None]).T @ points)
+    return left
 
 
 def outliers(stray: Array) -> list[Finding]:

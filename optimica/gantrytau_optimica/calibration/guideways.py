@@ -106,8 +106,8 @@ class Linearity:
 
     @cached_property
     def straightness(self) -> Array:
-        """Height of the smooth part, highest less lowest, of each column of `error`, (d,) in m."""
-        return np.ptp(self.profile(np.linspace(self.q.min(), self.q.max(), 501))[0], axis=0)
+        """Height of the smooth part, highest less lowest measured place, of each column of `error`, (d,) in m."""
+        return np.ptp(self.profile(self.q)[0], axis=0)
 
     def spectrum(self, periods: Any) -> Array:
         """Amplitudes in m of waves of the periods (F,) in m, fitted one by one to error, beside smooth part and backlash.
@@ -181,9 +181,10 @@ def linearity(
 
     q: positions of the cart (N,) in m in the order of measuring; points: (N, 3) in m in any frame, or (N,) lengths along
     the axis. pitch: of rack and pinion or screw in m; harmonics: how many of its waves. rising: (N,) 1 where the cart
-    came with rising q, -1 with falling; default from the order of q. intervals: of the cubic splines of the smooth part,
-    default as many as the points allow, at most 12, none as short as three pitches. up: which way is up.
-    loss: "linear" fits all points, "robust" leaves out those that do not fit the others; both tell which they are.
+    came with rising q, -1 with falling; default from the order of q, less than 0.1 mm being no turn. intervals: of the
+    cubic splines of the smooth part, default as many as the points allow, at most 12, none as short as three pitches.
+    up: which way is up. loss: "linear" fits all points, "robust" leaves out those that do not fit the others; both tell
+    which they are.
     Raises ModelError for other shapes, CalibrationError (`.rows`) for data that do not hold what is asked.
     """
     given = np.size(q)
