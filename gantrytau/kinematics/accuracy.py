@@ -21,6 +21,7 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.linked import ThreeLinks
 from gantrytau.kinematics.poses import vectors
+from gantrytau.kinematics.rotations import angle_between, cross
 from gantrytau.model import Model
 
 if TYPE_CHECKING:
@@ -71,6 +72,16 @@ class Accuracy:
         cosines = np.stack([(u[:, (k + 1) % 3] * u[:, (k + 2) % 3]).sum(-1) for k in range(3)], axis=-1)
         return np.arccos(np.clip(cosines, -1.0, 1.0))
 
+    @property
+    def dihedral_angles(self) -> np.ndarray:
+        """Angles at links 1, 2 and 3 between the planes through it and either other link, (N, 3) in rad (beta_k of A.4).
+
+        The sides of the face orthogonal to a link meet at this angle, and at what it leaves of pi.
+        """
+        u = self.directions
+        sides = cross(u, u[:, [1, 2, 0]]), cross(u, u[:, [2, 0, 1]])
+        return angle_between(*sides)
+
     def sampled(self, samples: int = 1000, *, seed: int = 0) -> np.ndarray:
         """Displacements of the tool for random errors on the ellipsoids, (N, samples, 3) in m: the Monte Carlo check.
 
@@ -89,8 +100,9 @@ class Accuracy:
     def plot(
         self, quantity: str = "error", *, axes: str = "yz", file: str | os.PathLike[str] | None = None
     ) -> "Figure":
-        """Level plot over a slice of poses (Figures 4.8 to 4.10): "error", "bound" or "areas".
+        """Level plot over a slice of poses (Figures 4.8 to 4.10).
 
+        quantity: "error", "bound", "areas" of the faces, "angles" between links, or "dihedral angles" at links;
         axes: the two coordinates that vary, such as "yz"; file: saves the figure there, too.
         Raises ModelError for another quantity, other axes, or poses that lie on one line.
         """

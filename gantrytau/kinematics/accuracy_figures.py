@@ -27,7 +27,8 @@ def draw_levels(found: "Accuracy", quantity: str, axes: str, file: str | os.Path
     panels = _panels(found, quantity)
     first, second = _coordinates(axes)
     triangles = _triangles(found.r[:, first], found.r[:, second], np.isfinite(found.error), axes)
-    size = (1.0 + 4.6 * len(panels), 4.4)
+    extent = np.ptp(found.r[np.isfinite(found.error)], axis=0)
+    size = (1.0 + 4.6 * len(panels), np.clip(3.6 * extent[second] / extent[first] + 0.6, 2.5, 6.0))
     figure, drawn = plt.subplots(1, len(panels), squeeze=False, figsize=size, layout="constrained")
     for axis, (title, values) in zip(drawn[0], panels.items(), strict=True):
         # points out of reach are in no triangle that is drawn
@@ -57,7 +58,16 @@ def _panels(found: "Accuracy", quantity: str) -> dict[str, np.ndarray]:
         return {"bound of the error of the tool [µm]": found.bound * 1e6}
     if quantity == "areas":
         return {f"face orthogonal to link {i + 1} [10⁻³ mm²]": found.areas[:, i] * 1e9 for i in range(3)}
-    raise ModelError(f"plot: found the quantity {quantity!r}, expected 'error', 'bound' or 'areas'")
+    if quantity == "angles":
+        pairs = ((2, 3), (3, 1), (1, 2))
+        angles = np.rad2deg(found.angles)
+        return {f"angle of links {i} and {j} [°]": angles[:, k] for k, (i, j) in enumerate(pairs)}
+    if quantity == "dihedral angles":
+        angles = np.rad2deg(found.dihedral_angles)
+        return {f"angle of the sides that meet at link {i + 1} [°]": angles[:, i] for i in range(3)}
+    raise ModelError(
+        f"plot: found the quantity {quantity!r}, expected 'error', 'bound', 'areas', 'angles' or 'dihedral angles'"
+    )
 
 
 def _coordinates(axes: str) -> tuple[int, int]:

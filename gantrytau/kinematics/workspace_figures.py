@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gantrytau.kinematics.workspace import Workspace
 
 _COLOURS = ("#9fd69f", "#ffffff", "#c9d5e8", "#f2dfb0", "#e8b3ab")  # in the order of REASONS
+_OBSTACLE = "0.35"
 _UNITS = {"stroke": "m", "turn": "rad", "angle": "rad", "clearance": "m"}
 _FINE = 300  # points along a side, of which outlines of obstacles are drawn
 _LAYERS = 12  # outlines across one axis that can still be told apart
@@ -34,13 +35,17 @@ def draw_layer(
             f"plot: found the quantity {quantity!r}, expected 'limits', {', '.join(map(repr, _UNITS))}"
         )
     others = [k for k in range(3) if k != number]
-    figure, axis = plt.subplots(figsize=(6.0, 5.2), layout="constrained")
+    extent = found.box[others, 1] - found.box[others, 0]
+    height = np.clip(5.0 * extent[1] / max(extent[0], 1e-9) + 1.0, 3.0, 8.0)
+    figure, axis = plt.subplots(figsize=(6.0, height), layout="constrained")
     at = (found.x, found.y, found.z)[number][layer]
     if quantity == "limits":
         _limits(axis, found, number, layer, others)
     else:
         _levels(figure, axis, found, number, layer, others, quantity)
-    _obstacles(axis, found, number, float(at), others)
+    hidden = _obstacles(axis, found, number, float(at), others)
+    if quantity == "limits":
+        _legend(figure, found, number, layer, hidden)
     _guideways(axis, found, number, float(at), others)
     axis.set_xlabel(f"{'xyz'[others[0]]} [m]")
     axis.set_ylabel(f"{'xyz'[others[1]]} [m]")
@@ -65,16 +70,29 @@ def _edges(found: "Workspace", k: int) -> np.ndarray:
 def _limits(axis: Any, found: "Workspace", number: int, layer: int, others: list[int]) -> None:
     """Cells in the colours of the limits that they break."""
     from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
 
     reasons = _layer_of(found, found.examined.reason, number, layer)
     colours = ListedColormap(list(_COLOURS))
     axis.pcolormesh(
         *(_edges(found, k) for k in others), reasons.T, cmap=colours, vmin=-0.5, vmax=len(REASONS) - 0.5
     )
+
+
+def _legend(figure: Any, found: "Workspace", number: int, layer: int, hidden: bool) -> None:
+    """What colours mean, below the axes, where it hides nothing; hidden: an obstacle is drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    reasons = _layer_of(found, found.examined.reason, number, layer)
     shown = [k for k in range(len(REASONS)) if (reasons == k).any()]
-    patches = [Patch(facecolor=_COLOURS[k], edgecolor="0.5", label=REASONS[k]) for k in shown]
-    axis.legend(handles=patches, fontsize="small", loc="upper right")
+    signs: list[Any] = [Patch(facecolor=_COLOURS[k], edgecolor="0.5", label=REASONS[k]) for k in shown]
+    signs += [Patch(facecolor=_OBSTACLE, label="obstacle")] if hidden else []
+    along = all(abs(way[number]) <= 0.5 * np.linalg.norm(way) for _, way in found.rails)
+    line, end = ("-", "") if along else ("", "s")
+    signs.append(Line2D([], [], color="tab:red", label="guideway", linestyle=line, marker=end))
+    figure.legend(
+        handles=signs, fontsize="small", loc="outside lower center", ncols=min(len(signs), 4), frameon=False
+    )
 
 
 def _levels(
@@ -91,18 +109,21 @@ def _levels(
     figure.colorbar(filled, ax=axis, label=f"{quantity} left [{_UNITS[quantity]}]")
 
 
-def _obstacles(axis: Any, found: "Workspace", number: int, at: float, others: list[int]) -> None:
-    """Outlines of obstacles where the layer cuts them."""
+def _obstacles(axis: Any, found: "Workspace", number: int, at: float, others: list[int]) -> bool:
+    """Outlines of obstacles where the layer cuts them; whether it cuts any."""
     sides = [np.linspace(found.box[k, 0], found.box[k, 1], _FINE) for k in others]
     if any(found.box[k, 0] == found.box[k, 1] for k in others):
-        return
+        return False
     points = np.empty((_FINE, _FINE, 3))
     points[..., number] = at
     points[..., others[0]], points[..., others[1]] = np.meshgrid(*sides, indexing="ij")
+    some = False
     for obstacle in found.limits.obstacles:
         distance = obstacle.distance(points).T
         if distance.min() < 0 < distance.max():
-            axis.contourf(*sides, distance, levels=[-np.inf, 0.0], colors=["0.35"])
+            axis.contourf(*sides, distance, levels=[-np.inf, 0.0], colors=[_OBSTACLE])
+            some = True
+    return some
 
 
 def _guideways(axis: Any, found: "Workspace", number: int, at: float, others: list[int]) -> None:
@@ -119,19 +140,27 @@ def _guideways(axis: Any, found: "Workspace", number: int, at: float, others: li
 def draw_solid(found: "Workspace", file: str | os.PathLike[str] | None) -> "Figure":
     """Outlines of layers across each axis in space; see `Workspace.plot_solid`."""
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import MaxNLocator
 
     if file is not None:
         check_suffix(file)
     if min(found.shape) < 2:
         raise ModelError(f"plot_solid: found {found.shape} places, expected two along each axis; use plot()")
-    figure = plt.figure(figsize=(6.5, 5.8), layout="constrained")
+    figure = plt.figure(figsize=(6.5, 5.8))
     axis: Any = figure.add_subplot(projection="3d")
     for number, colour in enumerate(("tab:blue", "tab:orange", "tab:green")):
         _outlines(axis, found, number, colour)
-    for name, bounds in zip("xyz", found.box, strict=True):
-        getattr(axis, f"set_{name}label")(f"{name} [m]")
-        getattr(axis, f"set_{name}lim")(*bounds)
-    axis.set_box_aspect(found.box[:, 1] - found.box[:, 0])
+    inside = found.places if len(found.places) else found.box.T
+    side = (found.box[:, 1] - found.box[:, 0]) / found.shape
+    low, high = inside.min(axis=0) - side, inside.max(axis=0) + side
+    longest = (high - low).max()
+    for k, name in enumerate("xyz"):
+        getattr(axis, f"set_{name}label")(f"{name} [m]", labelpad=8.0)
+        getattr(axis, f"set_{name}lim")(low[k], high[k])
+        # ticks as far apart as on the longest side
+        parts = max(2, round(6 * (high[k] - low[k]) / longest))
+        getattr(axis, f"{name}axis").set_major_locator(MaxNLocator(parts))
+    axis.set_box_aspect(high - low, zoom=0.9)  # with room for the labels
     axis.set_title(f"{found.volume:.3g} m³")
     _finish(figure, file)
     return figure

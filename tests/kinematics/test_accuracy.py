@@ -148,12 +148,38 @@ def test_no_errors_move_nothing():
     assert 0 <= found.bound[0] < 1e-10
 
 
-@pytest.mark.parametrize("quantity", ["error", "bound", "areas"])
+def test_angles_of_the_parallelepiped_and_of_the_links():
+    found = accuracy(D1, slice_between_guideways(points=7), CASE_2)
+    between, at = found.angles, found.dihedral_angles
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        # law of cosines on the sphere around the tool
+        sides = np.cos(between[:, j]) * np.cos(between[:, k])
+        expected = sides + np.sin(between[:, j]) * np.sin(between[:, k]) * np.cos(at[:, i])
+        np.testing.assert_allclose(np.cos(between[:, i]), expected, atol=1e-12)
+        # edges of the face orthogonal to link i, from one of its corners to the two next to it
+        corner, one, two = (int(np.flatnonzero((SIGNS == s).all(axis=1))[0]) for s in _face(i, j, k))
+        edges = [found.parallelepiped[:, n] - found.parallelepiped[:, corner] for n in (one, two)]
+        cosine = np.sum(edges[0] * edges[1], axis=1) / np.prod(np.linalg.norm(edges, axis=2), axis=0)
+        np.testing.assert_allclose(np.cos(np.pi - at[:, i]), cosine, atol=1e-12)
+    square = accuracy(with_links_along(np.eye(3)), [0.0, 0.0, 0.0], CASE_1)
+    np.testing.assert_allclose([square.angles[0], square.dihedral_angles[0]], np.pi / 2, atol=1e-9)
+
+
+def _face(i: int, j: int, k: int) -> np.ndarray:
+    """Signs of a corner of the face orthogonal to link i, and of those next to it along the edges of the face."""
+    signs = -np.ones((3, 3))
+    signs[:, i] = 1.0
+    signs[1, j] = signs[2, k] = 1.0
+    return signs
+
+
+@pytest.mark.parametrize("quantity", ["error", "bound", "areas", "angles", "dihedral angles"])
 def test_levels_are_drawn(tmp_path, quantity):
     r = slice_between_guideways(points=15)
     r[:5] = 99.0  # some out of reach
     figure = accuracy(D1, r, CASE_1).plot(quantity, file=tmp_path / "levels.png")
-    assert len(figure.axes) == (6 if quantity == "areas" else 2)  # each panel with its colour bar
+    assert len(figure.axes) == (2 if quantity in ("error", "bound") else 6)  # each panel with its colour bar
     assert (tmp_path / "levels.png").stat().st_size > 1000
 
 

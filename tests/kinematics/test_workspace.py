@@ -261,7 +261,11 @@ def test_figures(tmp_path):
     assert "m³" in found.plot_solid(file=tmp_path / "solid.png").axes[0].get_title()
     figure = workspace(L1, limits, spacing=0.1, box=_slice(1.0)).plot(file=tmp_path / "slice.png")
     assert figure.axes[0].get_xlabel() == "y [m]"
-    assert figure.axes[0].get_legend() is not None
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"inside", "guideway", "collision"} <= set(words)
+    hides = figure.legends[0].get_window_extent()
+    assert not hides.overlaps(figure.axes[0].get_tightbbox())  # data and labels stay in sight
+    assert figure.bbox.x0 <= hides.x0 < hides.x1 <= figure.bbox.x1
     with pytest.raises(ModelError, match="found the quantity 'speed', expected 'limits', 'stroke'"):
         found.plot(quantity="speed")
     with pytest.raises(ModelError, match="found no place of the layer where turn is limited"):
