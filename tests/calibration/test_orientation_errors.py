@@ -170,6 +170,52 @@ def test_noise_alone_has_no_cause(level):
     assert orientation_errors(r, R, along=ALONG).by_layers().cause == "rest"
 
 
+def bent(seed: int):
+    """Carts of one to three arms that stray by some 50 um and turn by some 0.25 mrad, in waves of 0.8 to 3 m."""
+    rng = np.random.default_rng(seed)
+    which = rng.permutation(3)[: rng.integers(1, 4)]
+    periods, phases = rng.uniform(0.8, 3.0, 3), rng.uniform(0, 2 * np.pi, (3, 2, 3))
+    sizes = 50e-6 * rng.normal(size=(3, 2, 3)) / np.array([1.0, 0.2])[:, None]
+    first = np.array([0, 1, 1, 2, 2, 2])
+
+    def moved(q):
+        whole = np.zeros((len(q), 6, 3))
+        for link, arm in enumerate(first):
+            offsets = np.array([each.offset for each in prototypes.D1.arms[arm].links])
+            joint = np.array(offsets[link - np.argmax(first == arm)]) - offsets.mean(axis=0)
+            angle = 2 * np.pi * q[:, arm, None, None] / periods[arm] + phases[arm]
+            shift, turn = np.moveaxis(sizes[arm] * np.sin(angle), 1, 0)
+            whole[:, link] = (shift + np.cross(turn, joint)) * (arm in which)
+        return whole
+
+    return moved
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_cause_is_never_mistaken(level, seed):
+    """At random: what links did is found as that, and what guideways did is never put on links."""
+    lengths = 100e-6 * np.random.default_rng(seed).standard_normal(6)
+    x = grid()[:, 0]
+    for layers in (x < np.inf, x < -1.0 + 1e-9, x < -1.4 + 1e-9):  # six, two, one
+        q, r, R = (a[layers] for a in poses_of(level, lengths=lengths, noise=2e-6))
+        assert orientation_causes(level, q, r, R).cause in {"links", "unknown"}
+        q, r, R = (a[layers] for a in poses_of(level, moved=bent(seed), noise=2e-6))
+        assert orientation_causes(level, q, r, R).cause != "links"
+    q, r, R = poses_of(level, lengths=lengths, noise=2e-6)
+    assert orientation_causes(level, q, r, R).cause == "links"
+    assert orientation_errors(r, R, along=ALONG).by_layers().cause == "links"
+    q, r, R = poses_of(level, moved=bent(seed), noise=2e-6)
+    assert orientation_errors(r, R, along=ALONG).by_layers().cause in {"guideways", "rest"}
+
+
+def test_poses_in_one_layer_do_not_tell(level):
+    layer = grid()[:, 0] < -1.4 + 1e-9
+    found = orientation_causes(level, *(a[layer] for a in poses_of(level, moved=bent(0), noise=2e-6)))
+    assert found.cause == "unknown"
+    assert found.either == found.shares["links"]
+    assert str(found).endswith("cause: unknown")
+
+
 def test_parts_sum_up_to_the_whole(level):
     q, r, R = poses_of(level, lengths=100e-6 * np.eye(6)[3], moved=rolling(1), noise=1e-6)
     found = orientation_errors(r, R, along=ALONG)

@@ -45,7 +45,7 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
         raise ModelError(f"plot: found layers={layers!r}, expected 1 to {MOST_LAYERS}")
     first, second = ("xyz".index(a) for a in axes)
     third = 3 - first - second
-    figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.2 + 3.8 * layers, 4.2))
+    figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.6 + 3.8 * layers, 4.4))
     borders = np.linspace(found.r[:, third].min(), found.r[:, third].max(), layers + 1)
     layer = np.clip(np.searchsorted(borders, found.r[:, third], side="right") - 1, 0, layers - 1)
     width = max(np.ptp(found.r[:, first]), np.ptp(found.r[:, second]), 1e-9)
@@ -55,11 +55,14 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
         rows = layer == k
         arrows = axis.quiver(
             found.r[rows, first], found.r[rows, second], found.errors[rows, first], found.errors[rows, second],
-            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.008,
+            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.005,
             clim=(0.0, MICRO * found.size.max()),
         )  # fmt: skip
         drawn.append(arrows)
         axis.set_aspect("equal")
+        # one window for all, which leaves room for arrows
+        axis.set_xlim(found.r[:, first].min() - ARROW * width, found.r[:, first].max() + ARROW * width)
+        axis.set_ylim(found.r[:, second].min() - ARROW * width, found.r[:, second].max() + ARROW * width)
         axis.set_xlabel(f"{axes[0]} [m]")
         if layers > 1:
             axis.set_title(

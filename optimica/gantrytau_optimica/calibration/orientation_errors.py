@@ -40,6 +40,7 @@ SPARE = 1.5  # measured numbers for each unknown, at the least
 # Singular value by the largest, below which a direction of the unknowns has no influence. Joints on plate and cart can
 # be told apart only by how much the plate turns, mostly less than 0.01 rad; less than 0.001 rad is noise magnified.
 SMALLEST = 1e-3
+LAYERS = 0.1  # of the extent across the guideways: poses that move less along them are in one layer
 SURE = 0.01  # probability of chance, below which guideways are held to have a part in it
 
 
@@ -49,12 +50,17 @@ class Causes:
 
     links: what constant errors of links and joints explain; guideways: what they cannot, and errors that change along the
     guideways can; rest: neither. chance: probability that guideways without errors would explain as much.
+    either: share of the squares of the turns, within that of the links, that errors of guideways explain as well, all of
+    it if the poses are in one layer across the guideways;
+    chance_of_links: probability that links without errors would explain as much as they do beyond guideways.
     """
 
     links: Array
     guideways: Array
     rest: Array
     chance: float
+    either: float = 0.0
+    chance_of_links: float = 0.0
 
     @property
     def deviations(self) -> dict[str, float]:
@@ -71,15 +77,27 @@ class Causes:
 
     @property
     def cause(self) -> str:
-        """The largest part: "links", "guideways", or "rest" if neither explains the errors."""
+        """The largest part: "links", "guideways", "rest" if neither explains the errors, or "unknown".
+
+        It is unknown where links seem to be the largest part, yet the poses cannot tell that from guideways: these explain
+        as much alone, or they have a part that is certain, and could have most of the rest of it too.
+        """
         shares = self.shares
         if self.chance > SURE:
             shares["guideways"] = 0.0
-        return max(shares, key=lambda name: shares[name])
+        largest = max(shares, key=lambda name: shares[name])
+        if largest != "links":
+            return largest
+        guideways_alone = self.chance_of_links > SURE
+        guideways_too = self.chance <= SURE and self.either > shares["links"] / 2
+        return "unknown" if guideways_alone or guideways_too else "links"
 
     def __str__(self) -> str:
         parts = ", ".join(f"{name} {1e3 * np.degrees(d):.2f}" for name, d in self.deviations.items())
-        return f"orientation, root mean square in 0.001 deg: {parts}; guideways by chance: {self.chance:.2g}"
+        return (
+            f"orientation, root mean square in 0.001 deg: {parts}; guideways by chance: {self.chance:.2g}; "
+            f"cause: {self.cause}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,23 +214,38 @@ def orientation_causes(robot: Model | Kinematics, q: Any, r: Any, R: Any, *, deg
 def _by_closure(geometry: Geometry, q: Array, r: Array, R: Array, degree: int) -> Causes:
     length, u, by_pose, _ = geometry.slopes(q, r, R)
     missed = length - geometry.length
-    constant, changing = np.zeros_like(missed), np.zeros_like(missed)
-    unknowns = np.zeros(2)
+    first, second = np.zeros(
+        (2, *missed.shape, 2)
+    )  # links, guideways; the last axis: which of them had the choice
+    unknowns = np.zeros((2, 2))
     for arm in range(3):
         links = geometry.links_of(arm)
         fixed = _of_links(u[:, links], R)
         moving = _of_guideway(u[:, links], geometry.on_cart[links], q[:, arm], degree)
-        right = missed[:, links].reshape(-1)
-        explained, counts = _in_turn(fixed, moving, right[:, None])
-        constant[:, links], changing[:, links] = (part.reshape(len(q), -1) for part in explained)
-        unknowns += counts
-    _enough(missed.size, unknowns.sum(), len(q))
-    rest = missed - constant - changing
-    parts = np.stack([constant, changing, rest], axis=2)
+        right = missed[:, links].reshape(-1, 1)
+        for k, columns in enumerate(((fixed, moving), (moving, fixed))):
+            explained, counts = _in_turn(*columns, right)
+            first[:, links, k], second[:, links, k] = (part.reshape(len(q), -1) for part in explained)
+            unknowns[k] += counts
+    _enough(missed.size, unknowns[0].sum(), len(q))
+    rest = missed[:, :, None] - first - second
+    parts = np.concatenate([first[:, :, :1], second, rest[:, :, :1]], axis=2)
     turns = np.linalg.solve(by_pose, parts)[:, 3:]
     turns = turns - turns.mean(axis=0)
-    chance = _chance(changing, rest, unknowns[1], missed.size - unknowns.sum())
-    return Causes(turns[:, :, 0], turns[:, :, 1], turns[:, :, 2], chance)
+    by_links, by_guideways, links_alone, left = np.moveaxis(turns, 2, 0)
+    spare = missed.size - unknowns.sum(axis=1)
+    chances = [_chance(second[:, :, k], rest[:, :, k], unknowns[k, 1], spare[k]) for k in range(2)]
+    along = geometry.direction.mean(axis=0) / np.linalg.norm(geometry.direction.mean(axis=0))
+    x = r @ along
+    one_layer = np.ptp(x) < LAYERS * np.linalg.norm(np.ptp(r - np.outer(x, along), axis=0))
+    return _causes((by_links, by_guideways, left), links_alone * (not one_layer), chances)
+
+
+def _causes(parts: tuple[Array, Array, Array], links_alone: Array, chances: list[float]) -> Causes:
+    """Causes from parts, and from what links explain beyond guideways, with the chances of both second choices."""
+    whole = sum(float(np.sum(part**2)) for part in parts)
+    both = float(np.sum(parts[0] ** 2) - np.sum(links_alone**2))
+    return Causes(*parts, chances[0], max(0.0, both / whole) if whole else 0.0, chances[1])
 
 
 def _of_links(u: Array, R: Array) -> Array:
@@ -266,7 +299,7 @@ def _by_layers(found: OrientationErrors, degree: int) -> Causes:
     x = found.r @ found.along
     across = np.linalg.svd(found.along[None])[2][1:]
     y, z = across @ found.r.T
-    if np.ptp(x) < 1e-3 * max(np.ptp(y), np.ptp(z), 1e-12):
+    if np.ptp(x) < LAYERS * max(np.ptp(y), np.ptp(z), 1e-12):
         raise CalibrationError(
             "by_layers: found all poses at one place along the guideways, expected several layers; measure there too",
             kind="one layer",
@@ -281,10 +314,15 @@ def _by_layers(found: OrientationErrors, degree: int) -> Causes:
     beyond = np.column_stack([column for p, column in columns.items() if p[0] > 0])
     turns = found.turns - found.turns.mean(axis=0)
     (links, guideways), counts = _in_turn(layer, beyond, turns)
+    (others, links_alone), _ = _in_turn(beyond, layer, turns)
     _enough(len(x), counts.sum(), len(x))
     rest = turns - links - guideways
-    chance = _chance(guideways, rest, 3 * counts[1], 3 * (len(x) - counts.sum()))
-    return Causes(links, guideways, rest, chance)
+    spare = 3 * (len(x) - counts.sum())
+    chances = [
+        _chance(guideways, rest, 3 * counts[1], spare),
+        _chance(links_alone, turns - others - links_alone, 3 * layer.shape[1], spare),
+    ]
+    return _causes((links, guideways, rest), links_alone, chances)
 
 
 def _unit(values: Array) -> Array:
