@@ -3,14 +3,17 @@
 import ctypes
 import subprocess
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from gantrytau.kinematics import Kinematics
+from gantrytau.kinematics import Kinematics, accuracy, assembly_modes
 from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
+from tests.kinematics.test_accuracy import CASE_1, CASE_2, slice_between_guideways
+from tests.kinematics.test_assembly_modes import HOME, f1_hexapod, link_errors, random_hexapod
 from tests.kinematics.test_kinematics_f1 import LIMIT, poses
 
 POSES = 1_000_000
@@ -35,6 +38,8 @@ def rows() -> Iterator[Row]:
     yield from _three_links()
     yield from _others()
     yield from _right_poses()
+    yield from _assembly_modes()
+    yield from _errors_of_d1()
 
 
 def _three_links() -> Iterator[Row]:
@@ -95,8 +100,51 @@ def _right_poses() -> Iterator[Row]:
     q = kinematics.ik(r, R)
     bent = kinematics.ball_joint_angles(r, R, np.nan_to_num(q)).max(axis=(1, 2))
     inside = np.flatnonzero(np.isfinite(q[:, 0]) & (bent < LIMIT))[:10_000]
+    begin = time.perf_counter()
     found, _ = kinematics.fk(q[inside])
+    duration = time.perf_counter() - begin
     right = int(np.sum(np.abs(found - r[inside]).max(axis=1) < 1e-9))
     yield at_least("F1, right poses of 10000 from the five-degree start", right, 10_000)
     yield at_most("F1, most iterations of these", kinematics.iterations, 6)
     yield shown("F1, iterations of these on average", f"{kinematics.iterations_by_pose.mean():.2f}")
+    yield shown("F1, time of these", f"{duration:.3g} s")
+
+
+def _assembly_modes() -> Iterator[Row]:
+    random = np.random.default_rng(5)
+    spread = np.array([0.3, 0.3, 0.3, 0.4, 0.4, 0.5])  # m, rad
+    poses_of_f1 = [f1_hexapod(HOME + spread * q) for q in random.uniform(-1, 1, (100, 6))]
+    assembly_modes(*poses_of_f1[0])  # reads its start system once
+    for name, hexapods in (("F1", poses_of_f1), ("random hexapods", [random_hexapod(k) for k in range(100)])):
+        times, found = [], []
+        for hexapod in hexapods:
+            begin = time.perf_counter()
+            found.append(assembly_modes(*hexapod))
+            times.append(time.perf_counter() - begin)
+        whole = sum(modes.complete and len(modes) == 40 for modes in found)
+        yield at_least(f"assembly modes, {name}, 40 of 40 in 100", whole, 98)
+        yield at_most(f"assembly modes, {name}, median time", 1e3 * float(np.median(times)), 100, "ms")
+        errors = [link_errors(m, *h).max(axis=1) for m, h in zip(found, hexapods, strict=True)]
+        real = max(float(e[m.real].max()) for e, m in zip(errors, found, strict=True))
+        yield at_most(f"assembly modes, {name}, links of real modes", 1e3 * real, 1e-9, "mm")
+        exact = [link_errors(m.exact, *h).max() < 1e-12 for m, h in zip(found, hexapods, strict=True)]
+        words = ", ".join(f"{sum(met)} in {what}" for met, what in (
+            ([e.max() < 1e-12 for e in errors], "doubles"), (exact, "long numbers"),
+        ))  # fmt: skip
+        yield shown(f"assembly modes, {name}, of 100 with all 40 within 1e-9 mm", words)
+
+
+def _errors_of_d1() -> Iterator[Row]:
+    """Section 4.3 and Appendix A: the ranges over the slice between the guideways, and the bound beside Monte Carlo."""
+    kinematics = Kinematics(GantryTau(prototypes.D1))
+    r = slice_between_guideways()
+    for name, case, low, high in (("1", CASE_1, 140, 240), ("2", CASE_2, 90, 170)):
+        found = accuracy(kinematics, r, case)
+        error = 1e6 * found.error
+        yield at_least(
+            f"D1, error of case {name}, least over the slice, um", round(float(error.min()), 1), low
+        )
+        yield at_most(f"D1, error of case {name}, largest over the slice", float(error.max()), high, "um")
+        sampled = np.linalg.norm(found.sampled(2000), axis=2).max(axis=1)
+        share = float((sampled / found.bound).max())
+        yield at_most(f"D1, case {name}, largest of 2000 sampled errors by its bound", share, 1.0)

@@ -264,7 +264,9 @@ def test_figures(tmp_path):
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"inside", "guideway", "collision"} <= set(words)
     hides = figure.legends[0].get_window_extent()
-    assert not hides.overlaps(figure.axes[0].get_tightbbox())  # data and labels stay in sight
+    drawn = figure.axes[0].get_tightbbox()
+    assert drawn is not None
+    assert not hides.overlaps(drawn)  # data and labels stay in sight
     assert figure.bbox.x0 <= hides.x0 < hides.x1 <= figure.bbox.x1
     with pytest.raises(ModelError, match="found the quantity 'speed', expected 'limits', 'stroke'"):
         found.plot(quantity="speed")
