@@ -1,46 +1,51 @@
 """Whether a robot keeps its limits all along a way that is straight in its actuator coordinates.
 
-    P x' = -Q q'     x = (r, rho w): the pose, rotation by a length; P, Q: slopes of the link lengths, q' constant on a way
+    P x' + Q q' = 0     x = (r, rotation): the pose; P, Q: slopes of the link lengths; q' constant on a way
 
-At a sample P has the least singular value s. Within h of it rows of P turn by at most D h in all, so that for h <= s / (2
-D) the plate stays held, on its branch, and |x'| <= 2 |Q q'| / s. The second derivative of the closure then bounds |x''|
-<= (2 / s) |w^2 / L + rho W^2 + |A''||, w the speed between the ends of a link, W of rotation, A'' of joints on
-turntables: no point of plate or links moves by more than V h + C h^2 / 2. An interval of a way is clear if that is less
-than what the sample at its middle leaves; else it is halved, until it is clear, or a sample breaks a limit, or hardly
-anything moves in it. Nothing that happens between two samples can be missed; a way that is refused may be free by a hair.
+At a sample x' is known. Near it, as long as the speed w_j between the ends of each link stays below 3/2 of that (and a
+little more), and the rotation W below twice that, unit vectors along links turn by no more than |u_j'| <= |w_j| / L_j, so
+that rows of P change by no more than |u_j'| and b (|u_j'| + W) for each unit of time, b the lever of a joint on the
+plate. With the inverse of P at the sample, column by column, this gives G, two by two for position and rotation: within h
+< 1 / (2 rho(G)) the plate stays held, on its branch, and the second derivative of the closure bounds x'':
+
+    |x''| <= (I - G / (2 rho))^-1 sum_j |inverse of P, column j| (|w_j|^2 / L_j + b W^2 + |A_j''|)
+
+A_j'': of joints on turntables. As far as speeds then stay below what was assumed, no point of plate or links
+moves by more than V h + C h^2 / 2. An interval of a way is clear if that is less than what the sample at its middle
+leaves; else it is halved, until it is clear, or a sample breaks a limit, or hardly anything moves in it. Nothing that
+happens between two samples can be missed; a way that is refused may be free by a hair.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.kinematics.rotations import cross
 from gantrytau_optimica.procedure.fleet import Fleet, Member
 
-FIRST = 4  # intervals that a way begins with
+FIRST = 4  # intervals that a way begins with, or so many times more where the plate turns
+TURNING = 8
 LEAST = 2.5e-4  # m, motion within an interval below which it is not halved again
-MOST = 200_000  # samples at once
+LITTLE = 0.1  # of the speed of the fastest cart, by which motion may differ from twice that at a sample
+LEVER = 0.1  # m, to compare rotations with where the plate has no levers
+TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class _Bounds:
-    """What bounds motion about samples, (k,) each: as far as h the rest holds; speeds, and C; see above."""
+    """What bounds motion about samples, (k,) each.
+
+    reach: as far as which the rest holds; speed, growth: V and C of any point; angles: rate of the angle of any ball joint.
+    """
 
     reach: np.ndarray
     speed: np.ndarray
     growth: np.ndarray
-    relative: np.ndarray
-    turning: np.ndarray
-    turning_growth: np.ndarray
-    shortest: float
+    angles: np.ndarray
 
     def moved(self, h: np.ndarray) -> np.ndarray:
         """How far any point moves within h, (k,) in m."""
         return self.speed * h + self.growth * h**2 / 2
-
-    def turned(self, h: np.ndarray) -> np.ndarray:
-        """By how much the angle of any ball joint changes within h, (k,) in rad."""
-        of_links = (self.speed + self.growth * h + self.relative) / self.shortest
-        return h * (of_links + self.turning + self.turning_growth * h)
 
 
 def clear_ways(fleet: Fleet, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -58,12 +63,13 @@ def _clear_of(member: Member, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ends = np.concatenate([a, b])
     broken = ~member.judged(ends).safe
     clear[broken[: len(a)] | broken[len(a) :]] = False
-    way: np.ndarray = np.repeat(np.arange(len(a)), FIRST)
-    half: np.ndarray = np.full(len(way), 0.5 / FIRST)
-    middle: np.ndarray = np.tile((np.arange(FIRST) + 0.5) / FIRST, len(a))
+    first = FIRST * TURNING if member.turns else FIRST
+    way: np.ndarray = np.repeat(np.arange(len(a)), first)
+    half: np.ndarray = np.full(len(way), 0.5 / first)
+    middle: np.ndarray = np.tile((np.arange(first) + 0.5) / first, len(a))
     while True:
         kept = clear[way]
-        way, middle, half = way[kept][:MOST], middle[kept][:MOST], half[kept][:MOST]
+        way, middle, half = way[kept], middle[kept], half[kept]
         if not way.size:
             return clear
         covered, hopeless = _covered(member, a[way] + middle[:, None] * (b - a)[way], (b - a)[way], half)
@@ -86,44 +92,97 @@ def _covered(
     h = half[rows]
     both = 2.0 if member.limits.link_radius else 1.0  # links may move towards each other
     near = both * bounds.moved(h) <= found.clearance[rows]
-    good = near & (bounds.turned(h) <= found.angle[rows]) & (h <= bounds.reach)
+    good = near & (bounds.angles * h <= found.angle[rows]) & (h <= bounds.reach)
     covered[rows] = good
-    hopeless[rows] = ~good & (h * np.maximum(bounds.speed, bounds.relative) < LEAST)
+    hopeless[rows] = ~good & (h * bounds.speed < LEAST)
     return covered, hopeless
 
 
 def _bounds(member: Member, q: np.ndarray, r: np.ndarray, R: np.ndarray, rate: np.ndarray) -> _Bounds:
     geometry = member.linked.geometry
-    lever = float(np.linalg.norm(geometry.on_plate, axis=1).max()) if member.turns else 0.0
-    body = max([lever, *(max(map(np.linalg.norm, (c.start, c.end))) for c in member.limits.plate)])
-    _, _, by_pose, by_joints = geometry.slopes(q, r, R)
-    joints, inward, turning = _joint_motion(member, rate)
-    P = by_pose[:, :, :3] if not lever else by_pose / np.repeat([1.0, lever], 3)
-    asked = -np.einsum("kmn,kn->km", by_joints, rate)
-    left, s, right = np.linalg.svd(P)
-    least = s[:, -1]
-    x = np.einsum("kji,kj->ki", right, np.einsum("kji,kj->ki", left, asked) / s)
-    X = 2 * np.linalg.norm(joints, axis=1) / least
-    W = X / lever if lever else np.zeros_like(X)
-    apart = (np.sqrt(2.0) if lever else 1.0) * X[:, None] + joints  # speed between the ends of a link
+    levers = np.linalg.norm(geometry.on_plate, axis=1)
+    motion = _motion(member, q, r, R, rate)
+    largest = motion.joints.max(axis=1, keepdims=True)
+    W = 2 * motion.spin[:, None] + (
+        LITTLE * largest / max(float(levers.max()), LEVER) if member.turns else 0.0
+    )
+    more = motion.apart / 2 + LITTLE * largest
+    apart = motion.apart + more  # speed between the ends of a link, as assumed
     u = apart / geometry.length
-    rows = 2 * u + W[:, None] if lever else u
-    curved = apart**2 / geometry.length + (lever * W**2)[:, None] + inward
-    second = 2 / least * np.linalg.norm(curved, axis=1)
-    spin = np.linalg.norm(x[:, 3:], axis=1) / lever if lever else np.zeros_like(X)
-    relative = joints.max(axis=1)
+    changes = np.stack([u, levers * (u + W)], axis=2)[:, :, : motion.columns.shape[1]]
+    G = motion.columns @ changes
+    radius = np.maximum(np.abs(np.linalg.eigvals(G)).max(axis=1), TINY)
+    curved = apart**2 / geometry.length + levers * W**2 + motion.inward
+    held = np.eye(G.shape[1]) - G / (2 * radius[:, None, None])
+    second = np.linalg.solve(held, motion.columns @ curved[:, :, None])[:, :, 0]
+    along, twist = second[:, 0], second[:, 1] if member.turns else np.zeros(len(q))
+    faster = along[:, None] + levers * (twist[:, None] + W**2) + motion.inward
+    reach = np.minimum(0.5 / radius, (more / np.maximum(faster, TINY)).min(axis=1))
+    if member.turns:
+        reach = np.minimum(reach, (W[:, 0] - motion.spin) / np.maximum(twist, TINY))
+    body = max(
+        [float(levers.max()), *(max(map(np.linalg.norm, (c.start, c.end))) for c in member.limits.plate)]
+    )
     return _Bounds(
-        reach=least / (2 * np.linalg.norm(rows, axis=1)),
-        speed=np.maximum(np.linalg.norm(x[:, :3], axis=1) + spin * body, relative),
-        growth=second * (1 + (body / lever if lever else 0.0)) + W**2 * body,
-        relative=relative,
-        turning=np.maximum(spin, turning),
-        turning_growth=second / lever if lever else np.zeros_like(X),
-        shortest=float(geometry.length.min()),
+        reach=reach,
+        speed=np.maximum(motion.speed + motion.spin * body, largest[:, 0]),
+        growth=along + (twist + W[:, 0] ** 2) * body,
+        angles=(apart / geometry.length).max(axis=1) + np.maximum(W[:, 0], motion.turning),
     )
 
 
-def _joint_motion(member: Member, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """Motion at samples: columns (k, 1 or 2, m): lengths of the columns of the inverse of P, for position and rotation.
+
+    speed (k,) of the tool, spin (k,) of the plate; apart (k, m): speed between the ends of a link; joints, inward (k, m):
+    bounds of speed and acceleration of joints on carts; turning (k,): of turntables.
+    """
+
+    columns: np.ndarray
+    speed: np.ndarray
+    spin: np.ndarray
+    apart: np.ndarray
+    joints: np.ndarray
+    inward: np.ndarray
+    turning: np.ndarray
+
+
+def _motion(member: Member, q: np.ndarray, r: np.ndarray, R: np.ndarray, rate: np.ndarray) -> _Motion:
+    geometry = member.linked.geometry
+    _, _, by_pose, by_joints = geometry.slopes(q, r, R)
+    inverse = np.linalg.inv(by_pose if member.turns else by_pose[:, :, :3])
+    x = -np.einsum("kij,kj->ki", inverse, np.einsum("kmn,kn->km", by_joints, rate))
+    spin = x[:, 3:] if member.turns else np.zeros_like(x)
+    plate = x[:, None, :3] + cross(spin[:, None], geometry.on_plate @ np.swapaxes(R, 1, 2))
+    apart = plate - _joint_speeds(member, q, rate)
+    blocks = inverse.reshape(len(q), -1, 3, inverse.shape[2])
+    return _Motion(
+        columns=np.sqrt((blocks**2).sum(axis=2)),
+        speed=np.linalg.norm(x[:, :3], axis=1),
+        spin=np.linalg.norm(spin, axis=1),
+        apart=np.linalg.norm(apart, axis=2),
+        **_joint_bounds(member, rate),
+    )
+
+
+def _joint_speeds(member: Member, q: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Velocities of the joints on carts and turntables, (k, m, 3)."""
+    geometry = member.linked.geometry
+    found = rate[:, geometry.arm, None] * geometry.direction[geometry.arm]
+    if not geometry.turntables:
+        return found
+    joints = geometry.cart_joints(q)
+    for arm in range(len(geometry.offset)):
+        links, (_, *columns) = geometry.links_of(arm), geometry.columns_of(arm)
+        turns = geometry.frames(arm, q)[2]
+        for column, (axis, place) in zip(columns, turns, strict=True):
+            spin = np.broadcast_to(axis, (len(q), 3)) * rate[:, column, None]
+            found[:, links] += cross(spin[:, None], joints[:, links] - np.asarray(place)[:, None])
+    return found
+
+
+def _joint_bounds(member: Member, rate: np.ndarray) -> dict[str, np.ndarray]:
     """Bounds of speed (k, m) and acceleration (k, m) of the joints on carts, and of the rotation of turntables (k,)."""
     geometry = member.linked.geometry
     arm, sizes = geometry.arm, np.linalg.norm(geometry.direction, axis=1)
@@ -136,4 +195,4 @@ def _joint_motion(member: Member, rate: np.ndarray) -> tuple[np.ndarray, np.ndar
         spins[:, geometry.turntables[k].arm] += np.abs(rate[:, 3 + k])
         inward[:, links] = spins[:, geometry.turntables[k].arm, None] ** 2 * levers[links]
         levers[links] += np.linalg.norm(geometry.turntables[k].offset)
-    return speed, inward, spins.max(axis=1, initial=0.0)
+    return dict(joints=speed, inward=inward, turning=spins.max(axis=1, initial=0.0))

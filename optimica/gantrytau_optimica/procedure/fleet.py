@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.arms import Arm, read_arms
 from gantrytau_optimica.calibration.devices import Device
 from gantrytau_optimica.calibration.sight import Bars
 
+DRAWS = 50  # of parameters, until links meet
 SAME = 1e-6  # m and rad, between actuators commanded and those of the pose they lead to: else it is on another branch
 
 
@@ -166,29 +167,41 @@ def build_fleet(robot: Model, limits: Limits, *, tape: float, robots: int, seed:
     arms, random = read_arms(robot), np.random.default_rng(seed)
     members = [Member(kinematics, limits)]
     for _ in range(robots):
-        moved = _moved(arms, tape, random)
-        members.append(Member(kinematics.replaced(moved), limits))
+        members.append(Member(_other(kinematics, arms, tape, random), limits))
     return Fleet(robot, tuple(members))
 
 
-def _moved(arms: Sequence[Arm], tape: float, random: np.random.Generator) -> dict[str, Any]:
-    others = [arm.moved(tape * scales(arm) * random.standard_normal(arm.count)) for arm in arms]
-    return {name: arm.values[name] for arm in others for name in arm.free}
+def _other(
+    kinematics: Kinematics, arms: Sequence[Arm], tape: float, random: np.random.Generator
+) -> Kinematics:
+    """A robot with other parameters, by chance."""
+    home = kinematics.home.q
+    for _ in range(DRAWS):
+        moved = [arm.moved(tape * scales(arm) * random.standard_normal(arm.count)) for arm in arms]
+        found = kinematics.replaced({name: arm.values[name] for arm in moved for name in arm.free})
+        # links that do not even meet at home are not those of the robot that stands there
+        if np.isfinite(found.fk(home)[0]).all():
+            return found
+    raise ModelError(
+        f"plan_calibration.tape: found {tape:g} m, with which {DRAWS} of {DRAWS} robots could not be put together; "
+        "expected an error that lets the links meet; measure joints and lengths better by hand"
+    )
 
 
 def check_home(fleet: Fleet, home: np.ndarray) -> None:
     """ModelError unless all robots are safe at home, (n,)."""
     for number, member in enumerate(fleet.members):
-        reason = int(member.judged(home[None]).reason[0])
-        if not reason:
+        judged = member.judged(home[None])
+        reason = REASONS[int(judged.reason[0])]
+        if reason == "inside":
             continue
-        which = (
-            "" if number == 0 else f", in robot {number} of {len(fleet.others)} that differ by the tape error"
-        )
-        words = {"collision": "links or plate nearer to an obstacle or to each other than the limits allow"}
-        what = words.get(REASONS[reason], f"a pose beyond the limit '{REASONS[reason]}'")
+        which = f" in robot {number} of {len(fleet.others)} that differ by the tape error" if number else ""
+        if reason == "collision":
+            missing = f"{-judged.clearance[0] * 1e3:.3g} mm too little clearance of links or plate"
+        else:
+            missing = f"the limit '{reason}' broken"
         raise ModelError(
-            f"plan_calibration.home: found {what} at home = {np.round(home, 4).tolist()}{which}; expected a place from "
-            "which all robots can set out; give home= in m and rad, a place in the middle of the free space, or correct "
-            "the limits"
+            f"plan_calibration.home: found {missing} at home = {np.round(home, 4).tolist()}{which}; expected a place "
+            "from which all robots can set out; give home= in m and rad, in the middle of the free space, smaller "
+            "margins and radii, or measure the robot better by hand (tape=)"
         )

@@ -21,54 +21,12 @@ if TYPE_CHECKING:
 WIDTH = 80
 AXES = 6  # of robax and of extax
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
-RESERVED = frozenset(
-    [
-        "module",
-        "endmodule",
-        "proc",
-        "endproc",
-        "const",
-        "pers",
-        "var",
-        "local",
-        "task",
-        "func",
-        "endfunc",
-        "trap",
-        "endtrap",
-        "if",
-        "then",
-        "else",
-        "endif",
-        "for",
-        "from",
-        "to",
-        "step",
-        "do",
-        "endfor",
-        "while",
-        "endwhile",
-        "test",
-        "case",
-        "default",
-        "return",
-        "true",
-        "false",
-        "not",
-        "and",
-        "or",
-        "xor",
-        "div",
-        "mod",
-        "with",
-        "goto",
-        "raise",
-        "retry",
-        "error",
-        "undo",
-        "exit",
-    ]
-)
+RESERVED = {
+    "module", "endmodule", "proc", "endproc", "const", "pers", "var", "local", "task", "func", "endfunc", "trap",
+    "endtrap", "if", "then", "else", "endif", "for", "from", "to", "step", "do", "endfor", "while", "endwhile", "test",
+    "case", "default", "return", "true", "false", "not", "and", "or", "xor", "div", "mod", "with", "goto", "raise",
+    "retry", "error", "undo", "exit",
+}  # fmt: skip
 
 
 def rapid_program(

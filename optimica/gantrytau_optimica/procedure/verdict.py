@@ -158,9 +158,10 @@ def _remarks(
         )
     if not places.settled and len(places.spacings) > 1:
         found.append("The grid of the workspace has not settled; give spacing= for a finer one.")
-    if not trials.failed and trials.in_frame.mean() > 2 * choice.error:
+    times = float(trials.in_frame.mean() / choice.error)
+    if not trials.failed and times > 2:
         found.append(
-            f"Errors are {trials.in_frame.mean() / choice.error:.2g} times those predicted from noise alone "
+            f"Errors are {times:.0f} times those predicted from noise alone "
             f"({um(choice.error)}): part of them is systematic."
         )
     if trials.unseen.any():
