@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
+from gantrytau_optimica.calibration.arm_fit import fit_arm
 from tests.calibration import f1_data
 
 TRUTH = prototypes.F1
@@ -99,7 +101,79 @@ def test_a_prior_by_the_last_part_of_its_name(data):
         calibrate(nominal(), data[1], prior={"plate_offset": (0.1, 1e-4)})
 
 
-@pytest.mark.parametrize("columns", [[1, 0, 2, 3, 4, 5], [0, 1, 2, 4, 3, 5]])
+def test_the_frame_of_the_device_is_another(data):
+    poses, measured = data
+    assert measured.R is not None
+    turn = Rotation.from_rotvec([0.9, -1.4, 2.0]).as_matrix()
+    there = Measurements(measured.q, measured.r @ turn.T + [3.0, -2.0, 5.0], turn @ measured.R)
+    for orientation in ("local", "free"):
+        here, found = (calibrate(nominal(), each, orientation=orientation) for each in (measured, there))
+        assert "frame" in {f.kind for f in found.findings}
+        assert np.median(found.errors) == pytest.approx(np.median(here.errors), rel=0.05)
+    found = calibrate(nominal(), there)
+    r, R = found.kinematics.fk(poses.q[:10], near=(there.r[:10], there.R[:10]))  # the robot moved there
+    assert r == pytest.approx(poses.r[:10] @ turn.T + [3.0, -2.0, 5.0], abs=2e-4)
+    assert R == pytest.approx(turn @ poses.R[:10], abs=2e-4)
+
+
+def test_positions_of_another_size_make_another_robot(data):
+    measured = data[1]
+    found = calibrate(nominal(), Measurements(measured.q, 1.3 * measured.r, measured.R))
+    (far,) = [f for f in found.findings if f.kind == "far"]
+    assert "arms[0].links[0].length by" in far.message
+
+
+def test_signs_and_degrees_of_turntables_are_told(data):
+    measured = data[1]
+    for change, kind in (
+        (np.r_[np.ones(3), np.full(3, 180 / np.pi)], "degrees"),
+        (np.r_[np.ones(3), -1, 1, 1], "sign"),
+    ):
+        with pytest.raises(CalibrationError) as caught:
+            calibrate(nominal(1e-4), Measurements(measured.q * change, measured.r, measured.R))
+        assert caught.value.kind == kind
+
+
+def test_no_alarm_for_good_measurements(data):
+    poses, _ = data
+    for seed in range(20, 30):
+        found = calibrate(F1GantryTau(TRUTH), Measurements(*f1_data.measured(poses, seed=seed)))
+        assert {f.kind for f in found.findings} == {"undetermined"}
+
+
+def test_links_of_different_arms_vary_together(data):
+    poses, _ = data
+    robot = F1GantryTau(TRUTH)
+    names = [
+        "arms[0].links[0].length",
+        "arms[1].links[0].length",
+        "arms[1].links[1].length",
+        "arms[2].links[0].length",
+    ]
+    arms = f1_data.f1_arms()
+    runs = []
+    for seed in range(60):
+        noisy = f1_data.measured(poses, seed=seed)
+        fitted = [fit_arm(arm, *noisy).arm.values for arm in arms]
+        runs.append([float(fitted[int(name[5])][name]) for name in names])
+    sample = np.corrcoef(runs, rowvar=False)
+    C = np.mean(
+        [
+            calibrate(robot, Measurements(*f1_data.measured(poses, seed=seed)), holdout=None).covariance(
+                names
+            )
+            for seed in range(5)
+        ],
+        axis=0,
+    )
+    told = C / np.sqrt(np.outer(np.diag(C), np.diag(C)))
+    assert told == pytest.approx(sample, abs=0.4)  # three of 1 / sqrt(60)
+    assert np.abs(told - np.diag(np.diag(told)))[0].max() > 0.4
+    spread = np.std(runs, axis=0, ddof=1)
+    assert np.sqrt(np.diag(C)) == pytest.approx(spread, rel=0.27)  # three of 9 %
+
+
+@pytest.mark.parametrize("columns", [[1, 0, 2, 3, 4, 5], [0, 1, 2, 4, 3, 5], [2, 0, 1, 3, 4, 5]])
 def test_swapped_columns_are_told(data, columns):
     measured = data[1]
     with pytest.raises(CalibrationError, match="stands in column") as caught:
@@ -109,8 +183,10 @@ def test_swapped_columns_are_told(data, columns):
 
 def test_what_does_not_fit_an_f1(data):
     measured = data[1]
-    with pytest.raises(CalibrationError, match="nominal lengths"):
-        calibrate(nominal(), Measurements(measured.q, measured.r + np.array([0.3, 0.5, 0.2]), measured.R))
+    with pytest.raises(CalibrationError, match="nominal lengths") as caught:
+        calibrate(nominal(), Measurements(measured.q, 3.3 * measured.r, measured.R))
+    assert caught.value.kind == "another robot"
+    assert len(caught.value.rows) == 200
     with pytest.raises(ModelError, match="without R"):
         calibrate(nominal(), Measurements(measured.q, measured.r))
     with pytest.raises(ModelError, match="start='linear'"):

@@ -91,7 +91,7 @@ class Arm:
             size = len(self._elements(name))
             change, start = step[start : start + size], start + size
             if name.endswith(".orientation") and self.orientation == "local":
-                values[name] = _product(values[name], _exponential(change))
+                values[name] = product(values[name], exponential(change))
             else:
                 values[name] = values[name] + change.reshape(values[name].shape)
         return replace(self, values=values)
@@ -240,7 +240,7 @@ def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
     )
 
 
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Of two scalar-first quaternions."""
     return np.concatenate([
         [a[0] * b[0] - a[1:] @ b[1:]],
@@ -248,7 +248,7 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _exponential(turn: np.ndarray) -> np.ndarray:
+def exponential(turn: np.ndarray) -> np.ndarray:
     """The unit quaternion of a rotation vector in rad."""
     half = np.linalg.norm(turn) / 2
     return np.concatenate([[np.cos(half)], np.sinc(half / np.pi) / 2 * turn])

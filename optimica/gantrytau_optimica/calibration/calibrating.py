@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.geometry import Geometry, read_geometry
-from gantrytau_optimica.calibration.judging import check_count, in_frame, judged, usable_rows
+from gantrytau_optimica.calibration.judging import check_carts, check_count, in_frame, judged, usable_rows
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.model_fits import fit_model
 from gantrytau_optimica.calibration.models import check_model, nominal_links, six_links, started_linear
@@ -45,6 +45,7 @@ def calibrate(
     check_model(model, geometry, measurements)
     findings = list(measurements.findings)
     rows = usable_rows(findings, measurements)
+    check_carts(geometry, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
     if geometry.kind == "turning":
         from gantrytau_optimica.calibration.turning import calibrate_turning
@@ -54,20 +55,29 @@ def calibrate(
     data = measurements.select(fitted)
     links = nominal_links(geometry, data, six_links(model, geometry))
     check_count(max(len(link.start) for link in links), fitted, findings)
-    misses = misses_of(links)
-    check_robot(misses, data.q, data.r, data.R, rows)
-    if start == "linear":
-        links = started_linear(links)
-    else:
-        links, more = in_frame(geometry, links, data, rows)
+    check_robot(geometry, misses_of(links), data.q, data.r, data.R, rows)
+    nominal = links
+    if start == "nominal" or _needs_values(prior):
+        nominal, more = in_frame(geometry, links, data, rows)
         findings += more
-    fits = fit_model(model, links, data, start, prior, loss)
+    known = "linear" if findings and findings[-1].kind == "frame" else start  # of directions
+    links = started_linear(links) if start == "linear" else nominal
+    values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
+    known_misses = misses_of(nominal) if start == "nominal" else None
+    fits = fit_model(model, links, data, known, prior, loss, values)
     if method == "ipopt":
         from gantrytau_optimica.calibration.by_ipopt import solve
 
         fits = [solve(fit) for fit in fits]
-    found = Calibration(geometry, measurements, model, fits, fitted, held_out, method, loss)
-    return replace(found, findings=(*findings, *judged(found, misses)))
+    found = Calibration(
+        geometry, measurements, model, fits, fitted, held_out, method, loss, nominal=known_misses
+    )
+    return replace(found, findings=(*findings, *judged(found)))
+
+
+def _needs_values(prior: Mapping[str, Any] | None) -> bool:
+    """Whether a prior speaks of nominal values."""
+    return isinstance(prior, Mapping) and any(not isinstance(given, tuple) for given in prior.values())
 
 
 def _check_words(**words: str) -> None:

@@ -1,7 +1,7 @@
 """What `calibrate` found: parameters, how sure they are, and how well they predict poses that were held out."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,15 @@ from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.covariance import joint_covariance, link_noise, undetermined
 from gantrytau_optimica.calibration.findings import Finding
-from gantrytau_optimica.calibration.fitting import Fit, fit_group
-from gantrytau_optimica.calibration.forward import BLOCK, CalibratedKinematics, RodLink
+from gantrytau_optimica.calibration.fitting import Fit
+from gantrytau_optimica.calibration.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import mean_rotation
-from gantrytau_optimica.calibration.parameters import Named, named_parameters, rod_links
+from gantrytau_optimica.calibration.parameters import Named, arm_of, named_parameters, rod_links
+from gantrytau_optimica.calibration.plausibility import Misses
 from gantrytau_optimica.calibration.rotations import rotation_vector
-
-CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
+from gantrytau_optimica.calibration.suspicion import Suspicion, suspicion
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,8 @@ class Calibration:
     """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements.
 
     model, method, loss: as they were asked for; fits: links that share numbers, at their minima; rows: those of the
-    measurements that were fitted; held_out: those that validate; findings: what was noticed on the way.
+    measurements that were fitted; held_out: those that validate; findings: what was noticed on the way; nominal: how nominal
+    values in the frame of the measurements miss them, None if they were not used.
     """
 
     geometry: Geometry
@@ -40,6 +41,7 @@ class Calibration:
     method: str
     loss: str
     findings: tuple[Finding, ...] = ()
+    nominal: Misses | None = None
 
     def __repr__(self) -> str:
         return (
@@ -63,6 +65,10 @@ class Calibration:
     def undetermined(self) -> tuple[str, ...]:
         """Names of numbers that data do not hold: they stayed near their start values."""
         return tuple(name for fit in self.fits for name in undetermined(fit))
+
+    def undetermined_part(self, name: str) -> bool:
+        """Whether data do not hold a number, or an element of a vector."""
+        return any(lost == name or lost.rpartition("[")[0] == name for lost in self.undetermined)
 
     @property
     def success(self) -> bool:
@@ -202,22 +208,29 @@ class Calibration:
                 found.append((chain.name, chain.q, e))
         return found
 
-    def suspicious_rows(self, limit: float) -> np.ndarray:
-        """Rows whose closure errors exceed `limit` robust standard deviations of a fit without them."""
-        fits, bad = list(self.fits), np.zeros(0, dtype=int)
-        mask = np.zeros(len(self.measurements), dtype=bool)
-        mask[self.rows] = mask[self.held_out] = True
-        used = np.flatnonzero(mask)
-        for _ in range(CLEANINGS):
-            found = used[relative_distances(fits, self.measurements, used) > limit]
-            if np.array_equal(found, bad):
-                break
-            bad = found
-            weights = 1.0 - np.isin(self.rows, bad)
-            if weights.sum() < 0.7 * len(weights):  # what is bad for so many is the model
-                break
-            fits = [fit_group(fit.group.started(fit.x), weights) for fit in fits]
-        return bad
+    @cached_property
+    def suspicion(self) -> Suspicion:
+        """Rows that close worse than noise explains, seen by a fit without them."""
+        return suspicion(self)
+
+    def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        """For each actuator its column in q, errors (N, m) of a group of m links at some fitted poses, their slopes by the
+        numbers (N, m, p), and by the actuator (N, m), zero for links of others; by weights where a loss gave them.
+        """
+        for fit in self.fits:
+            errors, jacobian, by_cart = [], [], []
+            weights = np.ones(len(few)) if fit.weights is None else fit.weights[few]
+            chains = [chain.at(few) for chain in fit.group.chains]
+            here = replace(fit.group, chains=tuple(chains))
+            for k, chain in enumerate(chains):
+                p = here.numbers(k, fit.x)
+                errors.append(weights * chain.error(p))
+                jacobian.append(weights[:, None] * here.slopes(fit.x, k))
+                by_cart.append(weights * chain.by_cart(p))
+            arms = np.array([arm_of(chain.name) for chain in chains])
+            for arm in np.unique(arms):
+                slopes = np.where(arms == arm, np.column_stack(by_cart), 0.0)
+                yield int(arm), np.column_stack(errors), np.stack(jacobian, axis=1), slopes
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
@@ -233,30 +246,6 @@ def _mean(values: np.ndarray) -> np.float64:
     """The mean of what is finite, NaN of nothing."""
     finite = values[np.isfinite(values)]
     return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
-
-
-def relative_distances(fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray) -> np.ndarray:
-    """The largest closure error of each of some rows in robust standard deviations of its link, (rows,)."""
-    links = rod_links(fits, measurements.rails)
-    whole = measurements.select(rows)
-    parts = [_misses(links, whole, slice(k, k + BLOCK)) for k in range(0, len(rows), BLOCK)]
-    misses = np.concatenate(parts, axis=1)
-    # of many rows some thousand tell their median well enough
-    scales = 1.4826 * np.median(misses[:, :: max(1, len(rows) // 5000)], axis=1)
-    return (misses / np.maximum(scales, 1e-12)[:, None]).max(axis=0)
-
-
-def _misses(links: Sequence[RodLink], measurements: Measurements, rows: slice) -> np.ndarray:
-    """How far links are from their lengths, (links, rows) in m."""
-    q = np.ascontiguousarray(measurements.q[rows].T)
-    r, R = np.ascontiguousarray(measurements.r[rows].T), measurements.R
-    found = np.empty((len(links), r.shape[1]))
-    for k, link in enumerate(links):
-        y = r - link.guideway.across(q[link.arm])
-        if R is not None and link.on_plate.any():
-            y += (R[rows] @ link.on_plate).T
-        found[k] = np.abs(np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2) - link.length)
-    return found
 
 
 def calibrated_robot(found: Calibration) -> Model:

@@ -9,7 +9,7 @@ a rotation that is given, so that turn stays small. Dressler (2012), sections 4.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,6 +67,19 @@ class Chain:
         if self.R is not None:
             found[:, PLATE] = 2.0 * np.einsum("nji,nj->ni", self.R, y)
         return found
+
+    def by_cart(self, p: np.ndarray) -> np.ndarray:
+        """de/dq, (N,); of measured guideways with their mean direction."""
+        if self.points is None:
+            return -2.0 * (self.vector(p) @ p[ALONG])
+        around = self.q - self.q.mean()
+        along = around @ self.points / max(float(around @ around), 1e-300)
+        return -2.0 * (self.vector(p) @ (self.frame(p) @ along))
+
+    def at(self, rows: np.ndarray) -> "Chain":
+        """The link over some of the poses."""
+        R, points = (None if array is None else array[rows] for array in (self.R, self.points))
+        return replace(self, q=self.q[rows], r=self.r[rows], R=R, points=points)
 
     def _on_guideway(self, p: np.ndarray) -> np.ndarray:
         assert self.points is not None

@@ -1,9 +1,11 @@
-"""How sure identified numbers are, from the noise of measured positions.
+"""How sure identified numbers are, from the noise of measured poses.
 
-    e_ik = |y_ik|^2 - L_i^2,    de_ik = 2 y_ik . dT_k,    cov(e_ik, e_jk) = 4 s_i s_j y_ik . y_jk
+    e_ik = |y_ik|^2 - L_i^2,    de_ik = 2 y_ik . dT_k + 2 (R_k B_i x y_ik) . dphi_k = u_ik . dT_k + w_ik . dphi_k
+    cov(e_ik, e_jk) = s^2 u_ik . u_jk + a^2 w_ik . w_jk
     p = -(J'J)^-1 J'e           cov p = (J'J)^-1 J' cov(e) J (J'J)^-1
 
-Links share the noise of a position, so that numbers of different links vary together. For one link alone this is
+Links share the noise of a pose, so that numbers of different links vary together. The deviations s of a coordinate and a
+of a turn about an axis are those with which the products of closure errors agree best. For one link alone this is
 4 s^2 L^2 (J'J)^-1, the Cramer-Rao bound of its closure errors.
 """
 
@@ -11,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gantrytau_optimica.calibration.closure import PLATE
 from gantrytau_optimica.calibration.fitting import Fit
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
@@ -41,21 +44,49 @@ def link_noise(fits: Sequence[Fit], loss: str) -> list[np.ndarray]:
     return [np.sqrt(one) for one in found]
 
 
+def pose_noise(
+    errors: np.ndarray, by_place: np.ndarray, by_turn: np.ndarray, freedom: np.ndarray
+) -> tuple[float, float, np.ndarray]:
+    """Deviations s in m and a in rad of measured poses, and factors (links,) by which links are worse than these say.
+
+    errors: (N, links); by_place, by_turn: u and w, (N, links, 3), w zero where plates do not turn; freedom: of each link,
+    N less its share of the numbers. Factors are 1 unless errors of the model make links differ.
+    """
+    i, j = np.triu_indices(errors.shape[1])
+    share = np.sqrt(freedom / len(errors))
+    squares = np.sum(errors[:, i] * errors[:, j], axis=0) / (share[i] * share[j])
+    design = np.column_stack([np.einsum("nki,nki->k", w[:, i], w[:, j]) for w in (by_place, by_turn)])
+    own = np.maximum(squares[i == j], 1e-300)
+    weight = 1 / np.sqrt(own[i] * own[j] * np.where(i == j, 2.0, 1.0))
+    variances = _not_negative(design * weight[:, None], squares * weight)
+    expected = (design @ variances)[i == j]
+    ratio = own / np.maximum(expected, 1e-300)
+    alike = np.all(np.abs(ratio - 1) < ALIKE * np.sqrt(2 / freedom))
+    s, a = np.sqrt(variances)
+    return float(s), float(a), np.ones(len(own)) if alike else np.sqrt(ratio)
+
+
+def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Least squares for two numbers of which none is below zero."""
+    if design[:, 1].any():
+        found = np.linalg.lstsq(design, right, rcond=None)[0]
+        if (found >= 0).all():
+            return found
+    alone = np.maximum(design.T @ right, 0.0) / np.maximum(np.sum(design**2, axis=0), 1e-300)
+    left = [np.sum((right - alone[k] * design[:, k]) ** 2) for k in (0, 1)]
+    return np.array([alone[0], 0.0]) if left[0] <= left[1] else np.array([0.0, alone[1]])
+
+
 def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
     """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold."""
-    noises = link_noise(fits, loss)
-    parts = [
-        (f, k, s)
-        for f, fit in enumerate(fits)
-        for k, s in zip(range(len(fit.group.chains)), noises[f], strict=True)
-    ]
+    parts = [(f, k) for f, fit in enumerate(fits) for k in range(len(fit.group.chains))]
     starts = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
     middle = np.zeros((starts[-1], starts[-1]))
-    rows = [_rows(fits[f], k, s) for f, k, s in parts]
-    for a, (f, _, _) in enumerate(parts):
-        for b, (g, _, _) in enumerate(parts[: a + 1]):
-            (J, y), (K, z) = rows[a], rows[b]
-            block = (np.einsum("ij,ij->i", y, z)[:, None] * J).T @ K
+    moved = _moved(fits, parts, loss)
+    rows = [_slopes(fits[f], k) for f, k in parts]
+    for a, (f, _) in enumerate(parts):
+        for b, (g, _) in enumerate(parts[: a + 1]):
+            block = (np.einsum("ij,ij->i", moved[a], moved[b])[:, None] * rows[a]).T @ rows[b]
             middle[starts[f] : starts[f + 1], starts[g] : starts[g + 1]] += block
             if a != b:
                 middle[starts[g] : starts[g + 1], starts[f] : starts[f + 1]] += block.T
@@ -67,12 +98,30 @@ def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
     return outer @ middle @ outer
 
 
-def _rows(fit: Fit, k: int, noise: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted slopes (N, free) of a link, and its vectors (N, 3) times twice the noise."""
+def _moved(fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str) -> list[np.ndarray]:
+    """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
+    turned = []
+    for f, k in parts:
+        chain, p = fits[f].group.chains[k], fits[f].x[fits[f].group.places[k]]
+        y = 2 * chain.vector(p)
+        lever = np.zeros_like(y) if chain.R is None else chain.R @ p[PLATE]
+        turned.append((y, np.cross(lever, y) if chain.R is not None else lever))
+    if loss == "robust" or not any(w.any() for _, w in turned):
+        noises = np.concatenate(link_noise(fits, loss))
+        return [s * np.hstack([u, 0 * w]) for s, (u, w) in zip(noises, turned, strict=True)]
+    errors = np.column_stack(
+        [fits[f].group.chains[k].error(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
+    )
+    freedom = np.array([len(errors) - fits[f].minimum.rank / len(fits[f].group.chains) for f, _ in parts])
+    by_place, by_turn = (np.stack(each, axis=1) for each in zip(*turned, strict=True))
+    s, a, factors = pose_noise(errors, by_place, by_turn, np.maximum(freedom, 1.0))
+    return [c * np.hstack([s * u, a * w]) for c, (u, w) in zip(factors, turned, strict=True)]
+
+
+def _slopes(fit: Fit, k: int) -> np.ndarray:
+    """Weighted slopes (N, free) of a link."""
     J = fit.group.slopes(fit.x, k)
-    if fit.weights is not None:
-        J = J * (fit.weights**2)[:, None]
-    return J, 2 * noise * fit.group.chains[k].vector(fit.x[fit.group.places[k]])
+    return J if fit.weights is None else J * (fit.weights**2)[:, None]
 
 
 def _inverse(fit: Fit) -> np.ndarray:

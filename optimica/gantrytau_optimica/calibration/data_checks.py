@@ -11,6 +11,7 @@ LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
 FLAT = 2e-3  # extent across a line or plane by that along it, below which it is one
 BITS = 20  # a million places, in which few of 100,000 rows meet by chance
 SAMPLE = 2000  # rows that show how far all extend
+MOVED = 1e-3  # m or rad, more than noise of a pose that is measured twice
 NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
 
 
@@ -25,6 +26,7 @@ def check_data(
         *_not_finite(finite),
         *_few(rows),
         *_repeated(q, r, rows),
+        *_stuck(q, r, rows),
         *_units(q, r, rows),
         *_shape(r, rows),
         *_rotations(R, rows),
@@ -54,6 +56,17 @@ def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Findin
             f"{rows_in_words(rows[later])} repeat earlier rows to the last digit; a copied row adds no knowledge but "
             "counts twice in every deviation; it is left out",
         )
+
+
+def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
+    """Rows in which one of q and r is that of the row before to the last bit, while the other moved on."""
+    for name, still, other, moving in (("r", r, "q", q), ("q", q, "r", r)):
+        places = np.flatnonzero((still[1:] == still[:-1]).all(axis=1)) + 1
+        places = places[(np.abs(moving[places] - moving[places - 1]) > MOVED).any(axis=1)]
+        if places.size:
+            bad = rows[places]
+            words = f"{name} of {rows_in_words(bad)} is that of the row before while {other} moved; they are left out"
+            yield Finding("stuck", bad, words)
 
 
 def repeated_rows(table: np.ndarray) -> np.ndarray:
@@ -106,8 +119,10 @@ def _far(x: np.ndarray) -> np.ndarray:
     # column by column, as numpy is slow along the first axis
     if max(max(x[:, k].max() - m, m - x[:, k].min()) for k, m in enumerate(middle)) < LARGEST / 2:
         return np.zeros(0, dtype=int)
-    far = np.flatnonzero((np.abs(x - middle) > LARGEST / 2).any(axis=1))
-    return np.arange(len(x)) if 2 * len(far) > len(x) else far
+    away = np.abs(x - middle).max(axis=1)
+    far = np.flatnonzero(away > LARGEST / 2)
+    # where most others are too far as well for a robot, all were written so
+    return np.arange(len(x)) if 2 * len(far) > len(x) or np.median(away) > LARGEST / 8 else far
 
 
 def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:

@@ -110,12 +110,21 @@ def relative_size(fits: Sequence[Fit]) -> np.ndarray:
     return (distances / np.maximum(scale, 1e-12)).max(axis=1)
 
 
-def with_prior(groups: Sequence[Group], prior: Mapping[str, Any] | None) -> list[Group]:
+@dataclass(frozen=True)
+class Prior:
+    """What is expected of numbers: given, as in `calibrate`; nominal: values by name, about which deviations hold them."""
+
+    given: Mapping[str, Any] | None
+    nominal: Mapping[str, float]
+
+
+def with_prior(groups: Sequence[Group], expected: Prior) -> list[Group]:
     """The groups with deviations of numbers about what is expected of them.
 
-    prior: by name of a number, of a vector, or of the last part of these for all links: a deviation, or (value,
+    given: by name of a number, of a vector, or of the last part of these for all links: a deviation, or (value,
     deviation). Raises ModelError for names that are not identified and deviations that are not above 0.
     """
+    prior = expected.given
     if prior is None:
         return list(groups)
     if not isinstance(prior, Mapping):
@@ -137,7 +146,7 @@ def with_prior(groups: Sequence[Group], prior: Mapping[str, Any] | None) -> list
                 if n in matches:
                     k = int(n[-2]) if n.endswith("]") else 0
                     mine[i] = (
-                        group.x[i] if value is None else _element(value, k),
+                        expected.nominal.get(n, group.x[i]) if value is None else _element(value, k),
                         _positive(name, deviation, k),
                     )
     return [replace(g, prior=mine) for g, mine in zip(groups, found, strict=True)]

@@ -80,8 +80,8 @@ class Measurements:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is doubtful in these numbers, whatever the robot: kinds "nan", "duplicates", "too few poses", "line",
-        "plane", "millimetres", "rotations", "guideway".
+        """What is doubtful in these numbers, whatever the robot: kinds "nan", "duplicates", "stuck", "too few poses",
+        "line", "plane", "millimetres", "rotations", "guideway".
         """
         return check_data(self.q, self.r, self.R, self.finite, self.rails)
 

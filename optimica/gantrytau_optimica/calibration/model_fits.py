@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.fitting import Fit, fit_group, fit_robust, not_held, with_prior
+from gantrytau_optimica.calibration.fitting import Fit, Prior, fit_group, fit_robust, not_held, with_prior
 from gantrytau_optimica.calibration.groups import Group
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import (
@@ -32,22 +32,27 @@ def fit_model(
     start: str,
     prior: Mapping[str, Any] | None,
     loss: str,
+    nominal: Mapping[str, float],
 ) -> list[Fit]:
-    """The fits of a model of Table 5.2, of groups of links that share numbers; start, prior, loss as in `calibrate`."""
+    """The fits of a model of Table 5.2, of groups of links that share numbers; start, prior, loss as in `calibrate`.
+
+    nominal: values by name, about which a prior holds numbers, if not about those they start with.
+    """
+    expected = Prior(prior, nominal)
     if needs_rails(model):
-        return _fit_rails(model, links, data, prior, loss)
+        return _fit_rails(model, links, data, expected, loss)
     if model == 3:
         links = [own_directions(link) for link in links]
     if model == "parallel":
-        return _fit_parallel(links, start, prior, loss)
-    return _fit_groups(with_prior(grouped(links), prior), loss)
+        return _fit_parallel(links, start, expected, loss)
+    return _fit_groups(with_prior(grouped(links), expected), loss)
 
 
 def _fit_groups(groups: Sequence[Group], loss: str) -> list[Fit]:
     return fit_robust(groups) if loss == "robust" else [fit_group(group) for group in groups]
 
 
-def _fit_parallel(links: list[Link], start: str, prior: Mapping[str, Any] | None, loss: str) -> list[Fit]:
+def _fit_parallel(links: list[Link], start: str, prior: Prior, loss: str) -> list[Fit]:
     """One direction for all guideways: the nominal one, unless it is unknown or that of another frame."""
     common = _fit_groups(with_prior(grouped(parallel(links, True)), prior), loss)
     found = common[0].values
@@ -59,9 +64,7 @@ def _fit_parallel(links: list[Link], start: str, prior: Mapping[str, Any] | None
     return _fit_groups(with_prior(grouped(parallel(links, False)), prior), loss)
 
 
-def _fit_rails(
-    model: object, links: list[Link], data: Measurements, prior: Mapping[str, Any] | None, loss: str
-) -> list[Fit]:
+def _fit_rails(model: object, links: list[Link], data: Measurements, prior: Prior, loss: str) -> list[Fit]:
     """Models 2, 4 and 5: first where straight guideways lie, then how the measured ones do."""
     assert data.rails is not None
     single = [link for link in links if link.chain.R is None]
@@ -100,8 +103,7 @@ def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
 
 
 def _with_poses(link: Link, rows: np.ndarray) -> Link:
-    chain = link.chain
-    return replace(link, chain=replace(chain, q=chain.q[rows], r=chain.r[rows]))
+    return replace(link, chain=link.chain.at(rows))
 
 
 def _without_plate(arm: int, links: Sequence[Link]) -> Link:

@@ -141,6 +141,16 @@ def started_linear(links: Sequence[Link]) -> list[Link]:
     return found
 
 
+def moved(links: Sequence[Link], turn: np.ndarray, shift: np.ndarray) -> list[Link]:
+    """The same links in another frame: T' = turn T + shift."""
+    found = []
+    for link in links:
+        start = link.start.copy()
+        start[1:4], start[4:7] = turn @ start[1:4] + shift, turn @ start[4:7]
+        found.append(replace(link, start=start))
+    return found
+
+
 def _turn(R: np.ndarray) -> float:
     """How far orientations are from their mean, root mean square in rad."""
     return float(np.sqrt(np.mean(np.sum((R - mean_rotation(R)) ** 2, axis=(1, 2))) / 2))

@@ -1,6 +1,6 @@
 """Calibration of robots with turntables, as the F1, arm by arm. Dressler (2012), section 5.4."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -9,19 +9,32 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, ArmFit, fit_arm, scales, triangle
+from gantrytau_optimica.calibration.arm_covariance import arms_covariance, held_directions
+from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, ArmFit, fit_arm, scales
+from gantrytau_optimica.calibration.arm_frames import frame_of, moved_arms
 from gantrytau_optimica.calibration.arm_poses import poses_of
 from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.covariance import MOVED
-from gantrytau_optimica.calibration.findings import CalibrationError, rows_in_words
+from gantrytau_optimica.calibration.findings import CalibrationError, Finding, rows_in_words
 from gantrytau_optimica.calibration.geometry import Geometry
-from gantrytau_optimica.calibration.judging import OUTLIER, check_count, judged
+from gantrytau_optimica.calibration.judging import check_count, in_words, judged
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.parameters import Named
-from gantrytau_optimica.calibration.plausibility import NEAR, check_robot, miss
+from gantrytau_optimica.calibration.plausibility import NEAR, Misses, check_robot, miss
+from gantrytau_optimica.calibration.suspicion import (
+    KEPT,
+    LEAST,
+    OUTLIER,
+    Suspicion,
+    far_rows,
+    limit,
+    standardised,
+)
 
-CLEANINGS = 2  # rounds of fitting without gross errors
+CLEANINGS = 5  # rounds of fitting without gross errors
+KEPT_AT_ALL = 0.4  # of the poses, that a robust fit must leave
+STEP = 1e-5  # m or rad, of differences by an actuator
 
 
 class ArmKinematics:
@@ -50,13 +63,14 @@ class TurningCalibration(Calibration):
     """A calibrated robot with turntables; `fits` are those of its arms.
 
     orientation: how quaternions were free. Rotations `turntables[k].rotation` of "local" have deviations in rad, and
-    parameters hold the quaternion `turntables[k].orientation`, scalar first. Arms are fitted one by one: covariances
-    between numbers of different arms are left out, as zeros.
+    parameters hold the quaternion `turntables[k].orientation`, scalar first.
     """
 
     arm_fits: tuple[ArmFit, ...] = ()
     orientation: Orientation = "local"
     prior: Mapping[str, float] = field(default_factory=dict)
+    used: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # rows that a robust loss left
+    start: tuple[Arm, ...] = ()  # in the frame of the measurements
 
     @property
     def arms(self) -> tuple[Arm, ...]:
@@ -81,17 +95,11 @@ class TurningCalibration(Calibration):
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Names of numbers that data do not hold: they stayed near their start values."""
-        data = self.measurements.select(self.rows)
+        data = self.measurements.select(self.used)
         found: list[str] = []
         for arm in self.arms:
-            scale = scales(arm)
-            pulls = [NOISE / _deviation(self.prior, name) for name in arm.names]
-            factor = triangle(arm, data.q, data.r, data.R, scale)[:, :-1]
-            _, singular, directions = np.linalg.svd(
-                np.vstack([factor, np.diag(pulls * scale)]), full_matrices=False
-            )
-            lost = directions[singular < NOISE / TAPE * (1 - 1e-6)]
-            part = np.abs(lost).max(axis=0, initial=0.0)
+            _, directions, held = held_directions(arm, data, self.prior)
+            part = np.abs(directions[~held]).max(axis=0, initial=0.0)
             found += [n for n, share in zip(arm.names, part, strict=True) if share > MOVED]
         return tuple(found)
 
@@ -117,11 +125,7 @@ class TurningCalibration(Calibration):
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        ends = np.cumsum([0, *(fit.arm.count for fit in self.arm_fits)])
-        found = np.zeros((ends[-1], ends[-1]))
-        for first, last, fit in zip(ends[:-1], ends[1:], self.arm_fits, strict=True):
-            found[first:last, first:last] = fit.covariance
-        return found
+        return arms_covariance(self.arms, self.measurements.select(self.used), self.prior)
 
     @cached_property
     def chains(self) -> Any:
@@ -184,27 +188,88 @@ class TurningCalibration(Calibration):
             for name, e in zip(arm.links, arm.closure(data.q, data.r, data.R)[0].T, strict=True)
         ]
 
-    def suspicious_rows(self, limit: float) -> np.ndarray:
-        """Rows whose closure errors exceed `limit` robust standard deviations."""
+    @cached_property
+    def suspicion(self) -> Suspicion:
+        """Rows that close worse than noise explains, seen by a fit without them."""
         mask = np.zeros(len(self.measurements), dtype=bool)
         mask[self.rows] = mask[self.held_out] = True
-        rows = np.flatnonzero(mask)
+        every = np.flatnonzero(mask)
+        data, arms, used, bad, typical = (
+            self.measurements.select(every),
+            self.arms,
+            self.used,
+            every[:0],
+            np.inf,
+        )
+        if (coarse := far_rows(self, every)).size:
+            used = np.setdiff1d(used, coarse)
+            clean = self.measurements.select(used)
+            arms = tuple(_fit(arm, clean, self.prior, "gauss-newton", "linear").arm for arm in self.start)
+        for _ in range(CLEANINGS):
+            sizes, typical = relative_size(arms, data, np.isin(every, used), self.prior)
+            fresh = every[sizes > _limit(arms, used)]
+            if np.array_equal(fresh, bad):
+                break
+            bad, good = fresh, np.setdiff1d(self.rows, fresh)
+            if len(good) < KEPT * len(self.rows):
+                break
+            if not np.array_equal(good, used):
+                used, clean = good, self.measurements.select(good)
+                arms = tuple(_fit(arm, clean, self.prior, "gauss-newton", "linear").arm for arm in arms)
+        return Suspicion(bad, misses_of_arms(arms), typical)
+
+    def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        """As of a Calibration, of carts and turntables."""
+        rows = self.rows[few]
         data = self.measurements.select(rows)
-        return rows[relative_size(self.arm_fits, data) > limit]
+        weights = np.isin(rows, self.used).astype(float)[:, None]
+        for arm in self.arms:
+            errors, jacobian = arm.closure(data.q, data.r, data.R)
+            _, directions, held = held_directions(arm, data, self.prior)
+            jacobian = (jacobian * scales(arm)) @ directions[held].T
+            for column in (arm.cart, *(table.column for table in arm.turntables)):
+                step = STEP * (np.arange(data.q.shape[1]) == column)
+                ends = [arm.closure(data.q + s * step, data.r, data.R)[0] for s in (1.0, -1.0)]
+                slopes = (ends[0] - ends[1]) / (2 * STEP)
+                yield column, weights * errors, weights[:, :, None] * jacobian, weights * slopes
 
 
-def relative_size(fits: Sequence[ArmFit], data: Measurements) -> np.ndarray:
-    """The largest closure error of each pose in robust standard deviations of its link, (N,)."""
-    sizes = np.abs(np.hstack([fit.arm.closure(data.q, data.r, data.R)[0] for fit in fits]))
-    return (sizes / np.maximum(1.4826 * np.median(sizes, axis=0), 1e-12)).max(axis=1)
+def misses_of_arms(arms: Sequence[Arm]) -> Misses:
+    """How far links of arms are from their lengths."""
+
+    def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        return np.abs(np.hstack([arm.closure(q, r, R)[0] for arm in arms])).max(axis=1)
+
+    return misses
+
+
+def _limit(arms: Sequence[Arm], used: np.ndarray) -> float:
+    return limit(len(used) - max(arm.count / len(arm.links) for arm in arms))
+
+
+def relative_size(
+    arms: Sequence[Arm], data: Measurements, fitted: np.ndarray, prior: Mapping[str, float]
+) -> tuple[np.ndarray, float]:
+    """The largest closure error of each pose in robust standard deviations of its link, (N,), and the worst of these.
+
+    fitted: which of the poses were, (N,); the others may be worse, as `suspicion.py` says.
+    """
+    errors, spread = [], []
+    there = data.select(np.flatnonzero(fitted))
+    for arm in arms:
+        e, J = arm.closure(data.q, data.r, data.R)
+        singular, directions, held = held_directions(arm, there, prior)
+        along = (J * scales(arm)) @ directions.T
+        h = np.sum((along[:, :, held] / singular[held]) ** 2, axis=2)
+        other = np.sum((along[:, :, ~held] * (TAPE / NOISE)) ** 2, axis=2)
+        squares = np.where(fitted[:, None], np.maximum(1 - h, LEAST), 1 + h + other)
+        errors.append(e)
+        spread.append(np.sqrt(squares))
+    return standardised(np.hstack(errors).T, np.hstack(spread).T)
 
 
 def _plain(value: np.ndarray) -> Any:
     return float(value) if np.ndim(value) == 0 else list(map(float, value))
-
-
-def _deviation(prior: Mapping[str, float], name: str) -> float:
-    return prior.get(name, prior.get(name.rpartition("[")[0], np.inf))
 
 
 def calibrate_turning(
@@ -231,29 +296,71 @@ def calibrate_turning(
     check_count(max(arm.count for arm in arms) // 3, fitted, findings)
     data = measurements.select(fitted)
 
-    def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-        return np.abs(np.hstack([arm.closure(q, r, R)[0] for arm in arms])).max(axis=1)
-
-    check_robot(misses, data.q, data.r, data.R, rows)
-    missed = miss(misses, data.q, data.r, data.R)
-    if missed > NEAR:
-        raise CalibrationError(
-            f"Measurements: found {rows_in_words(rows)} in which links miss their nominal lengths by {missed:.3g} m in the "
-            f"median, expected {NEAR:g} m at most; give nominal values of this robot, in the frame of the measurements",
-            kind="another robot",
-            rows=rows,
-        )
+    check_robot(geometry, misses_of_arms(arms), data.q, data.r, data.R, rows)
+    arms, more = _in_frame(geometry, arms, data, rows)
     own = _prior(arms, prior)
-    fits = tuple(_fit(arm, data, own, method, loss) for arm in arms)
+    used = _plausible(arms, data, fitted) if loss == "robust" else fitted
+    fits = _fits(arms, measurements.select(used), own, method, loss)
     if loss == "robust":  # what Huber's weights leave of gross errors still pulls at what data hardly hold
         for _ in range(CLEANINGS):
-            good = relative_size(fits, data) < OUTLIER
-            clean = measurements.select(fitted[good])
-            fits = tuple(_fit(arm, clean, own, method, loss) for arm in arms)
+            now = tuple(fit.arm for fit in fits)
+            sizes, _ = relative_size(now, data, np.isin(fitted, used), own)
+            good = fitted[sizes < _limit(now, used)]
+            if np.array_equal(good, used) or len(good) < KEPT_AT_ALL * len(fitted):
+                break
+            used, fits = good, _fits(arms, measurements.select(good), own, method, loss)
     found = TurningCalibration(
-        geometry, measurements, None, (), fitted, held_out, method, loss, (), fits, orientation, own
+        geometry,
+        measurements,
+        None,
+        (),
+        fitted,
+        held_out,
+        method,
+        loss,
+        (),
+        misses_of_arms(arms),
+        fits,
+        orientation,
+        own,
+        used,
+        arms,
     )
-    return replace(found, findings=(*findings, *judged(found, misses)))
+    return replace(found, findings=(*findings, *more, *judged(found)))
+
+
+def _in_frame(
+    geometry: Geometry, arms: tuple[Arm, ...], data: Measurements, rows: np.ndarray
+) -> tuple[tuple[Arm, ...], list[Finding]]:
+    """Arms in the frame of the measurements; CalibrationError for another robot."""
+    missed = miss(misses_of_arms(arms), data.q, data.r, data.R)
+    if missed < NEAR:
+        return arms, []
+    fitting = frame_of(geometry.robot, misses_of_arms(arms), data)
+    if fitting is not None:
+        there = moved_arms(arms, fitting.turn, fitting.shift)
+        if (left := miss(misses_of_arms(there), data.q, data.r, data.R)) < NEAR:
+            return there, [in_words(fitting, rows)]
+        missed = min(missed, left)
+    raise CalibrationError(
+        f"Measurements: found {rows_in_words(rows)} in which links miss their nominal lengths by {missed:.3g} m in the "
+        f"median however the frame is placed, expected {NEAR:g} m at most; these are measurements of another robot, or its "
+        "nominal values are wrong",
+        kind="another robot",
+        rows=rows,
+    )
+
+
+def _plausible(arms: Sequence[Arm], data: Measurements, fitted: np.ndarray) -> np.ndarray:
+    """The rows that nominal values miss no worse than some times the median: where a robust fit begins."""
+    missed = misses_of_arms(arms)(data.q, data.r, data.R)
+    return fitted[missed < max(OUTLIER * float(np.median(missed)), OUTLIER * NOISE)]
+
+
+def _fits(
+    arms: Sequence[Arm], data: Measurements, prior: Mapping[str, float], method: str, loss: str
+) -> tuple[ArmFit, ...]:
+    return tuple(_fit(arm, data, prior, method, loss) for arm in arms)
 
 
 def _prior(arms: Sequence[Arm], prior: Mapping[str, Any] | None) -> dict[str, float]:

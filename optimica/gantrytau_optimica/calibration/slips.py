@@ -1,0 +1,71 @@
+"""Whether an actuator lost its count on the way: a step in what is left of a fit, from one row on.
+
+    e = J dp + s_k d [k >= first]       gain(first) = (h'e)^2 / h'h,   h the column s [k >= first] less its part in J
+
+s is the derivative of the closure errors by the actuator. One step that explains most of the squares is told; errors of
+guideways do not do that. Rows are taken in the order measured.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SHARE = 0.5  # of the squares, that a step must explain, or two
+DEVIATIONS = 7.0  # of its own, that a step must have
+ROWS = 5  # at the least on each side of a step: fewer are outliers
+FREEDOM = 30  # errors more than numbers; fewer hardly tell a step from noise
+
+
+@dataclass(frozen=True)
+class Slip:
+    """first, last: places among the rows, from which on and up to which the actuator is off by `size` (m or rad)."""
+
+    first: int
+    last: int
+    size: float
+
+
+def slip(errors: np.ndarray, jacobian: np.ndarray, slopes: np.ndarray) -> Slip | None:
+    """Errors (N, m) of m links over N poses, jacobian (N, m, p) of what was identified, slopes (N, m) by the actuator."""
+    count, links = errors.shape
+    known = np.linalg.qr(jacobian.reshape(count * links, -1))[0]
+    freedom = count * links - known.shape[1] - 2
+    if freedom < FREEDOM:
+        return None
+    left = errors.ravel() - known @ (known.T @ errors.ravel())
+    whole = float(left @ left)
+    first, gain = _step(left, known, slopes)
+    column = _column(first, slopes, known)
+    size = float(column @ left) / float(column @ column)
+    rest = left - size * column
+    if gain > SHARE * whole and gain > DEVIATIONS**2 * (whole - gain) / freedom:
+        return Slip(first, count, size)
+    known = np.column_stack([known, column / np.linalg.norm(column)])
+    second, more = _step(rest, known, slopes)
+    left_over = whole - gain - more
+    if gain + more > SHARE * whole and min(gain, more) > DEVIATIONS**2 * left_over / freedom:
+        ends = sorted((first, second))
+        if ends[1] - ends[0] < ROWS:
+            return None
+        inside = _column(ends[0], slopes, known[:, :-1]) - _column(ends[1], slopes, known[:, :-1])
+        return Slip(ends[0], ends[1], float(inside @ left) / float(inside @ inside))
+    return None
+
+
+def _column(first: int, slopes: np.ndarray, known: np.ndarray) -> np.ndarray:
+    column = np.where(np.arange(len(slopes))[:, None] >= first, slopes, 0.0).ravel()
+    return column - known @ (known.T @ column)
+
+
+def _step(left: np.ndarray, known: np.ndarray, slopes: np.ndarray) -> tuple[int, float]:
+    """Where one step explains most, and how much of the squares."""
+    count, links = slopes.shape
+    products = (known.reshape(count, links, -1) * slopes[:, :, None]).sum(axis=1)
+    inside = np.cumsum(products[::-1], axis=0)[::-1]
+    along = np.cumsum((left.reshape(count, links) * slopes).sum(axis=1)[::-1])[::-1]
+    length = np.cumsum((slopes**2).sum(axis=1)[::-1])[::-1]
+    free = length - (inside**2).sum(axis=1)
+    gains = np.where(free > 1e-6 * length[0], along**2 / np.maximum(free, 1e-300), 0.0)
+    gains[:ROWS] = gains[max(0, count - ROWS + 1) :] = 0.0
+    first = int(np.argmax(gains))
+    return first, float(gains[first])
