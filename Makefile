@@ -5,20 +5,29 @@ VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 LOCK := pyproject.toml constraints.txt
 
-.PHONY: demo test bench lint clean
+.PHONY: demo test bench lint style types pytest clean
 
 demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
 
-test: lint
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile
+# The type checker takes minutes on one processor: it runs beside the tests.
+test: style
+	$(MAKE) --no-print-directory --jobs=2 types pytest
+
+# Files in the order of tests/conftest.py, not those with the most tests first.
+pytest: $(VENV)/installed-dev
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
 
-lint: $(VENV)/installed-dev
+lint: style types
+
+style: $(VENV)/installed-dev
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
+
+types: $(VENV)/installed-dev
 	$(VENV)/bin/basedpyright
 
 # A stamp is older than pyproject.toml or constraints.txt when the set-up has to be done again.
