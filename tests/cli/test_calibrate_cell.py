@@ -156,6 +156,16 @@ def test_missing_poses_are_told_and_planned_again(folder, run, answer):
     )
 
 
+def test_without_validation_the_verdict_says_so(folder, answer):
+    found = answer("calibrate", measure(folder), "--holdout", "none")
+    assert found["good"] is True
+    assert found["validation_error_m"] is None
+    assert "of the fitted poses, as none were left to validate" in found["verdict"]
+    few = answer("calibrate", measure(folder, slice(0, 20, 2)))  # ten, of which five are too few
+    assert few["validation_error_m"] is None
+    assert few["poses_fitted"] == 10
+
+
 def test_too_few_poses_still_say_which_are_missing(folder, run):
     found = run("calibrate", measure(folder, slice(0, 5)))
     assert found.exit_code == FAULT
@@ -342,6 +352,8 @@ def test_a_table_that_is_missing(fails, tmp_path):
         (dict(tape="tape = 5"), "robot.tape: found 5.0, expected a length in m"),
         (dict(poses="poses = 4"), "goal.poses: found 4, expected a whole number from 8"),
         (dict(home="home = [0.5, 0.5]"), "plan.home: found [0.5, 0.5], expected 3 finite numbers"),
+        (dict(strokes=""), "give limits.strokes"),
+        (dict(name='name = "1Cal"'), "program.name: found '1Cal', expected a name of RAPID"),
         (dict(facing="facing = [-1, 0, 0]"), "turn the target (device.facing) towards it"),
     ],
 )

@@ -39,9 +39,9 @@ def finish(
             told.append(_missing(missing, rest["program"]))
             if not json:
                 note(told.pop())  # also when the rest does not suffice
-    found, error = _found(choice, measured, policy, validate and planned is not None, json)
+    found, error, validated = _found(choice, measured, policy, validate and planned is not None, json)
     written = results.write(found, folder, choice.name, measured.file)
-    verdict = {} if planned is None else _verdict(float(error), planned)
+    verdict = {} if planned is None else _verdict(float(error), validated, planned)
     if json:
         numbers = wording.summary(found, measured, choice.name, written)
         typer.echo(as_json({**numbers, **rest, **verdict, "notes": told}))
@@ -53,20 +53,19 @@ def finish(
 
 def _found(
     choice: Choice, measured: Measured, policy: dict[str, Any], both: bool, json: bool
-) -> tuple[Any, float]:
-    """The calibration, and its error in poses that were not fitted, if there are enough of them."""
+) -> tuple[Any, float, bool]:
+    """The calibration, its error, and whether that is of poses that were not fitted, if there are enough of them."""
     if not both:
         found = calibrated(choice.robot, measured, policy, json)
-        return found, found.error
+        return found, found.error, policy["holdout"] is not None
     from gantrytau_optimica import CalibrationError
 
-    whole = dict(policy, holdout=None)
-    found = calibrated(choice.robot, measured, whole, json)
+    found = calibrated(choice.robot, measured, dict(policy, holdout=None), json)
     try:
         half = calibrated_quietly(choice.robot, measured, policy)
     except CalibrationError:  # too few for that
-        return found, found.error
-    return found, half.error
+        return found, found.error, False
+    return found, half.error, True
 
 
 def calibrated_quietly(robot: Model, measured: Measured, policy: dict[str, Any]) -> Any:
@@ -84,13 +83,18 @@ def _missing(numbers: list[int], program: str) -> str:
     )
 
 
-def _verdict(error: float, planned: Planned) -> dict[str, Any]:
+def _verdict(error: float, validated: bool, planned: Planned) -> dict[str, Any]:
+    """Whether the error is as small as wanted; validated: whether it is of poses that were not fitted."""
     wanted = planned.cell.wanted
     good = bool(error <= wanted)
-    words = (
-        f"{error * 1e6:.4g} um in the mean of poses that were not fitted, {wanted * 1e6:.4g} um were wanted"
-    )
+    which = "poses that were not fitted" if validated else "the fitted poses, as none were left to validate"
+    words = f"{error * 1e6:.4g} um in the mean of {which}, {wanted * 1e6:.4g} um were wanted"
     if not good:
         words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
-    found: dict[str, Any] = {"good": good, "validation_error_m": error, "wanted_m": wanted, "verdict": words}
+    found: dict[str, Any] = {
+        "good": good,
+        "validation_error_m": error if validated else None,
+        "wanted_m": wanted,
+        "verdict": words,
+    }
     return found if good else {**found, "error": words}

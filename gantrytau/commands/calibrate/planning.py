@@ -28,6 +28,16 @@ STAGES = {
 }
 
 
+_IN_THE_FILE = (
+    (r"^plan_calibration: ", ""),
+    (r"^program: found (\w+)=", r"program.\1: found "),
+    (r"give home= in m and rad", "give plan.home in m and rad"),
+    (r"\(facing=\)", "(device.facing)"),
+    (r"\(tape=\)", "(robot.tape)"),
+    (r"give Limits\(strokes=\.\.\.\)( or box=, a slice for example)?", "give limits.strokes"),
+)
+
+
 @dataclass
 class Reached:
     """How far a procedure has come."""
@@ -71,12 +81,19 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
         typer.echo(str(found))
         for name in files:
             typer.echo(f"Written: {name}")
-        typer.echo(
-            f"Measure the poses, write {folder / 'measurements.csv'} with the header {header(found)}, then: "
-            f"gantrytau calibrate {folder / 'measurements.csv'}"
-        )
+        typer.echo(_next(found, folder, file))
     if not good:
         raise typer.Exit(FAULT)
+
+
+def _next(found: Any, folder: Path, file: Path) -> str:
+    """What to do with a plan."""
+    measured = folder / "measurements.csv"
+    if found.verdict.good:
+        return f"Measure the poses, write {measured} with the header {header(found)}, then: gantrytau calibrate {measured}"
+    return (
+        f"Change {file}, and give the same command again: it goes on from what does not depend on the change"
+    )
 
 
 def _planned(cell: Cell, folder: Path, progress: Callable[[str, int, int], None]) -> Any:
@@ -139,9 +156,9 @@ def _in_the_file(message: str, file: Path) -> str:
     found = re.match(r"plan_calibration\.(\w+): ", message)
     if found:
         message = f"{places.get(found[1], found[1])}: {message[found.end() :]}"
-    message = message.removeprefix("plan_calibration: ").replace("(facing=)", "(device.facing)")
-    message = re.sub(r"^program: found (\w+)=", r"program.\1: found ", message)
-    return f"{file}: {message}".replace("; give home= in m and rad,", "; give plan.home in m and rad,")
+    for pattern, words in _IN_THE_FILE:
+        message = re.sub(pattern, words, message)
+    return f"{file}: {message}"
 
 
 @contextmanager
