@@ -156,6 +156,17 @@ def test_missing_poses_are_told_and_planned_again(folder, run, answer):
     )
 
 
+def test_measured_poses_are_not_planned_anew(folder, fails, answer, tmp_path):
+    measure(folder)
+    file, before = tmp_path / "cell.toml", (folder / "poses.csv").read_text()
+    file.write_text(with_lines(error='error = "0.3 mm"'))
+    answer("calibrate", file, "--output", folder)  # the same poses
+    file.write_text(with_lines(poses="poses = 12"))
+    message = fails(MISUSE, "calibrate", file, "--output", folder)
+    assert "measurements.csv: found measurements of an earlier plan" in message
+    assert (folder / "poses.csv").read_text() == before
+
+
 def test_without_validation_the_verdict_says_so(folder, answer):
     found = answer("calibrate", measure(folder), "--holdout", "none")
     assert found["good"] is True

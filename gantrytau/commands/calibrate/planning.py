@@ -8,16 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 
 from gantrytau.commands.calibrate import cell as cells
 from gantrytau.commands.calibrate.cell import Cell
 from gantrytau.commands.calibrate.results import rehearse
-from gantrytau.commands.reporting import FAULT, INTERRUPTED, as_json, fail, note, write_text
+from gantrytau.commands.reporting import FAULT, INTERRUPTED, CommandError, as_json, fail, note, write_text
 from gantrytau.errors import ModelError
 
 CELL = "plan.toml"  # in the folder of a plan: the cell that it was made for
 PROGRAM = "Calibration"
+MEASUREMENTS = "measurements.csv"
+SAME = 1e-6  # m and rad, by which poses of the same plan may differ
 STAGES = {
     "workspace": "workspace of the robot",
     "candidates": "safe and visible places",
@@ -65,6 +68,7 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
     try:
         with _live(reached, hidden=json) as progress:
             found = _planned(cell, folder, progress)
+            _protect(folder, found)
             found.write(folder, **cell.program)
             write_text(_copy(cell), folder / CELL)
     except KeyboardInterrupt:
@@ -86,9 +90,24 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
         raise typer.Exit(FAULT)
 
 
+def _protect(folder: Path, found: Any) -> None:
+    """CommandError if the folder holds measurements of other poses, which this plan would make worthless."""
+    from gantrytau_optimica import load_plan
+
+    measured = folder / MEASUREMENTS
+    if not measured.is_file() or not (folder / "plan.json").is_file():
+        return
+    earlier = load_plan(folder)
+    if earlier.q.shape != found.q.shape or np.abs(earlier.q - found.q).max() > SAME:
+        raise CommandError(
+            f"{measured}: found measurements of an earlier plan with other poses; nothing was written. Name another folder "
+            "with --output, or move the measurements away"
+        )
+
+
 def _next(found: Any, folder: Path, file: Path) -> str:
     """What to do with a plan."""
-    measured = folder / "measurements.csv"
+    measured = folder / MEASUREMENTS
     if found.verdict.good:
         return f"Measure the poses, write {measured} with the header {header(found)}, then: gantrytau calibrate {measured}"
     return (
