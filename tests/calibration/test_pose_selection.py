@@ -11,9 +11,11 @@ from gantrytau_optimica.calibration.arm_fit import fit_arm, scales
 from gantrytau_optimica.calibration.arm_poses import poses_of
 from gantrytau_optimica.calibration.arms import read_arms
 from gantrytau_optimica.calibration.identifiability import Poses
+from gantrytau_optimica.calibration.pose_exchange import _Choice
 from gantrytau_optimica.calibration.pose_selection import enough_poses, predict, select_poses
 from tests.calibration.f1_data import f1_arms, f1_poses
 from tests.calibration.linear_data import three_link_poses
+from tests.calibration.synthetic import grid
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +60,105 @@ def test_40_d_optimal_poses_of_the_f1_beat_40_random_ones(f1_robot, f1_candidate
     assert min(drawn) > 1.3 * chosen
     # as few as 20 say as much as 40 random ones
     assert expected(select_poses(f1_robot, f1_candidates, 20)) < np.mean(drawn)
+
+
+def expected_error(robot, candidates, method, seeds):
+    chosen = [select_poses(robot, candidates, 40, method=method, seed=seed) for seed in seeds]
+    return np.array([predict(robot, candidates, rows).error for rows in chosen])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_40_d_optimal_poses_of_three_links_beat_40_random_ones(robot, seed):
+    box = three_link_poses(400, seed=seed)
+    drawn, chosen = (
+        expected_error(robot, box, method, seeds)
+        for method, seeds in (("random", range(20)), ("d-optimal", range(2)))
+    )
+    assert drawn.mean() > 1.3 * chosen.max()
+    assert drawn.min() > 1.1 * chosen.max()
+
+
+def test_40_d_optimal_poses_of_a_grid_beat_40_random_ones(robot):
+    whole = Poses(*grid(prototypes.L1), None)  # the 779 poses of section 5.2
+    drawn, chosen = (
+        expected_error(robot, whole, method, range(10 if method == "random" else 1))
+        for method in ("random", "d-optimal")
+    )
+    assert drawn.mean() > 1.4 * chosen.max()
+
+
+def test_d_optimal_poses_are_that_but_for_what_was_given_away(robot, candidates):
+    """A design of Fedorov's exchange alone, written here anew, holds hardly more information."""
+    jacobians = [arm.closure(*candidates)[1] * scales(arm) for arm in read_arms(robot)]
+    rows = list(select_poses(robot, candidates, 40, method="random"))
+    while True:
+        best, exchange = information(jacobians, rows), None
+        variances = [
+            np.einsum("ni,ij,nj->n", J[:, 0], np.linalg.inv(J[rows, 0].T @ J[rows, 0]), J[:, 0])
+            for J in jacobians
+        ]
+        new = int(
+            np.argmax(np.where(np.isin(range(400), rows), 0.0, np.prod(1 + np.array(variances), axis=0)))
+        )
+        for old in rows:
+            trial = [*(k for k in rows if k != old), new]
+            if (found := information(jacobians, trial)) > best + 1e-6:
+                best, exchange = found, trial
+        if exchange is None:
+            break
+        rows = exchange
+    assert information(jacobians, select_poses(robot, candidates, 40)) > best - 21 * (
+        0.014 + 0.007
+    )  # slack, and luck
+
+
+def test_the_least_error_of_all_choices_is_nearly_found(robot):
+    few = three_link_poses(13, seed=5)
+    every = [predict(robot, few, rows).error for rows in itertools.combinations(range(13), 11)]
+    assert predict(robot, few, select_poses(robot, few, 11, method="tool")).error < 1.05 * min(every)
+
+
+@pytest.mark.parametrize("W", [None, np.diag([1.0, 2.0, 3.0, 0.5])])
+def test_exchanges_are_followed_by_rank_updates(W):
+    J = np.random.default_rng(0).standard_normal((30, 2, 4))
+    choice, inside = _Choice(J, W), np.arange(10)
+
+    def value(rows):
+        return _Choice(J, W).renew(np.array(rows))
+
+    before = choice.renew(inside)
+    assert choice.growth(1.0, np.array([20]))[0] == pytest.approx(value([*inside, 20]) - before, rel=1e-9)
+    assert choice.growth(-1.0, np.array([3]))[0] == pytest.approx(
+        value(inside[inside != 3]) - before, rel=1e-9
+    )
+    choice.move(20, 1.0)
+    choice.move(3, -1.0)
+    fresh = _Choice(J, W)
+    fresh.renew(np.array([*inside[inside != 3], 20]))
+    assert choice.half == pytest.approx(fresh.half, abs=1e-12)
+    assert choice.inverse == pytest.approx(fresh.inverse, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["d-optimal", "tool", "condition", "random"])
+def test_one_all_and_alike(robot, method):
+    few = three_link_poses(30)
+    for n in (1, 29, 30):
+        assert len(set(select_poses(robot, few, n, method=method))) == n
+    alike = Poses(np.tile(few.q[:1], (30, 1)), np.tile(few.r[:1], (30, 1)), None)
+    assert len(set(select_poses(robot, alike, 5, method=method))) == 5
+
+
+def test_more_of_the_same_choice_is_never_worse(robot, candidates):
+    errors = [
+        predict(robot, candidates, select_poses(robot, candidates, n)).error for n in (10, 20, 40, 80, 400)
+    ]
+    assert np.all(np.diff(errors) < 0)
+
+
+def test_a_mask_says_the_same_as_rows(robot, candidates):
+    mask = np.arange(400) % 7 == 0
+    found = [predict(robot, candidates, rows).error for rows in (mask, np.flatnonzero(mask))]
+    assert found[0] == found[1]
 
 
 def test_order_of_the_methods(robot, candidates):
@@ -136,6 +237,13 @@ def test_wrong_questions_are_told(robot, candidates):
         ModelError, match=r"method: found 'best', expected one of 'd-optimal', 'tool', 'condition'"
     ):
         select_poses(robot, candidates, 10, method="best")  # type: ignore
+    with pytest.raises(ModelError, match=r"n: found 4.5, expected 1 to 400"):
+        select_poses(robot, candidates, 4.5)  # type: ignore
+    with pytest.raises(ModelError, match=r"measurements: found no finite numbers in any of 400 rows"):
+        select_poses(robot, (np.nan * candidates.q, candidates.r), 4)
+    for name, value in (("noise", -1e-5), ("noise", 0.0), ("tape", 0.0), ("angle", np.nan)):
+        with pytest.raises(ModelError, match=f"{name}: found {value}, expected a standard deviation"):
+            predict(robot, candidates, **{name: value})  # type: ignore
     with pytest.raises(ModelError, match=r"n: found 401, expected 1 to 400, as many poses as there are"):
         select_poses(robot, candidates, 401)
     with pytest.raises(

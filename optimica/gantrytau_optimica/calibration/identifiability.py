@@ -129,10 +129,12 @@ def identifiability(
 
     measurements: a record with q, r and R, or (q, r) or (q, r, R); orientation: of turntables, "local", "unit" or "free"
     as in `arms`; gains: with the gains of turntables; noise, angle: standard deviations of the measured pose per axis, in
-    m and rad; tape: of what is known before, in m.
+    m and rad; tape: of what is known before, in m. Rows that are not finite, as of poses that a device did not see, count
+    for nothing.
     Raises ModelError for another robot, or for arrays that do not fit.
     """
-    poses = measured_poses(measurements)
+    check_deviations(noise, angle, tape)
+    poses, _ = finite_poses(measurements)
     return Identifiability(
         tuple(_of_arm(arm, poses, (noise, angle), tape) for arm in read_arms(robot, orientation, gains=gains))
     )
@@ -147,6 +149,44 @@ def measured_poses(measurements: Any) -> Poses:
     raise ModelError(
         f"measurements: found {type(measurements).__name__}, expected Measurements, or (q, r, R)"
     )
+
+
+def finite_poses(measurements: Any) -> tuple[Poses, np.ndarray]:
+    """The poses of measurements whose numbers are finite, and their rows; ModelError if there are none."""
+    found = measured_poses(measurements)
+    try:
+        q, r = (np.asarray(each, dtype=float) for each in (found.q, found.r))
+        R = None if found.R is None else np.asarray(found.R, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            "measurements: found q, r or R that hold no numbers, expected arrays of them"
+        ) from None
+    arrays = [q, r, *([] if R is None else [R])]
+    if any(each.ndim < 2 or len(each) != len(q) for each in arrays):
+        shapes = ", ".join(str(each.shape) for each in arrays)
+        raise ModelError(
+            f"measurements: found arrays of the shapes {shapes}, expected q (N, n), r (N, 3), R (N, 3, 3)"
+        )
+    rows = np.flatnonzero(
+        np.all([np.isfinite(each).reshape(len(q), -1).all(axis=1) for each in arrays], axis=0)
+    )
+    if rows.size == 0:
+        raise ModelError(
+            f"measurements: found no finite numbers in any of {len(q)} rows, expected poses; give some that were seen"
+        )
+    return Poses(q[rows], r[rows], None if R is None else R[rows]), rows
+
+
+def check_deviations(noise: float, angle: float, tape: float) -> None:
+    """ModelError for standard deviations of measurement and tape that are not above zero, or of angles below it."""
+    for name, value, least in (
+        ("noise", noise, "above 0"),
+        ("tape", tape, "above 0"),
+        ("angle", angle, "0 or more"),
+    ):
+        number = isinstance(value, int | float | np.number) and np.isfinite(value)
+        if not number or value < 0 or (value == 0 and name != "angle"):
+            raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
 
 
 def _of_arm(arm: Arm, poses: Poses, noise: tuple[float, float], tape: float) -> ArmIdentifiability:

@@ -3,7 +3,8 @@
     D-optimal: sum_i log det A_i        tool: - sum_i tr (W_i A_i^-1)        A_i = least I + sum_k J_ik' J_ik
 
 What pose k adds or takes follows by Woodbury's identity from J_k A^-1, with matrices as large as there are links. This is
-kept for all candidates and follows the exchanges, each of which costs one product with the rows of a pose. At first many poses are exchanged at once, half as many whenever that is no gain; then one by one (Fedorov, 1972).
+kept for all candidates and follows the exchanges, each of which costs one product with the rows of a pose. At first many
+poses are exchanged at once, half as many whenever that is no gain; then one by one (Fedorov, 1972).
 """
 
 from collections.abc import Sequence
@@ -107,13 +108,13 @@ def _one_by_one(choices: Sequence[_Choice], chosen: np.ndarray, lowest: float) -
     """Exchange the best one outside for the least one inside, while that is a gain and log det is not below `lowest`."""
     everything, inside = np.arange(len(choices[0].J)), np.zeros(len(choices[0].J), dtype=bool)
     inside[chosen] = True
-    least = 0.0
+    left_out, least = np.zeros_like(inside), 0.0
     # too few poses leave directions to the first term of A, and rounding grows by a million
     well_known = all(len(chosen) * each.J.shape[1] > 2 * each.J.shape[2] for each in choices)
     for k in range(EXCHANGES):
         if k % RENEWED == 0 or not well_known:
             least = GAIN * sum(each.scale(each.renew(np.flatnonzero(inside))) for each in choices)
-        gain = np.where(inside, -np.inf, sum(each.growth(1.0, everything) for each in choices))
+        gain = np.where(inside | left_out, -np.inf, sum(each.growth(1.0, everything) for each in choices))
         new = int(np.argmax(gain))
         for each in choices:
             each.move(new, 1.0)
@@ -124,7 +125,10 @@ def _one_by_one(choices: Sequence[_Choice], chosen: np.ndarray, lowest: float) -
             break
         trial = np.append(after[(after != old) & (after != new)], new)
         if np.isfinite(lowest) and _information(choices, trial) < lowest:
-            break
+            left_out[new] = True
+            for each in choices:
+                each.move(new, -1.0)
+            continue
         inside[new], inside[old] = True, False
         for each in choices:
             each.move(old, -1.0)

@@ -21,7 +21,13 @@ from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, checked_poses, scales
 from gantrytau_optimica.calibration.arm_poses import pose_rows, tool_gain
 from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
-from gantrytau_optimica.calibration.identifiability import NOTHING, Poses, deviations, measured_poses
+from gantrytau_optimica.calibration.identifiability import (
+    NOTHING,
+    Poses,
+    check_deviations,
+    deviations,
+    finite_poses,
+)
 from gantrytau_optimica.calibration.pose_exchange import exchanged
 
 Method = Literal["d-optimal", "tool", "condition", "random"]
@@ -68,9 +74,9 @@ def select_poses(
     if method not in METHODS:
         raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
     arms, poses, rows = _candidates(robot, measurements, orientation)
-    if not 0 < n <= len(rows):
+    if not (isinstance(n, int | np.integer) and 0 < n <= len(rows)):
         raise ModelError(
-            f"n: found {n}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
+            f"n: found {n!r}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
         )
     start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
     if method != "random":
@@ -95,12 +101,15 @@ def predict(
 ) -> Prediction:
     """The error of the tool to be expected after calibration by some of the candidates.
 
-    measurements: candidates, as for `select_poses`, rows: those that are measured, all if None; at: the poses to predict
-    for, candidates if None; noise, angle: standard deviations of the measured pose per axis, in m and rad; tape: of
-    nominal parameters, in m at the joints.
+    measurements: candidates, as for `select_poses`, rows: those that are measured, or a mask of them, all if None; at: the
+    poses to predict for, candidates if None; noise, angle: standard deviations of the measured pose per axis, in m and
+    rad; tape: of nominal parameters, in m at the joints.
     Raises ModelError for another robot or arrays that do not fit, SolveError at a singular pose.
     """
+    check_deviations(noise, angle, tape)
     arms, poses, finite = _candidates(robot, measurements, orientation)
+    if rows is not None and np.asarray(rows).dtype == bool:
+        rows = np.flatnonzero(rows)
     if rows is not None and not np.isin(rows, finite).all():
         raise ModelError(
             "rows: found some that the candidates do not have with finite numbers, expected rows of them"
@@ -126,6 +135,7 @@ def enough_poses(
     measurements: candidates, as for `select_poses`; error: in m, over the candidates; noise, angle, tape: as for `predict`.
     Raises ModelError where even all of the candidates are not enough.
     """
+    check_deviations(noise, angle, tape)
     arms, poses, finite = _candidates(robot, measurements, "local")
     blocks, weights = _blocks(arms, poses)
     gains = _gains(arms, poses)
@@ -167,12 +177,7 @@ def _candidates(
     robot: Model, measurements: Any, orientation: Orientation
 ) -> tuple[tuple[Arm, ...], Poses, np.ndarray]:
     """The arms, the candidates whose numbers are finite, and their rows."""
-    arms, found = read_arms(robot, orientation), measured_poses(measurements)
-    finite = np.isfinite(found.q).all(axis=-1) & np.isfinite(found.r).all(axis=-1)
-    if found.R is not None:
-        finite &= np.isfinite(found.R).all(axis=(-2, -1))
-    rows = np.flatnonzero(finite)
-    poses = _rows_of(found, rows)
+    arms, (poses, rows) = read_arms(robot, orientation), finite_poses(measurements)
     return arms, Poses(*[checked_poses(arm, *poses) for arm in arms][-1]), rows
 
 

@@ -17,7 +17,7 @@ from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.arm_fit import checked_poses
 from gantrytau_optimica.calibration.arm_poses import poses_of, rotation_vectors
 from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
-from gantrytau_optimica.calibration.identifiability import Poses, measured_poses
+from gantrytau_optimica.calibration.identifiability import Poses, finite_poses
 
 STEP = 5e-5  # m, or without unit: that of Table 5.10
 
@@ -61,10 +61,13 @@ def sensitivity(
     """What a step of each parameter either way does to poses and costs, summed over poses.
 
     measurements: a record with q, r and R, or a tuple of them; the poses proper follow from q, near r and R. orientation:
-    of turntables, as in `arms`.
-    Raises ModelError for another robot or arrays that do not fit, SolveError where links cannot be closed.
+    of turntables, as in `arms`. Rows that are not finite count for nothing.
+    Raises ModelError for another robot, arrays that do not fit or a step that is not above zero, SolveError where links
+    cannot be closed.
     """
-    arms, poses = read_arms(robot, orientation), measured_poses(measurements)
+    if not (isinstance(step, int | float | np.number) and 0 < step < np.inf):
+        raise ModelError(f"step: found {step!r}, expected a length above 0 in m")
+    arms, (poses, _) = read_arms(robot, orientation), finite_poses(measurements)
     q, r, R = [checked_poses(arm, *poses) for arm in arms][-1]
     here = Poses(q, *poses_of(arms, q, r, R))
     names, rows = [], []
