@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.linked import ThreeLinks
-from gantrytau.kinematics.poses import vectors
+from gantrytau.kinematics.poses import floats, told, vectors
 from gantrytau.kinematics.rotations import angle_between, cross
 from gantrytau.model import Model
 
@@ -87,13 +87,25 @@ class Accuracy:
 
         Where the links meet is computed for displaced carts without any approximation; the same errors in every pose.
         """
+        if not (isinstance(samples, (int, np.integer)) and samples >= 1):
+            raise ModelError(f"sampled: found samples={samples!r}, expected a whole number from 1")
         random = np.random.default_rng(seed).normal(size=(samples, 3, 3))
         errors = random / np.linalg.norm(random, axis=-1, keepdims=True) * self.semi_axes
         return self.displaced(errors)
 
     def displaced(self, errors: np.ndarray) -> np.ndarray:
         """Displacements of the tool, (N, k, 3) in m, for errors of the carts (k, 3, 3) or (N, k, 3, 3) in m."""
-        carts = self.carts[:, None] + errors
+        given = floats(errors)
+        if (
+            given.ndim not in (3, 4)
+            or given.shape[-2:] != (3, 3)
+            or given.shape[:-3] not in ((), (len(self.r),))
+        ):
+            raise ModelError(
+                f"displaced: found errors of shape {given.shape}, expected (k, 3, 3) or ({len(self.r)}, k, 3, 3), a row an "
+                "actuator, in m; reshape them"
+            )
+        carts = self.carts[:, None] + given
         start = np.broadcast_to(self.r[:, None], (*carts.shape[:2], 3))
         return _meet(carts, self.lengths, start) - self.r[:, None]
 
@@ -127,10 +139,10 @@ def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> A
         )
     places, _ = vectors(r, 3, "r", name)
     lengths = linked.geometry.length
-    axes = np.asarray(semi_axes, dtype=float)
+    axes = floats(semi_axes)
     if axes.shape != (3, 3) or not ((axes >= 0) & (axes < 0.1 * lengths.min())).all():
         raise ModelError(
-            f"{name}: found semi_axes {axes.tolist()}, expected three rows (one per actuator) of three lengths in m "
+            f"{name}: found semi_axes {told(semi_axes)}, expected three rows (one per actuator) of three lengths in m "
             "(along x, y, z of the base), of at least 0 and below a tenth of a link; convert millimetres"
         )
     carts = linked.geometry.cart_joints(kinematics.ik(places))

@@ -6,6 +6,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.kinematics.assembly_modes_links import PAIRS
+from gantrytau.kinematics.poses import floats, real, told
 from gantrytau.kinematics.study import quadrics
 from gantrytau.kinematics.study_roots import placed
 
@@ -23,9 +24,9 @@ def checked_hexapod(base: Any, platform: Any, lengths: Any, diameter: float) -> 
         raise ModelError(
             f"{_PATH}: found lengths[{k}] = {lengths[k]:g}, expected lengths above 0 m; a link joins two places"
         )
-    if not 0 <= diameter < np.inf:
+    if not 0 <= real(diameter) < np.inf:
         raise ModelError(
-            f"{_PATH}: found diameter {diameter}, expected 0 or more, in m; leave it out for thin links"
+            f"{_PATH}: found diameter {diameter!r}, expected 0 or more, in m; leave it out for thin links"
         )
     for name, joints in (("base", base), ("platform", platform)):
         if _extents(joints)[1] <= EXACT * max(_extents(joints)[0], EXACT * lengths.max()):
@@ -60,10 +61,11 @@ def specialities(base: np.ndarray, platform: np.ndarray, lengths: np.ndarray) ->
 
 def _array(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
     expected = f"{'six joints, (6, 3)' if len(shape) == 2 else 'six lengths, (6,)'} in m"
-    try:
-        found = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise ModelError(f"{_PATH}: found {name} {value!r}, expected {expected}; give numbers") from None
+    found = floats(value)
+    if found.shape == ():
+        raise ModelError(
+            f"{_PATH}: found {name} {told(value)}, expected {expected}; give numbers, not complex ones"
+        )
     if found.shape != shape:
         raise ModelError(
             f"{_PATH}: found {name} of shape {found.shape}, expected {expected}; one hexapod and one pose at a time"

@@ -19,7 +19,7 @@ from gantrytau.kinematics.configurations import Configuration, of_joints, of_pos
 from gantrytau.kinematics.geometry import geometry_of
 from gantrytau.kinematics.linked import Home, LinkedRobot, SixLinks, ThreeLinks, TurningLinks
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of
-from gantrytau.kinematics.poses import answered, poses, vectors
+from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau.model import Model
 from gantrytau.parameters import parameter_table, with_values
@@ -50,7 +50,8 @@ class Kinematics:
     ):
         self.dae = robot if isinstance(robot, Dae) else translate(robot, units=False)
         self._tool = tool
-        self._tolerance = tolerance
+        self._tolerance = _length(tolerance)
+        joints = (joints,) if isinstance(joints, str) else joints
         self._values = dict(self.dae.table.values)
         if f"{tool}.r" not in self.dae.vectors:
             raise ModelError(
@@ -180,15 +181,14 @@ class Kinematics:
         at, q, R = self._whole(robot, r, R, q, "Kinematics.ball_joint_angles")
         default = _directions(robot, robot.home.q[None], robot.home.r[None], robot.home.R[None])
         axes = [
-            d[0] if a is None else np.asarray(a, float)
-            for a, d in zip((cart_axes, plate_axes), default, strict=True)
+            d[0] if a is None else floats(a) for a, d in zip((cart_axes, plate_axes), default, strict=True)
         ]
         count = len(robot.geometry.length)
         for name, array in zip(("cart_axes", "plate_axes"), axes, strict=True):
-            if array.shape != (count, 3):
+            if array.shape != (count, 3) or not (np.abs(array).max(axis=1) > 0).all():
                 raise ModelError(
                     f"Kinematics.ball_joint_angles: found {name} of shape {array.shape}, expected ({count}, 3), a row a "
-                    "link; give one axis for each link"
+                    "link, none of them zero; give one axis for each link"
                 )
         links = _directions(robot, q, at.r, R)
         found = np.stack([angle_between(link, axis) for link, axis in zip(links, axes, strict=True)], axis=2)
@@ -236,6 +236,11 @@ class Kinematics:
             q, self.iterations_by_pose = robot.ik(at.r, at.R)
         else:
             q, _ = vectors(q, len(self.joints), "q", place)
+            if len(q) != len(at.r):
+                raise ModelError(
+                    f"{place}: found q of {len(q)} rows for {len(at.r)} poses, expected one a pose; leave q out where it "
+                    "follows from the pose"
+                )
         if at.R is not None:
             return at, q, at.R
         following = isinstance(robot, SixLinks)
@@ -270,6 +275,12 @@ class Kinematics:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
         names = tuple(scalar for name in names for scalar in self.dae.expand(name))
         return ModelFunctions(self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names))
+
+
+def _length(tolerance: float) -> float:
+    if not 0 <= real(tolerance) < np.inf:
+        raise ModelError(f"Kinematics: found tolerance={tolerance!r}, expected a length of at least 0, in m")
+    return real(tolerance)
 
 
 def driven_joints(dae: Dae) -> tuple[str, ...]:

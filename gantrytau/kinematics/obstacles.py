@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.kinematics.poses import floats, real, told
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _SECTIONS = 30  # of a segment, which leave 0.5e-6 of it
@@ -39,9 +40,9 @@ class Box:
             raise ModelError(
                 f"Box: found low {low.tolist()} and high {high.tolist()}, expected low < high; {_REMEDY}"
             )
-        R = np.asarray(self.R, dtype=float)
+        R = floats(self.R)
         if R.shape != (3, 3) or not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=1e-6):
-            raise ModelError(f"Box.R: found {R.tolist()}, expected a rotation matrix (3, 3)")
+            raise ModelError(f"Box.R: found {told(self.R)}, expected a rotation matrix (3, 3)")
         for name, value in (("low", low), ("high", high), ("R", R)):
             object.__setattr__(self, name, value)
 
@@ -102,14 +103,14 @@ class Capsule:
 def _hold_segment(body: Any, kind: str) -> None:
     for name in ("start", "end"):
         object.__setattr__(body, name, _vector(f"{kind}.{name}", getattr(body, name)))
-    if not (np.isfinite(body.radius) and body.radius > 0):
+    if not 0 < real(body.radius) < np.inf:
         raise ModelError(f"{kind}.radius: found {body.radius!r}, expected a length above 0 m; {_REMEDY}")
 
 
 def _vector(place: str, value: Any) -> np.ndarray:
-    vector = np.asarray(value, dtype=float)
+    vector = floats(value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ModelError(f"{place}: found {value!r}, expected three finite numbers; {_REMEDY}")
+        raise ModelError(f"{place}: found {told(value)}, expected three finite numbers; {_REMEDY}")
     return vector
 
 

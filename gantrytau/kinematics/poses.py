@@ -66,13 +66,30 @@ def answered(one: bool, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
     return tuple(array[0] if one else array for array in arrays)
 
 
-def _numbers(value: object, name: str, place: str) -> np.ndarray:
+def real(value: object) -> float:
+    """A number as a float; NaN for what is none."""
+    found = floats(value)
+    return float(found) if found.shape == () else np.nan
+
+
+def floats(value: object) -> np.ndarray:
+    """Numbers as an array of floats; one NaN for what are none, so that no shape but () fits."""
     try:
         array = np.asarray(value)
-        if not np.iscomplexobj(array):
-            return np.asarray(array, dtype=float)
+        return np.array(np.nan) if np.iscomplexobj(array) else np.asarray(array, dtype=float)
     except (TypeError, ValueError):
-        pass
-    raise ModelError(
-        f"{place}: found {name} = {value!r}, expected an array of numbers, not complex; give one row a pose"
-    )
+        return np.array(np.nan)
+
+
+def told(value: object) -> str:
+    """A value in one line of a message."""
+    return str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
+
+
+def _numbers(value: object, name: str, place: str) -> np.ndarray:
+    array = floats(value)
+    if array.shape == () and np.isnan(array):
+        raise ModelError(
+            f"{place}: found {name} = {told(value)}, expected an array of numbers, not complex; give one row a pose"
+        )
+    return array

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
+from gantrytau.kinematics.poses import floats, real, told
 from gantrytau.kinematics.workspace_limits import REASONS, Examined, Examiner, Limits
 from gantrytau.model import Model
 
@@ -45,7 +46,14 @@ class Workspace:
         shares = ", ".join(
             f"{n / self.reason.size:.0%} {word}" for word, n in zip(REASONS, counts, strict=True) if n
         )
-        size = f"{self.volume:.4g} m3" if (self._extent > 0).all() else f"{self.area:.4g} m2"
+        dimensions = self._dimensions
+        size = (
+            f"{self.volume:.4g} m3"
+            if dimensions == 3
+            else f"{self.area:.4g} m2"
+            if dimensions == 2
+            else "no area"
+        )
         count = int(self.parts.max(initial=0))
         parts = f" in {count} separate parts" if count > 1 else ""
         return f"Workspace of {self.name}: {size}{parts}; of {self.reason.size} places {shares}"
@@ -88,6 +96,10 @@ class Workspace:
         return self.box[:, 1] - self.box[:, 0]
 
     @property
+    def _dimensions(self) -> int:
+        return int((self._extent > 0).sum())
+
+    @property
     def volume(self) -> float:
         """Of the cells inside, in m3; zero for a slice, whose size is `area`."""
         return float(self.fraction.mean() * self._extent.prod())
@@ -95,7 +107,7 @@ class Workspace:
     @property
     def area(self) -> float:
         """Of a slice, in m2; ModelError for a workspace that is no slice."""
-        if (self._extent == 0).sum() != 1:
+        if self._dimensions != 2:
             raise ModelError(
                 f"{self.name}: found a workspace with the extent {self._extent.tolist()} m, expected a slice for its area; "
                 "ask for volume, or for cross_section(axis, at)"
@@ -109,7 +121,7 @@ class Workspace:
         Each such cell is wrong like a number spread evenly over it. Borders run along the grid, so that the cells of one
         row are taken as wrong alike, those of different rows as independent; the worst of the three directions counts.
         """
-        dimensions = int((self._extent > 0).sum())
+        dimensions = self._dimensions
         size = self._extent[self._extent > 0].prod() / self.fraction.size
         cut = border(self.inside)
         rows = max(np.sqrt((cut.sum(axis=k).astype(float) ** 2).sum()) for k in range(3))
@@ -127,7 +139,7 @@ class Workspace:
     def _layer(self, number: int, at: float) -> int:
         """The layer of cells that contains a coordinate."""
         low, high = self.box[number]
-        if not low <= at <= high:
+        if not low <= real(at) <= high:
             raise ModelError(
                 f"{self.name}: found {'xyz'[number]} = {at!r} m, expected {low:.6g} to {high:.6g}, the box of the workspace"
             )
@@ -150,6 +162,11 @@ class Workspace:
         """
         from gantrytau.kinematics.workspace_figures import draw_layer
 
+        if self._dimensions < 2:
+            raise ModelError(
+                f"{self.name}: found a workspace with the extent {self._extent.tolist()} m, expected a slice or a solid to "
+                "draw; give a wider box"
+            )
         flat = np.flatnonzero(self._extent == 0)
         number = _axis(self.name, axis or "xyz"[flat[0] if len(flat) else 0])
         shares = np.moveaxis(self.fraction, number, 0).reshape(self.shape[number], -1).mean(axis=1)
@@ -182,23 +199,22 @@ def workspace(
     """
     limits = limits or Limits()
     examiner = Examiner(robot, limits)
-    bounds = _bounds(examiner) if box is None else np.asarray(box, dtype=float)
+    bounds = _bounds(examiner) if box is None else floats(box)
     if bounds.shape != (3, 2) or not (np.isfinite(bounds).all() and (bounds[:, 0] <= bounds[:, 1]).all()):
         raise ModelError(
-            f"{examiner.name}: found the box {bounds.tolist()}, expected three finite pairs (least, largest) of x, y and z "
-            "in m; give box=, or strokes of all carts in Limits"
+            f"{examiner.name}: found the box {told(bounds if box is None else box)}, expected three finite "
+            "pairs (least, largest) of x, y and z in m; give box=, or strokes of all carts in Limits"
         )
     axes = _cells(examiner.name, bounds, spacing)
-    if not (isinstance(refine, int) and refine >= 1):
+    if not (isinstance(refine, (int, np.integer)) and refine >= 1):
         raise ModelError(f"{examiner.name}: found refine={refine!r}, expected a whole number from 1")
-    orientation = None if R is None else np.asarray(R, dtype=float)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    examined = examiner(grid.reshape(-1, 3), orientation)
+    examined = examiner(grid.reshape(-1, 3), R)
     inside = examined.inside.reshape(grid.shape[:3])
     fraction = inside.astype(float)
     if refine > 1:
         cut = border(inside)
-        fraction[cut] = _shares(examiner, grid[cut], bounds, inside.shape, orientation, refine)
+        fraction[cut] = _shares(examiner, grid[cut], bounds, inside.shape, R, refine)
     x, y, z = axes
     return Workspace(
         name=examiner.name,
@@ -210,7 +226,7 @@ def workspace(
         fraction=fraction,
         limits=limits,
         rails=np.stack([examiner.geometry.offset, examiner.geometry.direction], axis=1),
-        refine=refine,
+        refine=int(refine),
     )
 
 
@@ -230,7 +246,7 @@ def _shares(
     middles: np.ndarray,
     box: np.ndarray,
     shape: Sequence[int],
-    R: np.ndarray | None,
+    R: ArrayLike | None,
     refine: int,
 ) -> np.ndarray:
     """How much of each cell is inside, (k,), by places spread evenly over it."""
@@ -244,7 +260,7 @@ def _shares(
 
 def _cells(name: str, box: np.ndarray, spacing: float) -> list[np.ndarray]:
     """Middles of cells of equal size along each axis."""
-    if not (np.isfinite(spacing) and spacing > 0):
+    if not 0 < real(spacing) < np.inf:
         raise ModelError(f"{name}: found spacing={spacing!r}, expected a length above 0 m")
     extents = box[:, 1] - box[:, 0]
     counts = np.maximum(np.ceil(extents / spacing - 1e-9), 1.0)

@@ -12,7 +12,7 @@ from gantrytau.kinematics.geometry import Geometry
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.linked import SixLinks
 from gantrytau.kinematics.obstacles import Capsule, between_segments, segment_distance
-from gantrytau.kinematics.poses import poses
+from gantrytau.kinematics.poses import floats, poses, real, told
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau.model import Model
 
@@ -50,11 +50,11 @@ class Limits:
 
     def __post_init__(self):
         for name in ("link_radius", "stroke_margin", "turn_margin", "angle_margin", "clearance"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+            if not 0 <= real(getattr(self, name)) < np.inf:
                 raise ModelError(
                     f"Limits.{name}: found {getattr(self, name)!r}, expected a number of at least 0"
                 )
-        if not self.ball_joint > 0 or (math.isfinite(self.ball_joint) and self.ball_joint > math.pi):
+        if not (0 < real(self.ball_joint) <= math.pi or self.ball_joint == math.inf):
             raise ModelError(
                 f"Limits.ball_joint: found {self.ball_joint!r}, expected an angle above 0 and up to pi in rad; convert "
                 "degrees with math.radians"
@@ -64,7 +64,7 @@ class Limits:
             bodies = tuple(bodies) if isinstance(bodies, (list, tuple)) else (bodies,)
             object.__setattr__(self, name, bodies)
         for body in self.obstacles:
-            if not hasattr(body, "distance"):
+            if isinstance(body, type) or not hasattr(body, "distance"):
                 raise ModelError(f"Limits.obstacles: found {body!r}, expected Box, Cylinder or Capsule")
         for body in self.plate:
             if not isinstance(body, Capsule):
@@ -114,6 +114,10 @@ class Examiner:
     def __init__(self, robot: Model | Kinematics, limits: Limits):
         self.kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
         self.name = self.kinematics.dae.name
+        if not isinstance(limits, Limits):
+            raise ModelError(
+                f"{self.name}: found limits {limits!r}, expected Limits, such as Limits(strokes=(0.0, 2.0)); name them there"
+            )
         self.limits = limits
         self.linked = self.kinematics.linked("workspace")
         self.geometry: Geometry = self.linked.geometry
@@ -124,7 +128,7 @@ class Examiner:
 
     def __call__(self, r: ArrayLike, R: ArrayLike | None = None) -> Examined:
         """See `examine`."""
-        at = poses(np.atleast_2d(np.asarray(r, dtype=float)), R, self.name)
+        at = poses(r, R, self.name)
         parts = [slice(k, k + _BLOCK) for k in range(0, len(at.r), _BLOCK)] or [slice(0)]
         blocks = [self._of_block(at.r[part], None if at.R is None else at.R[part]) for part in parts]
         return Examined(
@@ -184,17 +188,19 @@ class Examiner:
     def _joint_axes(self) -> list[np.ndarray]:
         """Axes of the ball joints on carts and on the plate, (m, 3) each: as given, or along the links at home."""
         home = self.linked.home
-        r = home.r if self.limits.home is None else np.asarray(self.limits.home, dtype=float)
-        q, R = self._joints_and_orientation(poses(r, None, f"{self.name}: Limits.home").r[:1], None)
-        usual = [directions[0] for directions in self._directions(q, r[None], R)]
+        r = home.r if self.limits.home is None else self.limits.home
+        at = poses(r, None, f"{self.name}: Limits.home").r[:1]
+        q, R = self._joints_and_orientation(at, None)
+        usual = [directions[0] for directions in self._directions(q, at, R)]
         found = []
         for name, along in zip(("cart_axes", "plate_axes"), usual, strict=True):
             given = getattr(self.limits, name)
-            axes = along if given is None else np.asarray(given, dtype=float)
+            axes = along if given is None else floats(given)
             if axes.shape not in ((3,), along.shape) or not (np.linalg.norm(axes, axis=-1) > 0).all():
                 raise ModelError(
-                    f"{self.name}: found {name} {axes.tolist()}, expected one direction (3,) or one per link {along.shape}; "
-                    "where they follow from Limits(home=...), take a place in reach"
+                    f"{self.name}: found {name} {told(axes if given is None else given)}, expected one "
+                    f"direction (3,) or one per link {along.shape}; where they follow from "
+                    "Limits(home=...), take a place in reach"
                 )
             found.append(np.broadcast_to(axes, along.shape))
         return found
@@ -234,14 +240,14 @@ def _strokes(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
     if strokes is None:
         return kinematics.limits
     actuators = len(kinematics.joints)
-    found = np.asarray(strokes, dtype=float)
+    found = floats(strokes)
     if found.shape == (2,):
         found = np.tile(found, (carts, 1))
     if found.shape == (carts, 2):
         found = np.vstack([found, kinematics.limits[carts:]])
     if found.shape != (actuators, 2) or not (found[:, 0] < found[:, 1]).all():
         raise ModelError(
-            f"{kinematics.dae.name}: found strokes {strokes!r}, expected ({actuators}, 2) of (least, largest) coordinates "
-            "in m and rad, or one such pair for all carts"
+            f"{kinematics.dae.name}: found strokes {told(strokes)}, expected ({actuators}, 2) of (least, largest) "
+            "coordinates in m and rad, or one such pair for all carts"
         )
     return found

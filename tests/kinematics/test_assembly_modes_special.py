@@ -152,6 +152,7 @@ BASE, PLATFORM, LENGTHS = random_hexapod(7)
             r"found lengths of shape \(1, 6\), expected six lengths, \(6,\) in m",
         ),
         ((BASE, PLATFORM, ["a"] * 6), r"found lengths \['a'.*expected six lengths.*give numbers"),
+        ((BASE + 1j, PLATFORM, LENGTHS), "found base .*give numbers, not complex ones"),
         (
             (BASE * [1, 1, np.nan], PLATFORM, LENGTHS),
             r"found base\[0\] = .*nan.*expected finite numbers in m; leave no",
@@ -161,14 +162,14 @@ BASE, PLATFORM, LENGTHS = random_hexapod(7)
             r"found lengths\[3\] = -.*expected lengths above 0 m",
         ),
     ],
-    ids=["five", "transposed", "many", "text", "gap", "negative"],
+    ids=["five", "transposed", "many", "text", "complex", "gap", "negative"],
 )
 def test_what_is_no_hexapod_is_refused(arguments, message):
-    with pytest.raises(ModelError, match=f"assembly_modes: {message}"):
+    with pytest.raises(ModelError, match=f"(?s)assembly_modes: {message}"):
         assembly_modes(*arguments)
 
 
-@pytest.mark.parametrize("diameter", [-0.01, np.nan, np.inf])
+@pytest.mark.parametrize("diameter", [-0.01, np.nan, np.inf, "thin"])
 def test_a_diameter_is_not_negative(diameter):
     with pytest.raises(ModelError, match=r"found diameter .*, expected 0 or more, in m; leave it out"):
         assembly_modes(BASE, PLATFORM, LENGTHS, diameter=diameter)

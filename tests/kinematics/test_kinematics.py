@@ -1,6 +1,7 @@
 """Kinematics of three and six links beside the equations of the models."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, SixLinkWithWrist, prototypes
 
+WORD: Any = "small"  # where a number is asked for
 ROUNDING = 1e-12  # m, some thousand roundings of coordinates of a few metres
 AXES = np.eye(3)
 
@@ -283,6 +285,10 @@ def test_a_translated_model_is_as_good():
         (lambda k: k.configurations(), "found neither of q and r"),
         (lambda k: k.configurations(q=np.zeros(3), r=np.zeros(3)), "found both of q and r"),
         (lambda k: k.ball_joint_angles(np.zeros(3), cart_axes=np.eye(2)), r"cart_axes of shape \(2, 2\)"),
+        (lambda k: k.ball_joint_angles(np.zeros(3), cart_axes=np.zeros((3, 3))), "none of them zero"),
+        (lambda k: k.ball_joint_angles(np.zeros(3), plate_axes="x"), r"plate_axes of shape \(\)"),
+        (lambda k: k.state(np.zeros((2, 3)), q=np.zeros((3, 3))), "q of 3 rows for 2 poses, expected one"),
+        (lambda k: Kinematics(k.dae, tolerance=WORD), "found tolerance='small', expected a length"),
         (lambda k: k.replaced({"arms[0].lenght": 2.0}), "did you mean 'arms"),
         (lambda k: k.fk_of_five_degrees(np.zeros(6)), "expected a robot with turntables"),
     ],

@@ -1,11 +1,14 @@
 """Distances from obstacles, against dense samples and other closed forms."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from gantrytau import ModelError
 from gantrytau.kinematics.obstacles import Box, Capsule, Cylinder, between_segments, segment_distance
 
+WORD: Any = "thick"  # where a number is asked for
 TURN = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
 TURN = TURN * np.sign(np.linalg.det(TURN))
 BODIES = [
@@ -66,6 +69,9 @@ def test_parallel_and_vanishing_segments():
         (lambda: Box([0, 0, 0], [1, 1, 1], 2 * np.eye(3)), "Box.R: found .* expected a rotation"),
         (lambda: Cylinder([0, 0, 0], [0, 0, 0], 1.0), "Cylinder: found start and end"),
         (lambda: Cylinder([0, 0, 0], [0, 0, 1], 0.0), "Cylinder.radius: found 0.0"),
+        (lambda: Box("low", [1, 1, 1]), "Box.low: found 'low', expected three"),
+        (lambda: Box([0, 0, 0], [1, 1, 1], "turned"), "Box.R: found 'turned', expected a rotation"),
+        (lambda: Capsule([0, 0, 0], [0, 0, 1], WORD), "Capsule.radius: found 'thick', expected a length"),
         (lambda: Capsule([0, 0, np.nan], [0, 0, 1], 0.1), "Capsule.start: found"),
     ],
 )

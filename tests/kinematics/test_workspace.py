@@ -1,6 +1,7 @@
 """Workspaces: against volumes in closed form, against other ways to compute a limit, and against finer grids."""
 
 import math
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -20,6 +21,10 @@ SIX = Kinematics(SixLinkGantryTau(prototypes.L1))
 F1 = Kinematics(F1GantryTau(prototypes.F1))
 STROKE, LENGTH = 0.8, 1.0
 FREE = [-np.inf, np.inf]
+# what is of another type than asked for
+WORD: Any = "far"
+NO_LIMITS: Any = dict(strokes=(0, 1))
+SHARE: Any = 1.5
 
 
 def one_link() -> Kinematics:
@@ -250,6 +255,11 @@ def test_parts_behind_an_obstacle_are_told():
     assert "in 2 separate parts" in str(found)
 
 
+def test_a_line_of_places_prints_itself():
+    line = workspace(L1, Limits(strokes=(0.0, 2.5)), box=[[1.2, 1.2], [3.0, 3.0], [-2.0, 1.0]])
+    assert "no area; of 60 places" in str(line)
+
+
 def test_figures(tmp_path):
     limits = Limits(strokes=(0.0, 1.2), ball_joint=0.6, obstacles=[_block()], link_radius=0.02)
     found = workspace(L1, limits, spacing=0.15)
@@ -300,6 +310,20 @@ def test_figures(tmp_path):
         ),
         (lambda: workspace(L1, Limits(strokes=[[0, 0.1], [50, 51], [0, 0.1]])), "cannot meet in any place"),
         (lambda: examine(L1, [[0, 0]]), "found r of shape"),
+        (lambda: workspace(L1, NO_LIMITS, box=BOX), "found limits {.*expected Limits"),
+        (lambda: workspace(L1, box=WORD), "found the box 'far', expected three"),
+        (lambda: workspace(L1, box=BOX, spacing=WORD), "found spacing='far', expected a length"),
+        (lambda: workspace(L1, box=BOX, refine=SHARE), "found refine=1.5, expected a whole number"),
+        (lambda: workspace(L1, box=BOX, R=WORD), "found R = 'far'"),
+        (lambda: workspace(L1, Limits(strokes="long"), box=BOX), r"found strokes 'long', expected \(3, 2\)"),
+        (lambda: workspace(L1, Limits(ball_joint=0.5, home="here"), box=BOX), "home: found r = 'here'"),
+        (lambda: workspace(L1, Limits(ball_joint=0.5, cart_axes="x"), box=BOX), "found cart_axes 'x'"),
+        (lambda: workspace(L1, box=[[1, 1], [3, 3], [-2, 1]]).plot(), "expected a slice or a solid to draw"),
+        (lambda: workspace(L1, box=_slice(1.2), spacing=0.5).cross_section("x", WORD), "found x = 'far' m"),
+        (lambda: examine(L1, WORD), "found r = 'far', expected an array of numbers"),
+        (lambda: Limits(ball_joint=WORD), "Limits.ball_joint: found 'far', expected an angle"),
+        (lambda: Limits(clearance=WORD), "Limits.clearance: found 'far', expected a number"),
+        (lambda: Limits(obstacles=[Box]), "Limits.obstacles: found <class"),
         (lambda: Limits(ball_joint=40), "Limits.ball_joint: found 40.*math.radians"),
         (lambda: Limits(clearance=-1), "Limits.clearance: found -1"),
         (lambda: Limits(obstacles=("wall",)), "Limits.obstacles: found 'wall'"),
