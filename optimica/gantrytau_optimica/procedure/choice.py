@@ -6,7 +6,7 @@ import numpy as np
 
 from gantrytau_optimica.calibration.arm_fit import scales
 from gantrytau_optimica.calibration.devices import Device
-from gantrytau_optimica.calibration.identifiability import NOTHING, Poses
+from gantrytau_optimica.calibration.identifiability import Poses
 from gantrytau_optimica.calibration.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
@@ -25,7 +25,7 @@ class Choice:
 
     position: expected standard deviations of the tool over the workspace, (k,) in m; angle: the same in rad; noise,
     noise_angle: of the device per axis at these poses, m and rad; condition, observability: of the identification
-    Jacobian, scaled so that all unknowns move joints by metres, without the directions that no pose determines.
+    Jacobian, scaled so that all unknowns move joints by metres, without the directions that the tape measure knows better.
     """
 
     rows: np.ndarray
@@ -62,7 +62,8 @@ def judge(fleet: Fleet, candidates: Candidates, device: Device, rows: np.ndarray
     """What some rows of the candidates promise."""
     noise = device_noise(device, candidates.r[rows], candidates.R[rows])
     expected = expected_error(fleet, candidates, rows, noise=noise, tape=tape)
-    condition, index = observability(fleet, poses_of(fleet, candidates, rows))
+    held = max(noise[0], 1e-9) / tape
+    condition, index = observability(fleet, poses_of(fleet, candidates, rows), held)
     return Choice(rows, expected.position, expected.angle, *noise, condition, index)
 
 
@@ -90,12 +91,15 @@ def device_noise(device: Device, r: np.ndarray, R: np.ndarray) -> tuple[float, f
     return float(np.sqrt(np.nanmean(np.nanvar(readings, axis=0, ddof=1)))), 0.0
 
 
-def observability(fleet: Fleet, data: Poses) -> tuple[float, float]:
-    """Condition number and Nahvi and Hollerbach's index of the identification Jacobian of all arms."""
+def observability(fleet: Fleet, data: Poses, held: float) -> tuple[float, float]:
+    """Condition number and Nahvi and Hollerbach's index of the identification Jacobian of all arms.
+
+    held: noise by tape error, the least singular value of what is known better from poses than from the tape measure.
+    """
     values = []
     for arm in fleet.arms:
         J = arm.closure(*data)[1] * scales(arm)
         s = np.linalg.svd(J.reshape(-1, arm.count), compute_uv=False)
-        values.append(s[s > NOTHING * s[0]])
+        values.append(s[s > held])
     s = np.concatenate(values)
     return float(s.max() / s.min()), float(s.min() ** 2 / s.max())

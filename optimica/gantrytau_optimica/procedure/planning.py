@@ -172,6 +172,7 @@ class _Procedure:
     def _trials(self, candidates: Candidates, order: Order, key: str) -> tuple[Trials, str]:
         q, seed = order.q[order.measured], self.asked["seed"]
         count, found = self.asked["robots"], []
+        key = digest(key, q)
 
         def trial(number: int, readings: int) -> Trial:
             return simulated(self.fleet, candidates, self.device, q, number, seed=seed, readings=readings)

@@ -12,7 +12,7 @@ SETTLED = 0.02  # of the volume, and of that part of it which the device sees
 FINER = 1.5  # times more cells along each axis in each round
 LOOK = 1.0  # m, spacing of a grid of which only the box around it is wanted
 COARSE = 10  # cells along the longest side at first
-MOST = {"three links": 300_000, "six links": 60_000, "turntables": 40_000}  # places, some seconds of work
+MOST = {"three links": 300_000, "six links": 200_000, "turntables": 120_000}  # places, some seconds of work
 
 
 @dataclass(frozen=True, eq=False)
