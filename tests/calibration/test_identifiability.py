@@ -1,14 +1,19 @@
 """Ranks and redundant parameters: Table 5.4, invariances of rigid bodies, and data that hold too little."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, StructureError
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.arm_fit import fit_arm
+from gantrytau_optimica.calibration.arms import read_arms
 from gantrytau_optimica.calibration.identifiability import Poses, identifiability
 from tests.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
+from tests.calibration.linear_data import carts
 
 # Table 5.4, Dressler (2012); 1u2 is turntables[0].orientation, 1u3 and 2u3 those of [1] and [2], r3 turntables[2].offset
 TABLE_5_4 = {
@@ -124,6 +129,47 @@ def test_a_line_of_poses_holds_less_than_a_volume():
     robot = GantryTau(prototypes.L1)
     assert [arm.deficiency for arm in identifiability(robot, (poses.q, poses.r)).arms] == [0, 0, 0]
     assert min(arm.deficiency for arm in identifiability(robot, (poses.q * 0 + r[:, :1], r)).arms) > 0
+
+
+@pytest.mark.parametrize(
+    ("where", "rank"),
+    [
+        ([[0.8, 0, 0], [0, 0.4, 0], [0, 0, 0.3]], 7),
+        ([[0.8, 0, 0], [0, 0.4, 0]], 6),  # in a plane along the guideways: the joint may be mirrored in it
+        ([[0.8, 0, 0]], 2),  # links do not turn: a constant and q
+        ([[0, 0.4, 0], [0, 0, 0.3]], 7),  # across them: carts still move
+        ([[0, 0, 0]], 1),
+    ],
+)
+def test_rank_of_three_links_in_a_box_a_plane_a_line_and_a_point(where, rank):
+    """With guideways along x exactly; of the columns L, d and q d with d = r - A - q v, by another decomposition."""
+    arms = [replace(arm, direction=(1.0, 0.0, 0.0)) for arm in prototypes.L1.arms]
+    robot = GantryTau(replace(prototypes.L1, arms=arms))
+    drawn = np.random.default_rng(1).uniform(-1, 1, (60, len(where)))
+    r = np.array([0.5, 2.8, -0.8]) + drawn @ np.array(where)
+    q = carts(read_arms(robot), r, np.tile(np.eye(3), (60, 1, 1)))
+    for i, arm in enumerate(identifiability(robot, (q, r)).arms):
+        d = r - np.array(arms[i].offset) - np.outer(q[:, i], arms[i].direction)
+        columns = np.column_stack([np.ones(60), d, q[:, i, None] * d])
+        pivots = np.abs(np.diag(qr(columns, mode="r", pivoting=True)[0]))
+        assert arm.rank == np.count_nonzero(pivots > 1e-10 * pivots[0]) == rank
+
+
+def test_rows_that_were_not_seen_count_for_nothing(robot, poses):
+    lost = np.arange(185) % 4 == 0
+    q, r, R = poses
+    seen = identifiability(robot, (q[~lost], r[~lost], R[~lost]))
+    whole = identifiability(robot, (q, np.where(lost[:, None], np.nan, r), R))
+    for a, b in zip(seen.arms, whole.arms, strict=True):
+        np.testing.assert_array_equal(a.singular_values, b.singular_values)
+    with pytest.raises(ModelError, match="measurements: found no finite numbers in any of 185 rows"):
+        identifiability(robot, (q, np.nan * r, R))
+    with pytest.raises(ModelError, match=r"measurements: found arrays of the shapes \(185, 6\), \(3,\)"):
+        identifiability(robot, (q, r[0], R))
+    with pytest.raises(ModelError, match="measurements: found q, r or R that hold no numbers"):
+        identifiability(robot, (q, "r", R))
+    with pytest.raises(ModelError, match=r"tape: found 0\.0, expected a standard deviation above 0"):
+        identifiability(robot, poses, tape=0.0)
 
 
 def test_few_poses_leave_what_they_cannot_count():
