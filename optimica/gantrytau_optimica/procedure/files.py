@@ -118,7 +118,7 @@ def _plain(value: Any) -> Any:
 def load_plan(
     folder: str | Path, robot: Model | None = None, limits: Limits | None = None
 ) -> CalibrationPlan:
-    """The plan that `CalibrationPlan.write` or `plan_calibration(folder=...)` left in a folder, or its plan.json itself.
+    """The plan that `CalibrationPlan.write` left in a folder, or its plan.json itself.
 
     robot, limits: as they were planned for; with both `remaining` seeks a new order, without them it keeps the old one.
     Raises ModelError for a folder without a plan, a file that is none, and a robot of another kind.
@@ -130,7 +130,7 @@ def load_plan(
     except OSError as error:
         raise ModelError(
             f"load_plan: found no plan at '{path}' ({error.strerror}), expected plan.json as "
-            "plan_calibration(folder=...) writes it; name its folder, or plan first"
+            "CalibrationPlan.write leaves it; name its folder, or plan first"
         ) from None
     except ValueError as error:
         raise ModelError(

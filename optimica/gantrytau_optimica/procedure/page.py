@@ -18,7 +18,7 @@ STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
 table { border-collapse: collapse; font-size: .9rem; margin: .5rem 0 1.5rem; }
 th, td { text-align: right; padding: .15rem .8rem .15rem 0; border-bottom: 1px solid #8886; }
-th:first-child, td:first-child { text-align: left; }
+th:first-child, td:first-child { text-align: left; white-space: nowrap; }
 .verdict { border-left: .5rem solid #3a3; padding: .2rem 1rem; background: #3a32; }
 .bad { border-color: #c33; background: #c332; }
 .passed { opacity: .6; } img { max-width: 100%; background: white; }
