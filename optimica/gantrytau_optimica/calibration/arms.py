@@ -11,7 +11,7 @@ An arm without turntables is one of (4.14), or of (4.13) where the plate cannot 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -254,10 +254,17 @@ def exponential(turn: np.ndarray) -> np.ndarray:
     return np.concatenate([[np.cos(half)], np.sinc(half / np.pi) / 2 * turn])
 
 
-def read_arms(robot: Model, orientation: Orientation = "local", *, gains: bool = False) -> tuple[Arm, ...]:
+def read_arms(
+    robot: Model,
+    orientation: Orientation = "local",
+    *,
+    gains: bool = False,
+    values: Mapping[str, Any] | None = None,
+) -> tuple[Arm, ...]:
     """The arms of a model of a Gantry-Tau robot at its own parameters.
 
     robot: an instance with `arms[i].direction` and one link or `arms[i].links[j]` each, and `turntables` as the F1;
+    values: its parameters by name, where they were read before;
     gains: with `turntables[k].gain`, the true angle for one of q, 1 where it is nominal, among the unknowns.
     Unknown are lengths, joints on the plate, offset and direction of guideways, offsets of turntables upon turntables,
     orientations, and joints on the arm; 10, 24 and 38 of an F1 with quaternions. What follows by convention is not:
@@ -268,7 +275,7 @@ def read_arms(robot: Model, orientation: Orientation = "local", *, gains: bool =
         raise ModelError(
             f"orientation: found {orientation!r}, expected one of {', '.join(map(repr, ORIENTATIONS))}"
         )
-    table = _Values(robot)
+    table = _Values(robot, values)
     count = table.how_many("arms[{}].direction")
     turning = table.how_many("turntables[{}].axis")
     if count == 0 or turning not in (0, 3) or (turning and count != 3):
@@ -286,8 +293,10 @@ class _Values:
     Plain numbers are read as they are declared, five times as quick as flattening the whole model.
     """
 
-    def __init__(self, robot: Model):
-        self.name, self.values = type(robot).__name__, {}
+    def __init__(self, robot: Model, values: Mapping[str, Any] | None = None):
+        self.name, self.values = type(robot).__name__, dict(values or {})
+        if self.values:
+            return
         try:
             for placed in instantiate(robot).quantities:
                 if _READ.fullmatch(placed.name):

@@ -1,7 +1,6 @@
 """`calibrate`: the parameters of a robot from measured poses."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -72,7 +71,7 @@ def calibrate(
     found = Calibration(
         geometry, measurements, model, fits, fitted, held_out, method, loss, nominal=known_misses
     )
-    return replace(found, findings=(*findings, *judged(found)))
+    return found.with_findings([*findings, *judged(found)])
 
 
 def _needs_values(prior: Mapping[str, Any] | None) -> bool:

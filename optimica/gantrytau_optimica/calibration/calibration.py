@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class Calibration:
             f"<Calibration of {self.geometry.name}, model {self.model}: {len(self.names)} numbers from {len(self.rows)} "
             f"poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
         )
+
+    def with_findings(self, findings: Sequence[Finding]) -> Self:
+        """The same with other findings, without working anything out anew."""
+        found = replace(self, findings=tuple(findings))
+        found.__dict__.update({name: value for name, value in self.__dict__.items() if name != "findings"})
+        return found
 
     @cached_property
     def parameters(self) -> Mapping[str, Any]:

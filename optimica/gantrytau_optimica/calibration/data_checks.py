@@ -61,7 +61,8 @@ def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Findin
 def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     """Rows in which one of q and r is that of the row before to the last bit, while the other moved on."""
     for name, still, other, moving in (("r", r, "q", q), ("q", q, "r", r)):
-        places = np.flatnonzero((still[1:] == still[:-1]).all(axis=1)) + 1
+        places = np.flatnonzero(still[1:, 0] == still[:-1, 0]) + 1
+        places = places[(still[places] == still[places - 1]).all(axis=1)]
         places = places[(np.abs(moving[places] - moving[places - 1]) > MOVED).any(axis=1)]
         if places.size:
             bad = rows[places]

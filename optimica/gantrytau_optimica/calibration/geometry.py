@@ -1,7 +1,7 @@
 """The nominal geometry of a robot, read by the names of its parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -32,12 +32,16 @@ class ArmGeometry:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Arms of a robot. kind: "three" (one link on each, the plate keeps its orientation), "six" or "turning"."""
+    """Arms of a robot. kind: "three" (one link on each, the plate keeps its orientation), "six" or "turning".
+
+    values: parameters of arms and turntables by name.
+    """
 
     robot: Model
     kind: Literal["three", "six", "turning"]
     arms: tuple[ArmGeometry, ...]
     turntables: int = 0
+    values: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:
@@ -64,7 +68,7 @@ def read_geometry(robot: Any) -> Geometry:
         )
     turntables = _count(values, "turntables[{}].axis")
     arms = tuple(_three_link_arm(values, i) if three else _arm(values, i) for i in range(count))
-    return Geometry(robot, "three" if three else "turning" if turntables else "six", arms, turntables)
+    return Geometry(robot, "three" if three else "turning" if turntables else "six", arms, turntables, values)
 
 
 def _three_link_arm(values: dict[str, Any], i: int) -> ArmGeometry:

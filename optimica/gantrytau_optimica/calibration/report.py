@@ -1,12 +1,14 @@
 """The report of a calibration: one HTML page, complete in itself, and the same numbers as JSON."""
 
 import json
+import os
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau_optimica.calibration.residual_tests import residual_tests
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ def report_numbers(found: "Calibration") -> dict[str, Any]:
         "poses_held_out": len(found.held_out),
         "error_m": _spread(errors[good]),
         "angle_error_rad": _spread(found.angle_errors[np.isfinite(found.angle_errors)]),
-        "noise_m": found.noise,
+        "noise_m": found.noise if np.isfinite(found.noise) else None,
         "parameters": {n: np.asarray(v).tolist() for n, v in found.parameters.items()},
         "deviations": {n: d if np.isfinite(d) else None for n, d in found.deviations.items()},
         "undetermined": list(found.undetermined),
@@ -84,12 +86,36 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
 
 
 def write_report(found: "Calibration", path: Path) -> Path:
-    """Both files; the path of the page, which ends in .html."""
-    page = path if path.suffix in (".html", ".htm") else path.with_suffix(".html")
+    """Both files, whole or not at all; the path of the page, which ends in .html."""
+    page = (
+        path
+        if path.suffix in (".html", ".htm")
+        else path.with_name(path.name.removesuffix(".json") + ".html")
+    )
     numbers = report_numbers(found)
-    page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(html_report(numbers), encoding="utf-8")
-    page.with_suffix(".json").write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding="utf-8")
+    texts = {
+        page: html_report(numbers),
+        page.with_suffix(".json"): json.dumps(numbers, indent=1, allow_nan=False),
+    }
+    fresh = {target: target.with_name(f".{target.name}.{os.getpid()}") for target in texts}
+    try:
+        for target in texts:
+            if target.is_dir():
+                raise IsADirectoryError(f"{target} is a directory")
+        page.parent.mkdir(parents=True, exist_ok=True)
+        for target, text in texts.items():
+            fresh[target].write_text(text, encoding="utf-8")
+        for target in texts:
+            fresh[target].replace(target)
+    except OSError as error:
+        raise ModelError(
+            f"report: found that {page} cannot be written ({error}), expected a file name in a folder that can be written "
+            "to; what was there is as before"
+        ) from None
+    finally:
+        for temporary in fresh.values():
+            if temporary.exists():
+                temporary.unlink()
     return page
 
 
@@ -124,10 +150,12 @@ def html_report(numbers: dict[str, Any]) -> str:
 def _summary(numbers: dict[str, Any]) -> str:
     model = "of the robot" if numbers["model"] is None else numbers["model"]
     verdict = "converged" if numbers["success"] else "did not converge"
+    noise = "nothing" if numbers["noise_m"] is None else f"{numbers['noise_m'] * 1e6:.4g} um"
+    poses = f"{numbers['poses_fitted']} poses fitted, {numbers['poses_held_out']} held out"
+    name = f"Model {escape(str(model))}, loss {escape(numbers['loss'])}"
     return (
-        f"<p>Model {escape(str(model))}, {numbers['poses_fitted']} poses fitted, {numbers['poses_held_out']} held out; "
-        f"{escape(numbers['method'])} {verdict} after {numbers['iterations']} steps. What is left is explained by "
-        f"{numbers['noise_m'] * 1e6:.4g} um in each measured coordinate.</p>"
+        f"<p>{name}, {poses}; {escape(numbers['method'])} {verdict} after "
+        f"{numbers['iterations']} steps. What is left is explained by {noise} in each measured coordinate.</p>"
     )
 
 
@@ -158,6 +186,8 @@ def _errors(numbers: dict[str, Any]) -> str:
 def histogram(bars: dict[str, Any], width: int = 640, height: int = 180) -> str:
     """A histogram of errors as SVG."""
     counts, edges = bars["counts"], np.array(bars["edges_m"]) * 1e6
+    if not any(counts):
+        return "<p>There is no error to show.</p>"
     tallest, step = max([*counts, 1]), width / max(1, len(counts))
     shapes = "".join(
         f'<rect x="{k * step:.1f}" y="{height - height * c / tallest:.1f}" width="{step - 1:.1f}" '
@@ -201,6 +231,8 @@ def _correlations(covariance: dict[str, Any]) -> str:
         return "<p>none</p>"
     d = np.sqrt(np.maximum(np.diag(C), 1e-300))
     rows = [
-        [name, *(f"{100 * x:.0f}" for x in row)] for name, row in zip(names, C / np.outer(d, d), strict=True)
+        [f"{k} {name}", *(f"{100 * x:.0f}" for x in row)]
+        for k, (name, row) in enumerate(zip(names, C / np.outer(d, d), strict=True))
     ]
-    return f'<p>In per cent.</p><div class="matrix">{_table(["", *map(str, range(len(names)))], rows)}</div>'
+    words = "In per cent; the covariance itself, in m2, stands in the JSON file beside this page."
+    return f'<p>{words}</p><div class="matrix">{_table(["", *map(str, range(len(names)))], rows)}</div>'

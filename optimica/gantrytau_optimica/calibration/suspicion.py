@@ -65,12 +65,14 @@ def suspicion(found: "Calibration") -> Suspicion:
     mask = np.zeros(len(found.measurements), dtype=bool)
     mask[found.rows] = mask[found.held_out] = True
     used = np.flatnonzero(mask)
-    fits, bad, typical = list(found.fits), used[:0], np.inf
-    if (coarse := far_rows(found, used)).size:
+    fits, bad = list(found.fits), used[:0]
+    sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    # among many poses a mistake in a few is seen without nominal values
+    if (len(used) < MANY or (sizes > OUTLIER).any()) and (coarse := far_rows(found, used)).size:
         fits = [fit_group(fit.group, 1.0 - np.isin(found.rows, coarse)) for fit in fits]
-    for _ in range(CLEANINGS):
         sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
-        freedom = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
+    freedom = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
+    for _ in range(CLEANINGS):
         fresh = used[sizes > limit(freedom)]
         if np.array_equal(fresh, bad):
             break
@@ -79,6 +81,7 @@ def suspicion(found: "Calibration") -> Suspicion:
         if weights.sum() < KEPT * len(weights):
             break
         fits = [fit_group(fit.group.started(fit.x), weights) for fit in fits]
+        sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
     links = rod_links(fits, found.measurements.rails)
 
     def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:

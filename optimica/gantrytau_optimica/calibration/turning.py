@@ -1,7 +1,7 @@
 """Calibration of robots with turntables, as the F1, arm by arm. Dressler (2012), section 5.4."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -290,7 +290,7 @@ def calibrate_turning(
             f"calibrate: found start='linear' for {geometry.name}, expected 'nominal'; closure is linear in the "
             "parameters of linear guideways only"
         )
-    arms = read_arms(geometry.robot, orientation)
+    arms = read_arms(geometry.robot, orientation, values=geometry.values)
     fitted, held_out = split
     findings = list(measurements.findings)
     check_count(max(arm.count for arm in arms) // 3, fitted, findings)
@@ -326,7 +326,7 @@ def calibrate_turning(
         used,
         arms,
     )
-    return replace(found, findings=(*findings, *more, *judged(found)))
+    return found.with_findings([*findings, *more, *judged(found)])
 
 
 def _in_frame(
