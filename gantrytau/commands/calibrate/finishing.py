@@ -77,9 +77,11 @@ def calibrated_quietly(robot: Model, measured: Measured, policy: dict[str, Any])
 
 def _missing(numbers: list[int], program: str) -> str:
     shown = ", ".join(map(str, numbers[:12])) + (", ..." if len(numbers) > 12 else "")
+    one = "A planned pose is not measured, number"
+    which = one if len(numbers) == 1 else f"{len(numbers)} planned poses are not measured, numbers"
     return (
-        f"{len(numbers)} planned poses are not measured, numbers {shown} of poses.csv; the program of these is {program}: "
-        "measure them, add their lines, and give the same command again"
+        f"{which} {shown} of poses.csv; the program of what is missing is {program}: measure, add the lines, and give the "
+        "same command again"
     )
 
 

@@ -46,7 +46,7 @@ class Planned:
     def placed(self, measured: Measured) -> tuple[Measured, str]:
         """Measurements in the frame of the plan, and words about it if they were in another.
 
-        Positions in the world, and those that fit the plan in no frame, stay as they are. CommandError where actuators are
+        Positions in the world, and those that fit the plan in no frame, stay as they are. ModelError where actuators are
         not those of planned poses.
         """
         data, rows = measured.data, self._rows(measured)
@@ -58,15 +58,26 @@ class Planned:
             return measured, ""
         placed = self.plan.placed(data)
         if not _apart(placed.r[known], expected) < near:
+            self._check_axes(measured, known, expected, near)
             return measured, ""
         words = "positions are in another frame than the plan; they were laid over the poses that it expects"
         return replace(measured, data=placed), words
+
+    def _check_axes(self, measured: Measured, known: np.ndarray, expected: np.ndarray, near: float) -> None:
+        """ModelError if positions fit the plan once they are mirrored, which no frame does."""
+        data = measured.data
+        mirrored = type(data)(data.q, data.r[:, [1, 0, 2]])
+        if _apart(self.plan.placed(mirrored).r[known], expected) < near:
+            raise ModelError(
+                f"{measured.file}: found positions that mirror the poses of the plan beside it; two of the columns x, y, z "
+                "are swapped, or one has the wrong sign; correct the columns. Nothing was written"
+            )
 
     def _rows(self, measured: Measured) -> np.ndarray:
         """The planned pose of each row, -1 for none."""
         q, planned = measured.data.q, self.plan.q[self.plan.measured]
         if q.shape[1] != planned.shape[1]:
-            raise CommandError(
+            raise ModelError(
                 f"{measured.file}: found {q.shape[1]} actuators, expected {planned.shape[1]} as the plan beside it, in the "
                 f"order {', '.join(self.plan.joints)}; check the columns q1, q2, ..."
             )
@@ -78,9 +89,9 @@ class Planned:
             (words for words, other in _mistakes(q) if np.mean(nearest(other, planned) >= 0) > 0.5), ""
         )
         remedy = words or "q1, q2, ... must be those of poses.csv"
-        raise CommandError(
+        raise ModelError(
             f"{measured.file}: found no actuator positions of the plan beside it; {remedy}; for measurements of other poses "
-            f"name the robot, --robot '{self.cell.name}'"
+            f"name the robot, --robot '{self.cell.name}'. Nothing was written"
         )
 
     def missing(self, measured: Measured) -> list[int]:
