@@ -85,7 +85,7 @@ def calibrate(
         typer.Option(
             metavar="second|none",
             help="Which poses validate: every second, or those of the fit.",
-            show_default="second; of a plan all are fitted after that",
+            show_default="second; of a plan each fifth in turn",
         ),
     ] = None,
     output: Output = None,
