@@ -193,7 +193,5 @@ def test_what_does_not_fit_an_f1(data):
         calibrate(nominal(), measured, start="linear")
     with pytest.raises(ModelError, match="no turntables"):
         calibrate(nominal(), measured, model="parallel")
-    with pytest.raises(ModelError, match="neither"):
-        calibrate(nominal(), measured, method="ipopt", loss="robust")
     with pytest.raises(ModelError, match="3 actuators"):
         calibrate(nominal(), Measurements(measured.q[:, :3], measured.r, measured.R))

@@ -68,7 +68,7 @@ def fit_arm(
     if loss not in ("linear", "robust"):
         raise ModelError(f"loss: found {loss!r}, expected 'linear' or 'robust'")
     q, r, R = checked_poses(arm, q, r, R)
-    scale, pulls = scales(arm), _pulls(arm, prior, noise)
+    scale, pulls = scales(arm), prior_pulls(arm, prior, noise)
     moved, success, taken = np.zeros(arm.count), False, 0
     weights = np.ones((len(q), len(arm.links)))
     factor = triangle(arm, q, r, R, scale, weights)
@@ -78,7 +78,7 @@ def fit_arm(
         moved, taken = moved + step, taken + 1
         success = bool(np.linalg.norm(step / scale) < TOLERANCE)
         if loss == "robust":
-            weights = _huber(arm.closure(q, r, R)[0], noise)
+            weights = huber(arm.closure(q, r, R)[0], noise)
             factor = triangle(arm, q, r, R, scale, weights)
     return fitted(arm, (q, r, R), (taken, success), (factor, scale, pulls), noise / tape)
 
@@ -183,7 +183,7 @@ def _shortened(
         halvings += 1
 
 
-def _pulls(arm: Arm, prior: Mapping[str, float] | None, noise: float) -> np.ndarray:
+def prior_pulls(arm: Arm, prior: Mapping[str, float] | None, noise: float) -> np.ndarray:
     """Weights of the nominal values against a closure error, (p,); ModelError for names that the arm does not have."""
     pulls, names = np.zeros(arm.count), arm.names
     for name, deviation in (prior or {}).items():
@@ -197,7 +197,7 @@ def _pulls(arm: Arm, prior: Mapping[str, float] | None, noise: float) -> np.ndar
     return pulls
 
 
-def _huber(residuals: np.ndarray, noise: float) -> np.ndarray:
+def huber(residuals: np.ndarray, noise: float) -> np.ndarray:
     """Weights by Huber, of errors against their median deviation, (N, m)."""
     sizes = np.abs(residuals)
     deviation = np.maximum(1.4826 * np.median(sizes, axis=0), noise)  # of a normal distribution

@@ -19,10 +19,12 @@ from gantrytau_optimica.calibration.arm_fit import (
     ArmFit,
     checked_poses,
     fitted,
+    prior_pulls,
     scales,
     triangle,
 )
 from gantrytau_optimica.calibration.arms import Arm
+from gantrytau_optimica.calibration.constraints import read_constraints
 
 
 def fit_arm_with_ipopt(
@@ -35,13 +37,17 @@ def fit_arm_with_ipopt(
     tape: float = TAPE,
     fixed: Iterable[str] = (),
     limits: Mapping[str, tuple[float, float]] | None = None,
+    prior: Mapping[str, float] | None = None,
+    weights: np.ndarray | None = None,
+    constraints: Mapping[str, Any] | None = None,
     tolerance: float = 1e-8,
 ) -> ArmFit:
     """Fit the unknowns of an arm to measured poses by Ipopt.
 
     q, r, R, noise, tape: as for `fit_arm`; tape: infinite for the plain sum of squares; fixed: names of unknowns that
     keep their values; limits: least and largest values by name, m or 1, of rotations about the nominal ones;
-    tolerance: of Ipopt, on a sum of squares in units of the noise.
+    prior: as for `fit_arm`; weights: of the squares, (N, m), as a robust loss found them, or None; constraints: equations
+    and limits as in `constraints.py`; tolerance: of Ipopt, on a sum of squares in units of the noise.
     Raises ModelError for unknown names and arrays that do not fit.
     """
     q, r, R = checked_poses(arm, q, r, R)
@@ -53,17 +59,26 @@ def fit_arm_with_ipopt(
         (np.tile(np.eye(3), (len(q), 1, 1)) if R is None else R).transpose(0, 2, 1).reshape(-1, 9).T,
     ]
     everything = residual.map(len(q))(ca.repmat(p, 1, len(q)), *map(ca.DM, data))
-    equations = [ca.sumsqr(p[place]) for place in _quaternions(arm)]
-    problem = {"x": p, "f": (ca.sumsqr(everything) + ca.sumsqr((p - x0) / scale * noise / tape)) / noise**2}
-    problem |= {"g": ca.vertcat(*equations)} if equations else {}
+    if weights is not None:
+        everything *= ca.DM(np.sqrt(weights).T)
+    pulls = prior_pulls(arm, prior, noise)
+    units = [ca.sumsqr(p[place]) for place in _quaternions(arm)]
+    wanted = read_constraints(constraints or {}, arm.names)
+    near = ca.sumsqr((p - x0) / scale * noise / tape) + ca.sumsqr(ca.DM(pulls) * (p - x0))
+    problem = {"x": p, "f": (ca.sumsqr(everything) + near) / noise**2}
+    kept = [*units, *(each.expression(p) for each in wanted)]
+    problem |= {"g": ca.vertcat(*kept)} if kept else {}
+    least, most = (
+        np.concatenate([np.ones(len(units)), *(getattr(c, side) for c in wanted)]) for side in ("low", "high")
+    )
     options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": tolerance}
     options |= {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
     solver = ca.nlpsol("fit", "ipopt", problem, options)
     low, high = _limits(arm, fixed, limits or {})
-    found: Any = solver(x0=x0, lbx=low, ubx=high, lbg=1.0, ubg=1.0)
+    found: Any = solver(x0=x0, lbx=low, ubx=high, lbg=least, ubg=most)
     stats = solver.stats()
     arm = arm.moved(np.array(found["x"]).ravel() - x0)
-    system = (triangle(arm, q, r, R, scale), scale, np.zeros(arm.count))
+    system = (triangle(arm, q, r, R, scale, weights), scale, pulls)
     return fitted(arm, (q, r, R), (int(stats["iter_count"]), bool(stats["success"])), system, noise / tape)
 
 

@@ -1,17 +1,21 @@
 """The same least squares by CasADi and Ipopt: another route to the minimum, with exact second derivatives."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from gantrytau import SolveError
 from gantrytau_optimica.calibration.closure import Chain
-from gantrytau_optimica.calibration.fitting import Fit
+from gantrytau_optimica.calibration.constraints import read_constraints
+from gantrytau_optimica.calibration.fitting import TAPE, Fit, not_held
 from gantrytau_optimica.calibration.gauss_newton import Minimum
-from gantrytau_optimica.calibration.groups import problem
+from gantrytau_optimica.calibration.groups import Group, problem
 
 TOLERANCE = 1e-8  # of the gradient of the scaled cost
+AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
 SCALE = 1e4  # of the cost in m4, so that this gradient leaves less than 1e-10 m
 # where rounding ends the descent before the gradient is that small
 AT_ROUNDING = ("Search_Direction_Becomes_Too_Small", "Solved_To_Acceptable_Level")
@@ -56,6 +60,99 @@ def solve(fit: Fit) -> Fit:
     numbers = group.x.copy()
     numbers[free] = np.array(found["x"]).ravel()
     return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
+
+
+def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
+    """All fits as one, by Ipopt, whose numbers keep constraints; from the minimum without them.
+
+    Directions that data do not hold are drawn to where they are by a tape measure. Raises ModelError for constraints on
+    what is not identified, SolveError where none or no minimum is found.
+    """
+    whole = _merged(fits)
+    group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
+    constraints = read_constraints(given, whole.free_names)
+    noise = not_held(whole) * TAPE
+    unknown = ca.MX.sym("x", len(free))
+    x = ca.MX(ca.DM(group.x))
+    x[free.tolist()] = unknown
+    lost = ca.DM(minimum.directions[minimum.rank :])
+    cost = (noise / TAPE) ** 2 * ca.sumsqr(lost @ (unknown - ca.DM(minimum.x[free])))
+    for chain, places in zip(group.chains, group.places, strict=True):
+        e = _errors(chain, x[places.tolist()])
+        cost += ca.sumsqr(e if whole.weights is None else ca.DM(whole.weights) * e)
+    for i, (value, deviation) in group.prior.items():
+        cost += (noise / deviation * (x[i] - value)) ** 2
+    kept = ca.vertcat(*[each.expression(unknown) for each in constraints])
+    low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
+    options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
+    solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": SCALE * cost, "g": kept}, options)
+    found: Any = solver(x0=minimum.x[free], lbg=low, ubg=high)
+    stats = solver.stats()
+    if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
+        raise SolveError(
+            f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a "
+            "minimum that keeps the constraints; look whether they contradict each other"
+        )
+    numbers = group.x.copy()
+    numbers[free] = np.array(found["x"]).ravel()
+    value = np.array(found["g"]).ravel()
+    active = np.minimum(value - low, high - value) < AT_LIMIT
+    slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(numbers[free]))
+    return [_constrained(whole, numbers, slopes[active], int(stats["iter_count"]))]
+
+
+def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> Fit:
+    """The fit at x, which moves only across the slopes of the constraints it keeps."""
+    weights = None if fit.weights is None else [fit.weights] * len(fit.group.chains)
+    found = problem(fit.group, weights, not_held(fit) * TAPE)
+    J = found.slopes(x)[:, fit.group.free]
+    _, sizes, rows = np.linalg.svd(kept, full_matrices=True)
+    across = rows[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
+    _, singular, inside = np.linalg.svd(J @ across.T, full_matrices=False)
+    rank = int((singular > not_held(fit)).sum())
+    minimum = Minimum(x, found.errors(x), J, singular, inside @ across, rank, iterations, True)
+    return replace(fit, minimum=minimum)
+
+
+def _merged(fits: Sequence[Fit]) -> Fit:
+    """Several fits as one, whose numbers stand one after another."""
+    starts = np.cumsum([0, *(len(fit.x) for fit in fits)])
+    group = Group(
+        tuple(chain for fit in fits for chain in fit.group.chains),
+        tuple(
+            places + start
+            for fit, start in zip(fits, starts[:-1], strict=True)
+            for places in fit.group.places
+        ),
+        tuple(name for fit in fits for name in fit.group.names),
+        np.concatenate([fit.group.x for fit in fits]),
+        np.concatenate([fit.group.free for fit in fits]),
+        {
+            i + int(start): v
+            for fit, start in zip(fits, starts[:-1], strict=True)
+            for i, v in fit.group.prior.items()
+        },
+    )
+    held, lost = [], []
+    ends = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
+    for fit, first in zip(fits, ends[:-1], strict=True):
+        wide = np.zeros((len(fit.minimum.directions), int(ends[-1])))
+        wide[:, first : first + int(fit.group.free.sum())] = fit.minimum.directions
+        held.append(wide[: fit.minimum.rank])
+        lost.append(wide[fit.minimum.rank :])
+    rank = sum(fit.minimum.rank for fit in fits)
+    singular = np.concatenate([fit.minimum.singular[: fit.minimum.rank] for fit in fits])
+    minimum = Minimum(
+        np.concatenate([fit.x for fit in fits]),
+        np.concatenate([fit.minimum.errors for fit in fits]),
+        np.zeros((0, int(ends[-1]))),
+        np.concatenate([singular, np.zeros(sum(map(len, lost)))]),
+        np.vstack([*held, *lost]),
+        rank,
+        max(fit.minimum.iterations for fit in fits),
+        all(fit.minimum.success for fit in fits),
+    )
+    return Fit(group, minimum, max(fit.smallest for fit in fits), fits[0].weights)
 
 
 def _errors(chain: Chain, p: ca.MX) -> ca.MX:

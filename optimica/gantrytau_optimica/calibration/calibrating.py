@@ -26,6 +26,7 @@ def calibrate(
     prior: Mapping[str, Any] | None = None,
     loss: Literal["linear", "robust"] = "linear",
     holdout: Any = "second",
+    constraints: Mapping[str, Any] | None = None,
 ) -> Calibration:
     """Identify the kinematic parameters of a robot from measured poses by the closure of its links.
 
@@ -36,9 +37,15 @@ def calibrate(
     rotations each. prior: deviations about nominal values by name, in m, such as {"plate_offset": 0.001}, or pairs
     (value, deviation). loss: "robust" leaves gross errors without weight. holdout:
     "second" validates with every second usable pose, None with the poses of the fit, else rows or a mask.
+    constraints: equations and limits that numbers keep, by Ipopt, such as {"|arms[0].direction|": 1.0,
+    "arms[0].length": (2.0, 2.1), "arms[1].links[0].length": "arms[1].links[1].length"} (see `constraints.py`).
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
     _check_words(method=method, start=start, orientation=orientation, loss=loss)
+    if constraints and method != "ipopt":
+        raise ModelError(
+            "calibrate: found constraints with method='gauss-newton', which keeps none; take method='ipopt'"
+        )
     geometry = read_geometry(robot)
     _check_columns(geometry, measurements)
     check_model(model, geometry, measurements)
@@ -50,6 +57,7 @@ def calibrate(
         from gantrytau_optimica.calibration.turning import calibrate_turning
 
         policy: Any = dict(method=method, start=start, orientation=orientation, prior=prior, loss=loss)
+        policy["constraints"] = constraints
         return calibrate_turning(geometry, measurements, rows, (fitted, held_out), **policy)
     data = measurements.select(fitted)
     links = nominal_links(geometry, data, six_links(model, geometry))
@@ -65,9 +73,9 @@ def calibrate(
     known_misses = misses_of(nominal) if start == "nominal" else None
     fits = fit_model(model, links, data, known, prior, loss, values)
     if method == "ipopt":
-        from gantrytau_optimica.calibration.by_ipopt import solve
+        from gantrytau_optimica.calibration.by_ipopt import solve, solve_constrained
 
-        fits = [solve(fit) for fit in fits]
+        fits = solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
     found = Calibration(
         geometry, measurements, model, fits, fitted, held_out, method, loss, nominal=known_misses
     )

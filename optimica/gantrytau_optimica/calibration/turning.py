@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.arm_covariance import arms_covariance, held_directions
-from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, ArmFit, fit_arm, scales
+from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE, ArmFit, scales
 from gantrytau_optimica.calibration.arm_frames import frame_of, moved_arms
+from gantrytau_optimica.calibration.arm_policy import Policy, check_constraints, fit_arms, full_prior
 from gantrytau_optimica.calibration.arm_poses import poses_of
 from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
 from gantrytau_optimica.calibration.calibration import Calibration
@@ -204,7 +204,7 @@ class TurningCalibration(Calibration):
         if (coarse := far_rows(self, every)).size:
             used = np.setdiff1d(used, coarse)
             clean = self.measurements.select(used)
-            arms = tuple(_fit(arm, clean, self.prior, "gauss-newton", "linear").arm for arm in self.start)
+            arms = tuple(fit.arm for fit in fit_arms(self.start, clean, Policy(prior=self.prior)))
         for _ in range(CLEANINGS):
             sizes, typical = relative_size(arms, data, np.isin(every, used), self.prior)
             fresh = every[sizes > _limit(arms, used)]
@@ -215,7 +215,7 @@ class TurningCalibration(Calibration):
                 break
             if not np.array_equal(good, used):
                 used, clean = good, self.measurements.select(good)
-                arms = tuple(_fit(arm, clean, self.prior, "gauss-newton", "linear").arm for arm in arms)
+                arms = tuple(fit.arm for fit in fit_arms(arms, clean, Policy(prior=self.prior)))
         return Suspicion(bad, misses_of_arms(arms), typical)
 
     def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
@@ -283,6 +283,7 @@ def calibrate_turning(
     orientation: Any,
     prior: Mapping[str, Any] | None,
     loss: str,
+    constraints: Mapping[str, Any] | None,
 ) -> TurningCalibration:
     """`calibrate` for a robot with turntables; rows: usable ones; split: those to be fitted, and those held out."""
     if start == "linear":
@@ -298,9 +299,11 @@ def calibrate_turning(
 
     check_robot(geometry, misses_of_arms(arms), data.q, data.r, data.R, rows)
     arms, more = _in_frame(geometry, arms, data, rows)
-    own = _prior(arms, prior)
+    own = full_prior(arms, prior)
+    policy = Policy(method, own, loss, constraints)
+    check_constraints(arms, constraints)
     used = _plausible(arms, data, fitted) if loss == "robust" else fitted
-    fits = _fits(arms, measurements.select(used), own, method, loss)
+    fits = fit_arms(arms, measurements.select(used), policy)
     if loss == "robust":  # what Huber's weights leave of gross errors still pulls at what data hardly hold
         for _ in range(CLEANINGS):
             now = tuple(fit.arm for fit in fits)
@@ -308,7 +311,7 @@ def calibrate_turning(
             good = fitted[sizes < _limit(now, used)]
             if np.array_equal(good, used) or len(good) < KEPT_AT_ALL * len(fitted):
                 break
-            used, fits = good, _fits(arms, measurements.select(good), own, method, loss)
+            used, fits = good, fit_arms(arms, measurements.select(good), policy)
     found = TurningCalibration(
         geometry,
         measurements,
@@ -355,44 +358,3 @@ def _plausible(arms: Sequence[Arm], data: Measurements, fitted: np.ndarray) -> n
     """The rows that nominal values miss no worse than some times the median: where a robust fit begins."""
     missed = misses_of_arms(arms)(data.q, data.r, data.R)
     return fitted[missed < max(OUTLIER * float(np.median(missed)), OUTLIER * NOISE)]
-
-
-def _fits(
-    arms: Sequence[Arm], data: Measurements, prior: Mapping[str, float], method: str, loss: str
-) -> tuple[ArmFit, ...]:
-    return tuple(_fit(arm, data, prior, method, loss) for arm in arms)
-
-
-def _prior(arms: Sequence[Arm], prior: Mapping[str, Any] | None) -> dict[str, float]:
-    """Deviations by full names; a key may be the last part of names of all arms. ModelError for unknown names."""
-    elements = [name for arm in arms for name in arm.names]
-    vectors = list(dict.fromkeys(n.rpartition("[")[0] if n.endswith("]") else n for n in elements))
-    found: dict[str, float] = {}
-    for key, deviation in (prior or {}).items():
-        matches = [n for n in (*vectors, *elements) if n == key or n.rpartition(".")[2] == key]
-        if not matches:
-            raise ModelError(
-                f"calibrate: prior for '{key}', which is not identified{did_you_mean(key, vectors)}"
-            )
-        if not isinstance(deviation, (int, float)) or not deviation > 0:
-            raise ModelError(
-                f"calibrate: found the deviation {deviation!r} for '{key}' in prior, expected one number above 0, about the "
-                "nominal value"
-            )
-        found |= dict.fromkeys(matches, float(deviation))
-    return found
-
-
-def _fit(arm: Arm, data: Measurements, prior: Mapping[str, float], method: str, loss: str) -> ArmFit:
-    if method == "ipopt":
-        if prior or loss != "linear":
-            raise ModelError(
-                "calibrate: found method='ipopt' with a prior or a robust loss for a robot with turntables, expected "
-                "neither; take method='gauss-newton'"
-            )
-        from gantrytau_optimica.calibration.arm_ipopt import fit_arm_with_ipopt
-
-        return fit_arm_with_ipopt(arm, data.q, data.r, data.R)
-    names = {*arm.names, *(n.rpartition("[")[0] for n in arm.names)}
-    own = {name: deviation for name, deviation in prior.items() if name in names}
-    return fit_arm(arm, data.q, data.r, data.R, prior=own, loss=loss)

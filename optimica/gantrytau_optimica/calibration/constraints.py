@@ -1,0 +1,82 @@
+"""Equations and limits that identified numbers are to keep, as `calibrate(..., constraints=...)` says them.
+
+"arms[0].length": 2.05                                     held at a value, vectors too
+"arms[0].length": (2.0, 2.1)                               between limits
+"arms[1].links[0].length": "arms[1].links[1].length"       equal, vectors too
+"|arms[0].direction|": 1.0  or  (0.99, 1.01)               of the Euclidean length of a vector
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.errors import did_you_mean
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """low <= sum of squares, or value less other value, of numbers <= high. places: of the numbers; others: of those that
+    are taken from them, or none; squared: whether of squares.
+    """
+
+    places: tuple[int, ...]
+    others: tuple[int, ...]
+    low: np.ndarray
+    high: np.ndarray
+    squared: bool = False
+
+    def expression(self, x: Any) -> ca.MX:
+        """What is limited, of the numbers x."""
+        here = ca.vertcat(*[x[k] for k in self.places])
+        if self.squared:
+            return ca.sumsqr(here)
+        return here - ca.vertcat(*[x[k] for k in self.others]) if self.others else here
+
+
+def read_constraints(given: Any, names: Sequence[str]) -> list[Constraint]:
+    """The constraints on numbers of these names. ModelError for names that are not identified and what is no constraint."""
+    if not isinstance(given, Mapping):
+        raise ModelError(
+            f"calibrate: found constraints={given!r}, expected a dict as {{'|arms[0].direction|': 1.0}}, by names"
+        )
+    return [_read(key, value, names) for key, value in given.items()]
+
+
+def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
+    squared = key.startswith("|") and key.endswith("|")
+    places = _places(key.strip("|") if squared else key, names)
+    if isinstance(value, str):
+        others = _places(value, names)
+        if squared or len(others) != len(places):
+            raise ModelError(
+                f"calibrate: constraint '{key}': '{value}', expected two names of numbers or of vectors"
+            )
+        return Constraint(places, others, np.zeros(len(places)), np.zeros(len(places)))
+    try:
+        low, high = value if isinstance(value, tuple) else (value, value)
+        shape = () if squared else (len(places),)
+        low, high = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (low, high))
+    except (TypeError, ValueError):
+        low = high = np.array(np.nan)
+    if not np.all(low <= high) or (squared and not np.all(low >= 0)):
+        raise ModelError(
+            f"calibrate: constraint '{key}': found {value!r}, expected a value, a pair of limits (least, most), or the name "
+            "of what it equals"
+        )
+    if squared:
+        low, high = np.array([low**2]), np.array([high**2])
+    return Constraint(places, (), np.array(low), np.array(high), squared)
+
+
+def _places(name: str, names: Sequence[str]) -> tuple[int, ...]:
+    found = tuple(k for k, n in enumerate(names) if n == name or n.rpartition("[")[0] == name)
+    if not found:
+        known = sorted({*names, *(n.rpartition("[")[0] for n in names if n.endswith("]"))})
+        raise ModelError(
+            f"calibrate: constraint on '{name}', which is not identified{did_you_mean(name, known)}"
+        )
+    return found
