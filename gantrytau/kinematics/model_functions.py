@@ -12,11 +12,12 @@ import numpy as np
 
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError
+from gantrytau.interruption import on_interrupt
 from gantrytau.kinematics.linked import Home
 from gantrytau.kinematics.newton import limited, solved
 from gantrytau.kinematics.rotations import of_quaternion, quaternions, rotations, skewed
 
-BLOCK = 16  # poses of one call: far more cost than the call, few enough that Ctrl-C is soon heard where none is in reach
+BLOCK = 8  # poses of one call: they take longer than the call, and Ctrl-C is heard in a second where none is in reach
 MOST = 30  # iterations from `near`
 CLOSE = 1e-11  # of a joint, in m or rad, relative to its size: what the iteration of the inverse leaves
 
@@ -167,6 +168,19 @@ def _in_blocks(function: ca.Function, arguments: list[np.ndarray]) -> list[np.nd
     count = len(arguments[0])
     whole = count - count % BLOCK
     found = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
+    asked: list[bool] = []
+    with on_interrupt(
+        lambda: asked.append(True)
+    ):  # inside CasADi it would be a RuntimeError, or a failed iteration
+        _fill(function, arguments, found, whole, asked)
+    return found
+
+
+def _fill(
+    function: ca.Function, arguments: list[np.ndarray], found: list[np.ndarray], whole: int, asked: list[bool]
+) -> None:
+    """Results into `found`: the first rows in blocks, then the rest; until an end is asked for."""
+    count = len(arguments[0])
     for size, firsts in ((BLOCK, range(0, whole, BLOCK)), (count - whole, range(whole, count, BLOCK))):
         if not firsts:
             continue
@@ -182,6 +196,7 @@ def _in_blocks(function: ca.Function, arguments: list[np.ndarray]) -> list[np.nd
             for memory, argument in zip(inside, arguments, strict=True):
                 memory[:] = argument[first : first + size]
             run()
+            if asked:
+                raise KeyboardInterrupt
             for memory, result in zip(outside, found, strict=True):
                 result[first : first + size] = memory
-    return found

@@ -1,5 +1,8 @@
 """Kinematics of models that are no Gantry-Tau, through their own equations."""
 
+import signal
+import threading
+
 import numpy as np
 import pytest
 
@@ -44,6 +47,18 @@ def test_poses_that_are_no_numbers_are_nan_without_a_word(delta, capfd):
         assert np.isnan(found).all(axis=1).tolist() == lost
         assert np.isnan(turns).all(axis=(1, 2)).tolist() == lost
     assert capfd.readouterr() == ("", "")
+
+
+def test_an_interrupt_ends_the_call_between_two_blocks(delta):
+    """Poses out of reach take longest; Ctrl-C while CasADi iterates is no failure of the iteration."""
+    main = threading.main_thread().ident
+    assert main is not None
+    timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        delta.ik(np.tile([0.0, 0.0, -9.0], (2000, 1)))
+    timer.join()
+    assert np.isfinite(delta.ik(delta.home.r)).all()
 
 
 def test_near_chooses_among_the_assembly_modes_of_a_stewart_platform():
