@@ -5,20 +5,22 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-LONGEST = (  # more than ten seconds of one processor each, test_compiling.py minutes where zig's cache is empty
+LONGEST = (  # twenty seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/test_compiling.py",
     "test_notebooks.py",
     "fmu/test_singular_poses.py",
+    "models/test_tracking.py",
     "models/test_f1.py",
     "fmu/test_clients.py",
+    "models/test_six_link.py",
+    "models/test_stewart.py",
     "fmu/test_parameters.py",
     "mechanics/test_crossing_assemblies.py",
     "cli/test_simulate.py",
     "models/test_four_bar.py",
-    "mechanics/test_loops.py",
+    "fmu/test_fuzz.py",
     "test_simulation.py",
-    "optimica/test_refinement.py",
-    "fmu/test_closed_forms.py",
+    "mechanics/test_loops.py",
 )
 
 
