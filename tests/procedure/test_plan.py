@@ -40,8 +40,8 @@ def test_the_verdict_is_the_error_of_the_tool(plan):
 
 @pytest.mark.parametrize("cell", [cells.l1, cells.symmetric], ids=["l1", "symmetric"])
 def test_simulated_errors_are_those_predicted(cell):
-    found = plan_calibration(*cell(), **(FEW | dict(robots=24)))
-    # standard deviations are predicted, mean distances found, which are 0.92 of them for three alike; 24 robots
+    found = plan_calibration(*cell(), **(FEW | dict(robots=14)))
+    # standard deviations are predicted, mean distances found, which are 0.92 of them for three alike; 14 robots
     assert found.trials.in_frame.mean() == pytest.approx(0.9 * found.prediction.error, rel=0.2)
     assert (found.trials.after <= found.trials.in_frame).all()  # laid over each other best
 
@@ -76,16 +76,21 @@ def test_what_is_missing_is_said():
     robot, limits, device = cells.l1()
     small = FEW | dict(poses=9, robots=2)
     noisy = replace(device, transverse_noise=1e-3, range_noise=1e-3)
-    found = plan_calibration(robot, limits, noisy, **small, wanted=1e-3)
+    found = plan_calibration(robot, limits, noisy, **small, wanted=7e-4)
     assert not found.verdict.good
     assert "The rest is noise of the device: plan about" in str(found.verdict)
     found = plan_calibration(robot, limits, noisy, **small, wanted=1e-5)
     assert "times less noise" in str(found.verdict)
     cameras = stereo_cameras((3.5, 2.9, 1.0), (0.9, 2.9, -0.4), facing=(1.0, 0.0, 0.3))
-    found = plan_calibration(robot, limits, cameras, **small, wanted=1e-3)
+    found = plan_calibration(robot, limits, cameras, **(small | dict(poses=20)), wanted=1e-3)
+    assert not found.verdict.good
+    assert "of each pose are averaged the Cameras errs by" in str(found.verdict)  # too much for any robot
+    assert found.trials.misread > 1e-3
+    cameras = stereo_cameras((3.5, 2.9, 1.0), (0.9, 2.9, -0.4), facing=(1.0, 0.0, 0.3), lens_error=0.005)
+    found = plan_calibration(robot, limits, cameras, **(small | dict(poses=20)), wanted=5e-4)
     assert not found.verdict.good
     assert "systematic in the Cameras and more poses do not help" in str(found.verdict)
-    assert found.trials.averaged > 10 * found.prediction.error
+    assert found.trials.averaged > 5 * found.prediction.error
 
 
 def test_a_place_from_which_little_is_seen_is_told():

@@ -95,6 +95,14 @@ def test_the_direct_way_through_the_post_is_refused_and_a_detour_found():
     assert np.flatnonzero(~tour.via).tolist() == [len(detour) - 1]
 
 
+def test_a_way_of_no_length_is_clear_where_its_place_is_safe():
+    robot, limits, _ = cells.l1()
+    fleet = build_fleet(robot, limits, tape=1e-3, robots=1, seed=0)
+    home, inside = fleet.nominal.joints(np.array([[0.92, 2.93, -0.42], [0.7, 2.45, -0.9]]), None)
+    q = np.array([home, inside])
+    assert ways.clear_ways(fleet, q, q).tolist() == [True, False]
+
+
 def test_unreachable_stops_are_named():
     robot, limits, _ = cells.l1()
     fleet = build_fleet(robot, limits, tape=1e-4, robots=1, seed=0)

@@ -124,7 +124,7 @@ def _bounds(member: Member, q: np.ndarray, r: np.ndarray, R: np.ndarray, rate: n
         [float(levers.max()), *(max(map(np.linalg.norm, (c.start, c.end))) for c in member.limits.plate)]
     )
     return _Bounds(
-        reach=reach,
+        reach=np.where(largest[:, 0] > 0, reach, np.inf),  # nothing moves
         speed=np.maximum(motion.speed + motion.spin * body, largest[:, 0]),
         growth=along + (twist + W[:, 0] ** 2) * body,
         angles=(apart / geometry.length).max(axis=1) + np.maximum(W[:, 0], motion.turning),

@@ -24,13 +24,16 @@ SPACING = 1000  # between seeds of trials, which draw one for each reading
 class Trial:
     """One simulated robot: mean error of the tool over the workspace before and after its calibration, m.
 
-    largest: after, of any pose; in_frame: mean after, without laying robots over each other; note: why there is none.
+    largest: after, of any pose; in_frame: mean after, without laying robots over each other; misread: mean error of the
+    readings, laid over the true poses best; unseen: how many poses the device did not see; note: why there is no
+    calibration.
     """
 
     before: float
     after: float
     largest: float
     in_frame: float
+    misread: float
     unseen: int
     note: str
 
@@ -39,7 +42,8 @@ class Trial:
 class Trials:
     """All simulated robots, arrays (k,) in m as in `Trial`, NaN where a calibration failed.
 
-    averaged: the error after a calibration with 25 readings of each pose averaged: what no patience of the device removes.
+    averaged: the error after a calibration with 25 readings of each pose averaged: what no patience of the device removes;
+    misread: mean error of these averages themselves.
     """
 
     before: np.ndarray
@@ -48,6 +52,7 @@ class Trials:
     in_frame: np.ndarray
     unseen: np.ndarray
     averaged: float
+    misread: float
     notes: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -70,7 +75,12 @@ def collected(trials: list[Trial], averaged: Trial) -> Trials:
         name: np.array([getattr(each, name) for each in trials])
         for name in ("before", "after", "largest", "in_frame", "unseen")
     }
-    return Trials(**columns, averaged=averaged.after, notes=tuple(each.note for each in trials))
+    return Trials(
+        **columns,
+        averaged=averaged.after,
+        misread=averaged.misread,
+        notes=tuple(each.note for each in trials),
+    )
 
 
 def simulated(
@@ -86,6 +96,8 @@ def simulated(
     """Calibrate the nominal robot with what the device reads of robot `number` of the fleet at q (n, k)."""
     truth = fleet.others[number]
     points, turns, unseen = _read(truth, device, q, seed + SPACING * number, readings)
+    wrong = _aligned(points, _points(truth, device, q)[0])
+    misread = float(np.nanmean(wrong)) if np.isfinite(wrong).any() else np.nan
     placing = _placing(points, _points(fleet.nominal, device, q)[0])
     points, turns = _moved(placing, points, turns)
     at = candidates.at_q
@@ -97,13 +109,18 @@ def simulated(
         found = calibrate(fleet.robot, data, holdout=None)
         near = (true[good], true_R[good]) if fleet.nominal.turns else true[good]
         place, _ = found.chains.fk(at[good], near)
+        note = (
+            ""
+            if np.isfinite(place).all()
+            else "the calibrated robot does not reach all places of the workspace"
+        )
     except GantryTauError as error:
-        return Trial(float(before.mean()), np.nan, np.nan, np.nan, unseen, str(error))
-    if not np.isfinite(place).all():
-        note = "the calibrated robot does not reach all places of the workspace"
-        return Trial(float(before.mean()), np.nan, np.nan, np.nan, unseen, note)
+        place, note = np.full_like(true[good], np.nan), str(error)
     after, raw = _aligned(place, true[good]), np.linalg.norm(place - true[good], axis=1)
-    return Trial(float(before.mean()), float(after.mean()), float(after.max()), float(raw.mean()), unseen, "")
+    errors = (
+        (np.nan, np.nan, np.nan) if note else (float(after.mean()), float(after.max()), float(raw.mean()))
+    )
+    return Trial(float(before.mean()), *errors, misread, unseen, note)
 
 
 def check_device(fleet: Fleet, device: Device) -> None:

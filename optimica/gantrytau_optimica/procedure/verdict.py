@@ -51,7 +51,7 @@ def decide(
     count = len(choice.rows)
     said = [_told(trials, count, wanted)]
     if trials.failed:
-        said.append(_failed(trials, count))
+        said.append(_failed(device, trials, count, wanted))
     elif not good and trials.averaged >= SYSTEMATIC * trials.worst:
         said.append(_systematic(device, trials))
     elif not good:
@@ -76,11 +76,15 @@ def _told(trials: Trials, count: int, wanted: float) -> str:
     )
 
 
-def _failed(trials: Trials, count: int) -> str:
+def _failed(device: Device, trials: Trials, count: int, wanted: float) -> str:
     note = next(note for note in trials.notes if note)
-    return (
-        f"The first message: {note}. Plan more than {count} poses, or measure the robot better by hand first."
-    )
+    said = f"The first message: {note.rstrip('.')}."
+    if trials.misread > wanted:
+        return (
+            f"{said} Even when 25 readings of each pose are averaged the {type(device).__name__} errs by "
+            f"{um(trials.misread)}, which is systematic: calibrate the device itself, place it nearer, or take a better one."
+        )
+    return f"{said} Plan more than {count} poses, or measure the robot better by hand first."
 
 
 def _systematic(device: Device, trials: Trials) -> str:
