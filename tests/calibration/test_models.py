@@ -6,6 +6,8 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
+from gantrytau_optimica.calibration.covariance import as_told
+from gantrytau_optimica.calibration.rotations import rotation_vector
 from tests.calibration import synthetic_d1
 
 MODELS = (1, 2, 3, 4, 5)
@@ -97,6 +99,18 @@ def test_measured_guideways_are_placed_where_they_are(d1):
         assert np.linalg.norm(distance, axis=1).max() < 5e-3
         turn = found.parameters[f"arms[{i}].frame_rotation"]
         assert turn.shape == (3,)
+
+
+def test_deviations_of_a_turn_are_those_of_what_is_reported(d1):
+    fit = calibrate(ROBOT, d1[0], model=2).fits[0]
+    chain, p = fit.group.chains[0], fit.x
+    assert np.linalg.norm(rotation_vector(chain.frame(p)) - p[4:7]) > 0.1  # it is not the turn that was moved
+    step = 1e-4
+    after, before = (
+        np.array([rotation_vector(chain.frame(p + s * step * e)) for e in np.eye(7)[4:]]) for s in (1.0, -1.0)
+    )
+    # rounding over the step and over the sine of an angle near half a turn; measured 1e-8
+    assert as_told(fit)[4:7, 4:7] == pytest.approx((after - before).T / (2 * step), abs=1e-6)
 
 
 def test_kinematics_of_measured_guideways_go_back_and_forth(d1):

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.closure import PLATE
+from gantrytau_optimica.calibration.closure import ALONG, PLATE
 from gantrytau_optimica.calibration.fitting import Fit
+from gantrytau_optimica.calibration.rotations import left_jacobian, rotation_vector
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
 MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
@@ -95,7 +96,11 @@ def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
         part = slice(starts[f], starts[f + 1])
         outer[part, part] = _inverse(fit)
         middle[part, part] += _of_prior(fit)
-    return outer @ middle @ outer
+    told = np.zeros_like(middle)
+    for f, fit in enumerate(fits):
+        part = slice(starts[f], starts[f + 1])
+        told[part, part] = as_told(fit)
+    return told @ outer @ middle @ outer @ told.T
 
 
 def _moved(fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str) -> list[np.ndarray]:
@@ -139,8 +144,23 @@ def _of_prior(fit: Fit) -> np.ndarray:
     return rows.T @ rows * (fit.minimum.cost / freedom)
 
 
+def as_told(fit: Fit) -> np.ndarray:
+    """Derivatives of the numbers that are reported by those that were moved, (n, n).
+
+    The same, but for turns of measured guideways, before a rotation that was given: what is reported is the rotation
+    vector W of both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
+    """
+    whole = np.eye(len(fit.x))
+    for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
+        if chain.points is not None:
+            p, turn = fit.x[places], places[ALONG]
+            W = rotation_vector(chain.frame(p))
+            whole[np.ix_(turn, turn)] = np.linalg.solve(left_jacobian(W), left_jacobian(p[ALONG]))
+    return whole[np.ix_(fit.group.free, fit.group.free)]
+
+
 def undetermined(fit: Fit) -> tuple[str, ...]:
     """Names of the numbers that take part in directions that data do not hold."""
-    lost = fit.minimum.directions[fit.minimum.rank :]
+    lost = fit.minimum.directions[fit.minimum.rank :] @ as_told(fit).T
     part = np.abs(lost).max(axis=0, initial=0.0)
     return tuple(n for n, share in zip(fit.free_names, part, strict=True) if share > MOVED)
