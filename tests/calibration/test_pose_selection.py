@@ -67,7 +67,7 @@ def expected_error(robot, candidates, method, seeds):
     return np.array([predict(robot, candidates, rows).error for rows in chosen])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [1, 4])  # the worst of six boxes, and one as most are
 def test_40_d_optimal_poses_of_three_links_beat_40_random_ones(robot, seed):
     box = three_link_poses(400, seed=seed)
     drawn, chosen = (

@@ -15,6 +15,7 @@ from gantrytau_optimica.calibration.arm_fit import NOISE, TAPE
 
 LEAST = (NOISE / TAPE) ** 2  # what a tape measure knows
 EXCHANGES = 1000  # one by one, at most
+TRIED = 400  # of the poses outside, the best ones, where too much must not be given away
 RENEWED = 50  # exchanges, after which rounding is taken out of what is kept
 GAIN = 1e-5  # of each unknown's deviation, that an exchange must be worth: of thousands of poses each is worth less
 
@@ -108,28 +109,40 @@ def _one_by_one(choices: Sequence[_Choice], chosen: np.ndarray, lowest: float) -
     """Exchange the best one outside for the least one inside, while that is a gain and log det is not below `lowest`."""
     everything, inside = np.arange(len(choices[0].J)), np.zeros(len(choices[0].J), dtype=bool)
     inside[chosen] = True
-    left_out, least = np.zeros_like(inside), 0.0
+    least = 0.0
     # too few poses leave directions to the first term of A, and rounding grows by a million
     well_known = all(len(chosen) * each.J.shape[1] > 2 * each.J.shape[2] for each in choices)
     for k in range(EXCHANGES):
         if k % RENEWED == 0 or not well_known:
             least = GAIN * sum(each.scale(each.renew(np.flatnonzero(inside))) for each in choices)
-        gain = np.where(inside | left_out, -np.inf, sum(each.growth(1.0, everything) for each in choices))
-        new = int(np.argmax(gain))
-        for each in choices:
-            each.move(new, 1.0)
-        after = np.append(np.flatnonzero(inside), new)
-        loss = sum(each.growth(-1.0, after) for each in choices)
-        old = int(after[np.argmax(loss)])
-        if old == new or np.max(loss) + gain[new] < max(least, 1e-9 * abs(gain[new])):
+        gain = np.where(inside, -np.inf, sum(each.growth(1.0, everything) for each in choices))
+        pair = _allowed_pair(choices, np.flatnonzero(inside), gain, (least, lowest))
+        if pair is None:
             break
-        trial = np.append(after[(after != old) & (after != new)], new)
-        if np.isfinite(lowest) and _information(choices, trial) < lowest:
-            left_out[new] = True
-            for each in choices:
-                each.move(new, -1.0)
-            continue
+        new, old = pair
         inside[new], inside[old] = True, False
         for each in choices:
+            each.move(new, 1.0)
             each.move(old, -1.0)
     return np.flatnonzero(inside)
+
+
+def _allowed_pair(
+    choices: Sequence[_Choice], inside: np.ndarray, gain: np.ndarray, limits: tuple[float, float]
+) -> tuple[int, int] | None:
+    """The pose that comes and the one that goes: the best of the others whose exchange does not give too much away."""
+    least, lowest = limits
+    for new in map(int, np.argsort(-gain)[: min(TRIED, len(gain) - len(inside))]):
+        after = np.append(inside, new)
+        some = [_Choice(each.J[after], each.W) for each in choices]
+        for each in some:
+            each.renew(np.arange(len(after)))
+        loss = sum(each.growth(-1.0, np.arange(len(after))) for each in some)
+        old = int(after[np.argmax(loss)])
+        if old == new or np.max(loss) + gain[new] < max(least, 1e-9 * abs(gain[new])):
+            if np.isinf(lowest):
+                return None
+            continue
+        if np.isinf(lowest) or _information(choices, after[after != old]) >= lowest:
+            return new, old
+    return None
