@@ -359,7 +359,7 @@ class SpeedLimited(FreePath):
             yield between(-8.0, cart.v, 8.0)  # m/s
 
 
-other = optimize(SpeedLimited, elements=30, starts=6, refine=1e-3)
+other = optimize(SpeedLimited, elements=30, starts=4, refine=1e-3)
 print(other.search)
 print(f"refined: {other.final_time:.4f} s, {1 - other.final_time / fastest.final_time:.1%} faster; ", end="")
 print(f"played back it misses B by {1e3 * miss(other):.2f} mm")
