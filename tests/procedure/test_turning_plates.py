@@ -7,6 +7,7 @@ from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau_models import F1GantryTau, prototypes
 from gantrytau_optimica import TMac, plan_calibration
+from gantrytau_optimica.procedure.page import html_page
 from tests.procedure import cells
 
 SAMPLES = 150
@@ -42,6 +43,8 @@ def test_six_links():
     checked(plan, (0.0, 2.0))
     assert plan.verdict.good
     assert plan.trials.before.min() > 5e-4
+    assert plan.settings["prior"] == {"plate_offset": 0.001}  # one orientation does not tell where joints are
+    assert "calibrate measurements.csv --prior plate_offset=0.001" in html_page(plan, None, "Calibration.mod")
     # few poses and nearly one orientation: the prediction is a size, not a number
     assert 0.3 < plan.trials.in_frame.mean() / plan.prediction.error < 2.0
 

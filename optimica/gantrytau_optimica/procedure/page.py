@@ -71,9 +71,14 @@ def _steps(plan: "CalibrationPlan", program: str) -> str:
         "change the order or the kind of move: only these ways were checked.",
         f"Write measurements.csv with the header {header},x,y,z{turned}: a line for each measured pose, q as commanded in "
         "poses.csv (m and rad), x, y, z as measured in m. Leave out what was not seen.",
-        "Run: gantrytau calibrate measurements.csv",
+        "Run: gantrytau calibrate measurements.csv" + _prior(plan),
     ]
     return "<ol>" + "".join(f"<li>{escape(step)}</li>" for step in steps) + "</ol>"
+
+
+def _prior(plan: "CalibrationPlan") -> str:
+    prior = plan.settings.get("prior") or {}
+    return " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
 
 
 def _joint(plan: "CalibrationPlan", k: int, value: float) -> str:

@@ -24,6 +24,7 @@ from gantrytau_optimica.procedure.trials import (
     Trials,
     check_device,
     collected,
+    prior_of,
     simulated,
     with_obstacles,
 )
@@ -119,7 +120,12 @@ class _Procedure:
             joints=tuple(kinematics.joints),
             carts=len(self.fleet.nominal.linked.geometry.offset),
             parameters={n: arm.values[n] for arm in self.fleet.arms for n in arm.free},
-            settings=self.asked | {"device": type(self.device).__name__, "device_r": self.device.r},
+            settings=self.asked
+            | {
+                "prior": prior_of(self.fleet, self.asked["tape"]),
+                "device": type(self.device).__name__,
+                "device_r": self.device.r,
+            },
             workspace=places,
             q=order.q,
             r=r,
@@ -175,7 +181,16 @@ class _Procedure:
         key = digest(key, q)
 
         def trial(number: int, readings: int) -> Trial:
-            return simulated(self.fleet, candidates, self.device, q, number, seed=seed, readings=readings)
+            return simulated(
+                self.fleet,
+                candidates,
+                self.device,
+                q,
+                number,
+                seed=seed,
+                tape=self.asked["tape"],
+                readings=readings,
+            )
 
         self.stages.progress("trials", 0, count)
         for number in range(count):

@@ -91,6 +91,7 @@ def simulated(
     number: int,
     *,
     seed: int,
+    tape: float,
     readings: int = 1,
 ) -> Trial:
     """Calibrate the nominal robot with what the device reads of robot `number` of the fleet at q (n, k)."""
@@ -106,7 +107,7 @@ def simulated(
     before = _aligned(_points(fleet.nominal, device, at)[0][good], true[good])
     try:
         data = Measurements(q, points, turns if fleet.nominal.turns else None)
-        found = calibrate(fleet.robot, data, holdout=None)
+        found = calibrate(fleet.robot, data, holdout=None, prior=prior_of(fleet, tape))
         near = (true[good], true_R[good]) if fleet.nominal.turns else true[good]
         place, _ = found.chains.fk(at[good], near)
         note = (
@@ -121,6 +122,14 @@ def simulated(
         (np.nan, np.nan, np.nan) if note else (float(after.mean()), float(after.max()), float(raw.mean()))
     )
     return Trial(float(before.mean()), *errors, misread, unseen, note)
+
+
+def prior_of(fleet: Fleet, tape: float) -> dict[str, float] | None:
+    """What calibration is told beforehand: joints on the plate as the tape measure knows them, m.
+
+    Poses with nearly one orientation cannot tell them from the joints on the carts. Other robots do without.
+    """
+    return {"plate_offset": tape} if fleet.kind == "six links" else None
 
 
 def check_device(fleet: Fleet, device: Device) -> None:
