@@ -1,5 +1,6 @@
 """From an inert model to one whose members are symbols: modifications applied, paths given, symbols made."""
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -56,10 +57,22 @@ class Instance:
         return self.paths[id(member)]
 
 
+def _made(kind: type[Model]) -> Model:
+    """An instance of a class whose parameters all have values."""
+    try:
+        inspect.signature(kind).bind()
+    except TypeError as error:
+        raise ModelError(
+            f"{kind.__name__}: found the class, which needs arguments ({error}), expected an instance; write "
+            f"{kind.__name__}(...)"
+        ) from None
+    return kind()
+
+
 def instantiate(model: Model) -> Instance:
     """A fresh instance of `model` with symbols of its own; ModelError with the path of what is wrong."""
     if isinstance(model, type) and issubclass(model, Model):
-        model = model()
+        model = _made(model)
     if not isinstance(model, Model):
         raise ModelError(f"found {type(model).__name__}, expected a Model (an instance, or its class)")
     builder = _Builder()

@@ -45,6 +45,10 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
     """The model with other numbers for some parameters; ModelError for unknown names or wrong shapes."""
     if not values:
         return flat
+    if not isinstance(values, Mapping):
+        raise ModelError(
+            f"{flat.name}: found {type(values).__name__} as parameters, expected names and their values, {{name: value}}"
+        )
     remaining = dict(values)
     known = [*(p.name for p in flat.parameters), *(e for p in flat.parameters for e in p.elements)]
     for name in values:
@@ -56,17 +60,27 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
 def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:
     elements = list(parameter.value)
     if parameter.name in values:
-        array = np.asarray(values[parameter.name], dtype=float)
+        array = _numbers(parameter.name, values[parameter.name])
         if array.shape != parameter.shape:
             raise ModelError(f"{parameter.name}: value has shape {array.shape}, expected {parameter.shape}")
         elements = [ca.SX(float(x)) for x in array.ravel(order="F")]
     for index, name in enumerate(parameter.elements):
         if name in values and name != parameter.name:
-            elements[index] = ca.SX(float(values[name]))  # type: ignore[arg-type]
+            number = _numbers(name, values[name])
+            if number.shape:
+                raise ModelError(f"{name}: value has shape {number.shape}, expected ()")
+            elements[index] = ca.SX(float(number))
     for name, element in zip(parameter.elements, elements, strict=True):
         if element.is_constant() and not np.isfinite(float(element)):
             raise ModelError(f"{name}: value is {element}, expected a finite number")
     return replace(parameter, value=tuple(elements))
+
+
+def _numbers(name: str, value: object) -> np.ndarray:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"parameters: {name}: found {value!r}, expected a number or an array") from None
 
 
 def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> ParameterTable:

@@ -13,7 +13,6 @@ import numpy as np
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.events import refuse_sticking
-from gantrytau.flat_model import FlatModel
 from gantrytau.integration import Run
 from gantrytau.model import Model
 from gantrytau.motion import all_coordinates
@@ -53,7 +52,7 @@ def simulate(
     dae = model if isinstance(model, Dae) else translate(model, events=True)
     refuse_sticking(dae.flat)
     if parameters:
-        dae = retranslate(dae, _with_parameters(dae, parameters))
+        dae = retranslate(dae, with_values(dae.flat, parameters))
     wanted = names(outputs or ())
     for name in wanted:
         dae.expand(name)
@@ -93,15 +92,6 @@ def _check(start: float, stop: float, tolerance: float, points: int) -> None:
         )
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
         raise ModelError(f"simulate: found points={points!r}, expected a whole number of at least 2")
-
-
-def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> FlatModel:
-    for name, value in parameters.items():
-        try:
-            np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise ModelError(f"parameters: {name}: found {value!r}, expected a number or an array") from None
-    return with_values(dae.flat, parameters)
 
 
 def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:

@@ -7,16 +7,18 @@ from gantrytau_optimica.calibration.arm_fit import fit_arm
 from gantrytau_optimica.calibration.arms import read_arms
 from gantrytau_optimica.calibration.calibrating import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.cameras import single_camera, stereo_cameras
+from gantrytau_optimica.calibration.cameras import Camera, Cameras, single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.error_maps import error_map
 from gantrytau_optimica.calibration.findings import CalibrationError
-from gantrytau_optimica.calibration.gauges import LengthGauge
+from gantrytau_optimica.calibration.gauges import LengthGauge, Wires
 from gantrytau_optimica.calibration.guideways import linearity
 from gantrytau_optimica.calibration.identifiability import identifiability
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.orientation_errors import orientation_causes, orientation_errors
 from gantrytau_optimica.calibration.pose_selection import enough_poses, predict, select_poses
+from gantrytau_optimica.calibration.sensitivity_table import SensitivityTable, sensitivity_table
+from gantrytau_optimica.calibration.sight import Bars
 from gantrytau_optimica.estimation.estimate import Estimate
 from gantrytau_optimica.estimation.estimating import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -41,9 +43,12 @@ from gantrytau_optimica.studies.pareto import TradeOff, pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 
 __all__ = [
+    "Bars",
     "Calibration",
     "CalibrationError",
     "CalibrationPlan",
+    "Camera",
+    "Cameras",
     "Corner",
     "Deviation",
     "Estimate",
@@ -60,9 +65,11 @@ __all__ = [
     "Samples",
     "SavedOptimum",
     "Sensitivities",
+    "SensitivityTable",
     "TMac",
     "TradeOff",
     "Way",
+    "Wires",
     "at",
     "calibrate",
     "compare_records",
@@ -90,6 +97,7 @@ __all__ = [
     "save_optimum",
     "select_poses",
     "sensitivities",
+    "sensitivity_table",
     "single_camera",
     "stereo_cameras",
     "sum_of_squares",

@@ -11,8 +11,9 @@ from gantrytau import Array, Model, ModelError, Parameter, SolveError
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.arm_fit import TAPE, fit_arm, scales
 from gantrytau_optimica.calibration.arm_ipopt import fit_arm_with_ipopt
-from gantrytau_optimica.calibration.arm_poses import pose_rows, poses_of, rotation_vectors, turns
+from gantrytau_optimica.calibration.arm_poses import pose_rows, poses_of
 from gantrytau_optimica.calibration.arms import read_arms, rotation
+from gantrytau_optimica.calibration.rotations import rotation_vector, rotations
 from tests.calibration.f1_data import DEVICE, f1_arms, f1_poses, measured
 from tests.references import f1
 
@@ -89,7 +90,7 @@ def test_slopes_by_the_pose_are_those_of_differences(robot):
     )
 
     def errors(x):
-        turned = turns(np.tile(x[3:], (5, 1))) @ R
+        turned = rotations(np.tile(x[3:], (5, 1))) @ R
         return np.concatenate([arm.closure(q, r + x[:3], turned)[0] for arm in arms], axis=1)
 
     differences = np.stack([(errors(x) - errors(-x)) / 2e-6 for x in 1e-6 * np.eye(6)], axis=-1)
@@ -114,8 +115,8 @@ def test_a_quaternion_of_any_length_is_a_matrix_as_the_thesis_has_it():
 
 def test_rotation_vectors_come_back():
     vectors = np.array([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.3, -0.2, 0.1], [2.0, 1.0, -1.5]])
-    np.testing.assert_allclose(rotation_vectors(turns(vectors)), vectors, atol=1e-14)
-    np.testing.assert_allclose(turns(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-15)
+    np.testing.assert_allclose(rotation_vector(rotations(vectors)), vectors, atol=1e-14)
+    np.testing.assert_allclose(rotations(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-15)
 
 
 @pytest.mark.parametrize("orientation", ORIENTATIONS)

@@ -191,6 +191,13 @@ def test_two_cameras_know_the_depth_better_than_one():
     assert deep[1] < deep[0] / 5
 
 
+def test_cameras_may_look_straight_down():
+    device = stereo_cameras([0, 0, 3.0], [0, 0, 0], up=[0, 1.0, 0], lens_error=0.0, noise=0.0)
+    seen = device.measure(np.array([[0.1, 0.2, 0.0]]), np.eye(3)[None])
+    np.testing.assert_allclose(seen.r, [[0.1, 0.2, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(device.cameras[1].r - device.cameras[0].r, [0.8, 0, 0], atol=1e-15)
+
+
 def test_stereo_errs_as_much_as_in_the_thesis_and_measuring_again_does_not_help():
     """Section 5.5: 1.7 mm against a laser tracker."""
     device = stereo_cameras([-2.5, 0, 0], [0, 0, 0])

@@ -275,6 +275,19 @@ def test_modifications_that_cannot_be(make, message):
         flatten(make())
 
 
+def test_a_class_that_needs_arguments_is_told():
+    class Sized(Model):
+        def __init__(self, size):
+            super().__init__(size=size)
+
+        size = Parameter(unit="m", description="size")
+
+    with pytest.raises(
+        ModelError, match=r"^Sized: found the class, which needs arguments .*'size'.*write Sized"
+    ):
+        flatten(Sized)
+
+
 def test_components_that_would_be_lost():
     with pytest.raises(ModelError, match=r"Lost\.cells is a list of declarations.*Array\(Component, count\)"):
 

@@ -6,10 +6,12 @@ Newton over all poses at once, from poses near by: the plate moves by less than 
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from gantrytau import SolveError
+from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.arms import Arm
 
 STEPS = 12
@@ -46,11 +48,10 @@ def poses_of(
             break
         there = None if R is None else R[open_rows]
         rows = pose_rows(arms, q[open_rows], r[open_rows], there)
-        # where the plate is not held the least step is as good as any
-        step = (np.linalg.pinv(rows) @ -errors[open_rows, :, None])[:, :, 0]
+        step = _steps(rows, -errors[open_rows, :, None])[:, :, 0]
         r[open_rows] += step[:, :3]
         if R is not None and there is not None:
-            R[open_rows] = turns(step[:, 3:]) @ there
+            R[open_rows] = turned(there, step[:, 3:])
     bad = ~(np.abs(np.concatenate([arm.closure(q, r, R)[0] for arm in arms], axis=1)).max(axis=1) < GOOD)
     if bad.any() and all_of_them:
         raise SolveError(
@@ -63,23 +64,12 @@ def poses_of(
     return r, R
 
 
-def turns(vectors: np.ndarray) -> np.ndarray:
-    """Rotation matrices of rotation vectors in rad, (N, 3) to (N, 3, 3)."""
-    angle = np.linalg.norm(vectors, axis=1)
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    first = np.sinc(angle / np.pi)[:, None, None]
-    second = (np.sinc(angle / (2 * np.pi)) ** 2 / 2)[:, None, None]
-    return np.eye(3) + first * cross + second * (cross @ cross)
-
-
-def rotation_vectors(R: np.ndarray) -> np.ndarray:
-    """Rotation vectors in rad of small rotations, (N, 3, 3) to (N, 3); right below half a turn."""
-    axial = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1) / 2
-    sine = np.linalg.norm(axial, axis=1)
-    angle = np.arctan2(sine, (np.trace(R, axis1=1, axis2=2) - 1) / 2)
-    return axial * np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)[:, None]
+def _steps(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Newton steps; where the plate is not held the least step is as good as any."""
+    if rows.shape[1] == rows.shape[2]:
+        with suppress(np.linalg.LinAlgError):
+            return np.linalg.solve(rows, errors)
+    return np.linalg.pinv(rows) @ errors
 
 
 def tool_gain(

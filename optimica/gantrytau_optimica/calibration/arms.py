@@ -17,6 +17,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, flatten
 from gantrytau.instantiation import instantiate
+from gantrytau.kinematics.rotations import about
 from gantrytau.parameters import parameter_table
 
 Orientation = Literal["local", "unit", "free"]
@@ -150,7 +151,7 @@ class _Frames:
         for turntable in arm.turntables:
             gain = arm.values[f"{turntable.name}.gain"]
             self.seats.append(_seat(arm, turntable))
-            self.turns.append(_turns(turntable.axis, gain * q[:, turntable.column]))
+            self.turns.append(about(turntable.axis, gain * q[:, turntable.column]))
             self.before.append(self.before[-1] @ self.seats[-1] @ self.turns[-1])
 
     def places(self, link: str) -> list[np.ndarray]:
@@ -227,17 +228,6 @@ def rotation(u: np.ndarray) -> np.ndarray:
 def _seat(arm: Arm, turntable: Turntable) -> np.ndarray:
     u = arm.values[f"{turntable.name}.orientation"]
     return rotation(u / np.linalg.norm(u) if arm.orientation == "unit" else u)
-
-
-def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Rotations about a unit vector (Rodrigues), (N, 3, 3)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return (
-        np.eye(3)
-        + np.sin(angles)[:, None, None] * cross
-        + (1 - np.cos(angles))[:, None, None] * (cross @ cross)
-    )
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ SETTLED = 1e-8  # m and rad; a thousandth of it is left
 BLOCK = 1024  # poses at once: more take memory and no less time
 LEAST_POINTS = 4  # three leave up to four poses
 LENS_ERROR = 0.033  # of k1, for all that is wrong with a camera: fitted, see stereo_cameras
+UP = (0.0, 0.0, 1.0)
 STRAIGHT_AHEAD = 1e-3  # m, points nearer to the plane of the lens or behind it are not imaged
 
 
@@ -76,7 +77,7 @@ class Camera:
         return float(folds.min(initial=np.inf))
 
     @classmethod
-    def looking(cls, r: Any, at: Any, *, up: Any = (0.0, 0.0, 1.0), **lens: Any) -> "Camera":
+    def looking(cls, r: Any, at: Any, *, up: Any = UP, **lens: Any) -> "Camera":
         """A camera at r that looks at a point, the upper edge of its image towards `up`; lens: as of Camera."""
         r, ahead, up = (np.asarray(a, dtype=float) for a in (r, np.subtract(at, r), up))
         right = np.cross(ahead, up)
@@ -256,27 +257,29 @@ class Cameras(Device):
         return np.concatenate(images, axis=1), np.concatenate(rows, axis=1)
 
 
-def single_camera(r: Any, at: Any, *, lens_error: float = LENS_ERROR, **policy: Any) -> Cameras:
+def single_camera(r: Any, at: Any, *, up: Any = UP, lens_error: float = LENS_ERROR, **policy: Any) -> Cameras:
     """One camera at r that looks at a point, (3,) in m each, with a lens that is not quite known.
 
-    lens_error: what is left of k1 after the camera was calibrated (see `stereo_cameras`); policy: as of Cameras.
+    up: the direction of the upper edge of its image; lens_error: what is left of k1 after the camera was calibrated (see
+    `stereo_cameras`); policy: as of Cameras.
     """
-    return _with_lens_error([Camera.looking(r, at)], lens_error, policy)
+    return _with_lens_error([Camera.looking(r, at, up=up)], lens_error, policy)
 
 
 def stereo_cameras(
-    r: Any, at: Any, *, base: float = 0.8, lens_error: float = LENS_ERROR, **policy: Any
+    r: Any, at: Any, *, base: float = 0.8, up: Any = UP, lens_error: float = LENS_ERROR, **policy: Any
 ) -> Cameras:
     """Two cameras, `base` m apart about r, that look at a point, with lenses that are not quite known.
 
-    lens_error: what is left of k1 of each after calibration, with opposite signs: the default gives an error of about
-    1.7 mm in the mean over a workspace of 1 m at 2.5 m, which thesis section 5.5 found of its two cameras against a
-    laser tracker (fitted: lenses are not printed). policy: as of Cameras.
+    up: the direction of the upper edge of the images, across `base`; lens_error: what is left of k1 of each after
+    calibration, with opposite signs: the default gives an error of about 1.7 mm in the mean over a workspace of 1 m at
+    2.5 m, which thesis section 5.5 found of its two cameras against a laser tracker (fitted: lenses are not printed).
+    policy: as of Cameras.
     """
     r, at = np.asarray(r, dtype=float), np.asarray(at, dtype=float)
-    middle = Camera.looking(r, at)
+    middle = Camera.looking(r, at, up=up)
     aside = base / 2 * middle.R[:, 0]
-    return _with_lens_error([Camera.looking(r + s * aside, at) for s in (-1, 1)], lens_error, policy)
+    return _with_lens_error([Camera.looking(r + s * aside, at, up=up) for s in (-1, 1)], lens_error, policy)
 
 
 def _with_lens_error(believed: list[Camera], lens_error: float, policy: dict[str, Any]) -> Cameras:

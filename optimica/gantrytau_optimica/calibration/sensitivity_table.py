@@ -15,15 +15,16 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.arm_fit import checked_poses
-from gantrytau_optimica.calibration.arm_poses import poses_of, rotation_vectors
+from gantrytau_optimica.calibration.arm_poses import poses_of
 from gantrytau_optimica.calibration.arms import Arm, Orientation, read_arms
 from gantrytau_optimica.calibration.identifiability import Poses, finite_poses
+from gantrytau_optimica.calibration.rotations import rotation_vector
 
 STEP = 5e-5  # m, or without unit: that of Table 5.10
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class SensitivityTable:
     """Sums over poses and both signs of a step of each parameter; prints itself as a table.
 
     names: of the parameters; position: (p,) in m; angle: (p,) in rad, zero where the plate cannot turn; cost: (p,) in m4;
@@ -40,7 +41,9 @@ class Sensitivity:
     def of(self, name: str) -> tuple[float, float, float]:
         """Position, angle and cost of one parameter; ModelError for an unknown name."""
         if name not in self.names:
-            raise ModelError(f"sensitivity: there is no {name!r}, expected one of {', '.join(self.names)}")
+            raise ModelError(
+                f"sensitivity_table: there is no {name!r}, expected one of {', '.join(self.names)}"
+            )
         k = self.names.index(name)
         return float(self.position[k]), float(self.angle[k]), float(self.cost[k])
 
@@ -55,9 +58,9 @@ class Sensitivity:
         )
 
 
-def sensitivity(
+def sensitivity_table(
     robot: Model, measurements: Any, *, step: float = STEP, orientation: Orientation = "local"
-) -> Sensitivity:
+) -> SensitivityTable:
     """What a step of each parameter either way does to poses and costs, summed over poses.
 
     measurements: a record with q, r and R, or a tuple of them; the poses proper follow from q, near r and R. orientation:
@@ -75,7 +78,7 @@ def sensitivity(
         names += arm.names
         rows += [_of_parameter(arms, i, h, here) for h in step * np.eye(arm.count)]
     position, angle, cost = np.array(rows).T
-    return Sensitivity(tuple(names), position, angle, cost, step, len(q))
+    return SensitivityTable(tuple(names), position, angle, cost, step, len(q))
 
 
 def _of_parameter(arms: Sequence[Arm], i: int, step: np.ndarray, here: Poses) -> tuple[float, float, float]:
@@ -86,6 +89,6 @@ def _of_parameter(arms: Sequence[Arm], i: int, step: np.ndarray, here: Poses) ->
         position += np.linalg.norm(r - here.r, axis=1).sum()
         if R is not None and here.R is not None:
             turned = np.swapaxes(here.R, 1, 2) @ R
-            angle += np.linalg.norm(rotation_vectors(turned), axis=1).sum()
+            angle += np.linalg.norm(rotation_vector(turned), axis=1).sum()
         cost += ((2 * arm.lengths * arm.closure(*here)[0]) ** 2).sum()
     return position, angle, cost

@@ -7,7 +7,7 @@ from gantrytau import ModelError
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.arm_poses import poses_of, tool_gain
 from gantrytau_optimica.calibration.arms import read_arms
-from gantrytau_optimica.calibration.sensitivity import sensitivity
+from gantrytau_optimica.calibration.sensitivity_table import sensitivity_table
 from tests.calibration.linear_data import carts, six_link_poses, three_link_poses
 
 LINKS = [
@@ -30,7 +30,7 @@ ANGLE = {
 @pytest.fixture(scope="module")
 def found():
     # the 61 poses of section 5.3 that calibrate; where they are is not printed
-    return sensitivity(SixLinkGantryTau(prototypes.D1), six_link_poses(61))
+    return sensitivity_table(SixLinkGantryTau(prototypes.D1), six_link_poses(61))
 
 
 @pytest.mark.parametrize("parameter", POSITION)
@@ -68,7 +68,7 @@ def in_box():
     r = BOX[0] + np.random.default_rng(0).uniform(-1, 1, (61, 3)) * BOX[1]
     R = np.tile(np.array(prototypes.D1.plate_rotation), (61, 1, 1))
     q = carts(arms, r, R)
-    return sensitivity(robot, (q, *poses_of(arms, q, r, R)))
+    return sensitivity_table(robot, (q, *poses_of(arms, q, r, R)))
 
 
 @pytest.mark.parametrize("parameter", WHOLE)
@@ -83,9 +83,9 @@ def test_each_number_of_table_5_10(in_box, parameter):
 def test_rows_that_were_not_seen_count_for_nothing():
     robot, (q, r, _) = GantryTau(prototypes.L1), three_link_poses(20)
     lost = np.arange(20) % 3 == 0
-    found = sensitivity(robot, (q, np.where(lost[:, None], np.nan, r)))
+    found = sensitivity_table(robot, (q, np.where(lost[:, None], np.nan, r)))
     assert found.poses == 13
-    np.testing.assert_array_equal(found.position, sensitivity(robot, (q[~lost], r[~lost])).position)
+    np.testing.assert_array_equal(found.position, sensitivity_table(robot, (q[~lost], r[~lost])).position)
 
 
 def test_costs_are_those_of_a_length_alone(found):
@@ -97,7 +97,7 @@ def test_costs_are_those_of_a_length_alone(found):
 
 def test_small_steps_are_linear():
     robot, poses = GantryTau(prototypes.L1), three_link_poses(40)
-    found = sensitivity(robot, poses, step=1e-6)
+    found = sensitivity_table(robot, poses, step=1e-6)
     gains = np.concatenate([gain for gain, _ in tool_gain(read_arms(robot), *poses)], axis=2)
     expected = 2 * 1e-6 * np.linalg.norm(gains, axis=1).sum(axis=0)
     np.testing.assert_allclose(found.position, expected, rtol=1e-5)  # ten times the step
@@ -108,8 +108,8 @@ def test_prints_a_table_and_answers_by_name(found):
     assert "position/mm" in str(found)
     assert "(61 poses, steps of 5e-05)" in str(found)
     assert len(str(found).splitlines()) == 1 + len(found.names)
-    with pytest.raises(ModelError, match=r"sensitivity: there is no 'mass', expected one of arms\[0\]"):
+    with pytest.raises(ModelError, match=r"sensitivity_table: there is no 'mass', expected one of arms\[0\]"):
         found.of("mass")
     for step in (0.0, np.nan, "x"):
         with pytest.raises(ModelError, match=f"step: found {step!r}, expected a length above 0 in m"):
-            sensitivity(GantryTau(prototypes.L1), three_link_poses(3), step=step)  # type: ignore
+            sensitivity_table(GantryTau(prototypes.L1), three_link_poses(3), step=step)  # type: ignore
