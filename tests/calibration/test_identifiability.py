@@ -121,6 +121,8 @@ def test_an_orientation_that_hardly_changes_is_told_as_collinear():
             arm.covariance([name])
         assert np.isfinite(arm.covariance([f"{arm.name}.links[0].length"])).all()
         assert f"{arm.name}.links[0].offset[0] is known worse than by a tape measure, with" in str(found)
+    alone = replace(found.arms[0], collinear={"arms[0].length": []})
+    assert str(alone).endswith("arms[0].length is known worse than by a tape measure")
 
 
 def test_a_line_of_poses_holds_less_than_a_volume():

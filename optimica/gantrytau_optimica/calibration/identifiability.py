@@ -99,7 +99,8 @@ class ArmIdentifiability:
         lines = [f"{self.name}: {self.count} parameters, rank {self.rank}"]
         lines += [f"  {name} follows from {', '.join(others)}" for name, others in self.redundant.items()]
         lines += [
-            f"  {name} is known worse than by a tape measure, with {', '.join(others)}"
+            f"  {name} is known worse than by a tape measure"
+            + (f", with {', '.join(others)}" if others else "")
             for name, others in self.collinear.items()
         ]
         return "\n".join(lines)

@@ -119,9 +119,9 @@ def _comments(plan: "CalibrationPlan", carts: str) -> list[str]:
         f"Calibration of {plan.robot_name}: {int(plan.measured.sum())} poses to measure, "
         f"{int((~plan.measured).sum())} only passed (home at begin and end).",
         f"Joint targets: carts in mm, turntables in degrees; {unused}. Moves are linear in these axes and were checked "
-        "on all "
-        "of their way; do not change order, targets or kind of move. Rows of poses.csv have the same numbers.",
-        f"Expected error of the tool after calibration {um(plan.verdict.error)}, wanted {um(plan.verdict.wanted)}: "
+        "on all of their way; do not change order, targets or kind of move. Rows of poses.csv have the same numbers.",
+        f"Expected error of the tool after calibration with all {len(plan.prediction.rows)} poses of the plan "
+        f"{um(plan.verdict.error)}, wanted {um(plan.verdict.wanted)}: "
         f"{'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
         f"Poses: {CRITERION}.",
         f"Nominal parameters in m ({plan.kind}):",
