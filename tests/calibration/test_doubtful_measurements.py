@@ -136,10 +136,12 @@ def test_measurements_a_row_late(six):
     assert caught.value.kind == "misfit"
 
 
-def test_orientations_of_other_rows_leave_no_pose(six):
+def test_orientations_of_other_rows_are_doubtful(six):
+    # this plate turns by a milliradian: within a layer of poses the row before is nearly right, between layers it is not
     q, r, R, _ = six
     found = calibrate(SIX, Measurements(q, r, np.roll(R, 1, axis=0)))
-    assert {"no pose", "misfit"} & set(kinds(found))
+    assert {"no pose", "misfit", "outliers"} & set(kinds(found))
+    assert found.noise > 3 * NOISE
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -10,10 +10,9 @@ import numpy as np
 from gantrytau.commands.calibrate.lines import in_lines, read
 from gantrytau.commands.calibrate.policy import in_options
 from gantrytau.commands.reporting import FAULT, busy, fail
-from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.errors import ModelError
 from gantrytau.model import Model
 
-NEGLIGIBLE = 1e-3  # deviations of a parameter, that a search may go on moving it
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
 
 
@@ -37,15 +36,6 @@ class Measured:
         return in_options(in_lines(message, rows, self.lines) if rows else message)
 
 
-def scalars(values: Any) -> dict[str, float]:
-    """Numbers by name; of a vector `v` the elements `v[0]`, `v[1]` and so on."""
-    found = {}
-    for name, value in values.items():
-        elements = [name] if np.ndim(value) == 0 else [f"{name}[{k}]" for k in range(len(value))]
-        found |= dict(zip(elements, np.atleast_1d(value).tolist(), strict=True))
-    return found
-
-
 def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: bool) -> Any:
     """The calibration, whose findings name lines; leaves with a message for data that determine nothing."""
     from gantrytau_optimica import CalibrationError, calibrate
@@ -57,7 +47,7 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
         _refuse(error, measured, json)
     except ModelError as error:
         raise ModelError(in_options(str(error))) from error
-    if not (found.success or _stays(found, measured, policy)):
+    if not found.success:
         fail(
             f"{measured.file}: the search for parameters did not settle within {found.iterations} steps; look at the "
             "measurements, measure more poses, or try --robust or --start linear\nNothing was written",
@@ -69,22 +59,6 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
     if policy["loss"] == "linear":
         _refuse_outliers(found.error, told, measured, json)
     return replace(found, findings=told)
-
-
-def _stays(found: Any, measured: Measured, policy: dict[str, Any]) -> bool:
-    """Whether a search that begins where this one ended stays there; steps of rounding errors are never negligible."""
-    from gantrytau_optimica import calibrate
-
-    try:
-        again = calibrate(found.robot, measured.data, **dict(policy, start="nominal"))
-    except GantryTauError:
-        return False
-    before, after = scalars(found.parameters), scalars(again.parameters)
-    return all(
-        abs(after[name] - before[name]) < NEGLIGIBLE * deviation
-        for name, deviation in found.deviations.items()
-        if name in before
-    )
 
 
 def _refuse_outliers(error: float, findings: Sequence[Any], measured: Measured, json: bool) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from gantrytau.commands.calibrate import results
-from gantrytau.commands.calibrate.measured import Measured, scalars
+from gantrytau.commands.calibrate.measured import Measured
 
 
 def summary(found: Any, measured: Measured, robot: str, files: list[str]) -> dict[str, Any]:
@@ -88,6 +88,15 @@ def _deviation(name: str, deviations: dict[str, float]) -> str:
         return "held" if "orientation" not in name else "-"
     value = deviations[name]
     return f"{value * 1e6:.3g}" if np.isfinite(value) else "not known"
+
+
+def scalars(values: Any) -> dict[str, float]:
+    """Numbers by name; of a vector `v` the elements `v[0]`, `v[1]` and so on."""
+    found = {}
+    for name, value in values.items():
+        elements = [name] if np.ndim(value) == 0 else [f"{name}[{k}]" for k in range(len(value))]
+        found |= dict(zip(elements, np.atleast_1d(value).tolist(), strict=True))
+    return found
 
 
 def nominal_values(found: Any) -> dict[str, float]:

@@ -14,9 +14,9 @@ from gantrytau_optimica.calibration.fitting import TAPE, Fit, not_held
 from gantrytau_optimica.calibration.gauss_newton import Minimum
 from gantrytau_optimica.calibration.groups import Group, problem
 
-TOLERANCE = 1e-8  # of the gradient of the scaled cost
+TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
+LEAST = 1e-9  # m2, of the noise: rounding of closure errors is far below it
 AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
-SCALE = 1e4  # of the cost in m4, so that this gradient leaves less than 1e-10 m
 # where rounding ends the descent before the gradient is that small
 AT_ROUNDING = ("Search_Direction_Becomes_Too_Small", "Solved_To_Acceptable_Level")
 OPTIONS = {
@@ -33,13 +33,14 @@ OPTIONS = {
 def solve(fit: Fit) -> Fit:
     """The fit found again by Ipopt, from the start values of its group, with its weights and its prior.
 
-    Directions that were left alone by Gauss-Newton are held at their start by equality constraints. Raises SolveError
+    Directions that Gauss-Newton left alone are held where it left them by equality constraints. Raises SolveError
     where Ipopt finds no minimum.
     """
     group, free = fit.group, np.flatnonzero(fit.group.free)
+    steps = _steps(fit)
     unknown = ca.MX.sym("x", len(free))
     x = ca.MX(ca.DM(group.x))
-    x[free.tolist()] = unknown
+    x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
     cost = ca.MX(0)
     for chain, places in zip(group.chains, group.places, strict=True):
         e = _errors(chain, x[places.tolist()])
@@ -47,10 +48,12 @@ def solve(fit: Fit) -> Fit:
     noise = float(np.sqrt(fit.minimum.cost / max(1, fit.count - fit.minimum.rank)))
     for i, (value, deviation) in group.prior.items():
         cost += (noise / deviation * (x[i] - value)) ** 2
-    lost = ca.DM(fit.minimum.directions[fit.minimum.rank :])
-    held = lost @ (unknown - ca.DM(group.x[free]))
-    solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": SCALE * cost, "g": held}, OPTIONS)
-    found = solver(x0=group.x[free], lbg=0.0, ubg=0.0)
+    held = unknown[fit.minimum.rank :]
+    scaled = cost / max(noise, LEAST) ** 2
+    solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": scaled, "g": held}, OPTIONS)
+    start = np.linalg.solve(steps, group.x[free] - fit.x[free])
+    start[fit.minimum.rank :] = 0.0
+    found = solver(x0=start, lbg=0.0, ubg=0.0)
     stats = solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
         raise SolveError(
@@ -58,7 +61,7 @@ def solve(fit: Fit) -> Fit:
             "minimum; take method='gauss-newton', or start='linear'"
         )
     numbers = group.x.copy()
-    numbers[free] = np.array(found["x"]).ravel()
+    numbers[free] = fit.x[free] + steps @ np.array(found["x"]).ravel()
     return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
 
 
@@ -72,21 +75,24 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
     constraints = read_constraints(given, whole.free_names)
     noise = not_held(whole) * TAPE
+    steps = _steps(whole)
     unknown = ca.MX.sym("x", len(free))
+    numbers_of = ca.DM(minimum.x[free]) + ca.DM(steps) @ unknown
     x = ca.MX(ca.DM(group.x))
-    x[free.tolist()] = unknown
-    lost = ca.DM(minimum.directions[minimum.rank :])
-    cost = (noise / TAPE) ** 2 * ca.sumsqr(lost @ (unknown - ca.DM(minimum.x[free])))
+    x[free.tolist()] = numbers_of
+    cost = max(noise, LEAST) ** 2 * ca.sumsqr(unknown[minimum.rank :])
     for chain, places in zip(group.chains, group.places, strict=True):
         e = _errors(chain, x[places.tolist()])
         cost += ca.sumsqr(e if whole.weights is None else ca.DM(whole.weights) * e)
     for i, (value, deviation) in group.prior.items():
         cost += (noise / deviation * (x[i] - value)) ** 2
-    kept = ca.vertcat(*[each.expression(unknown) for each in constraints])
+    kept = ca.vertcat(*[each.expression(numbers_of) for each in constraints])
     low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
     options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
-    solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": SCALE * cost, "g": kept}, options)
-    found: Any = solver(x0=minimum.x[free], lbg=low, ubg=high)
+    solver = ca.nlpsol(
+        "calibration", "ipopt", {"x": unknown, "f": cost / max(noise, LEAST) ** 2, "g": kept}, options
+    )
+    found: Any = solver(x0=0.0, lbg=low, ubg=high)
     stats = solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
         raise SolveError(
@@ -94,11 +100,24 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
             "minimum that keeps the constraints; look whether they contradict each other"
         )
     numbers = group.x.copy()
-    numbers[free] = np.array(found["x"]).ravel()
+    numbers[free] = minimum.x[free] + steps @ np.array(found["x"]).ravel()
     value = np.array(found["g"]).ravel()
     active = np.minimum(value - low, high - value) < AT_LIMIT
-    slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(numbers[free]))
+    slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))
+    slopes = slopes @ np.linalg.inv(steps)
     return [_constrained(whole, numbers, slopes[active], int(stats["iter_count"]))]
+
+
+def _steps(fit: Fit) -> np.ndarray:
+    """One deviation of the numbers along each direction, of those that data do not hold by TAPE, in columns, (n, n).
+
+    In these steps the curvature of the cost is the same along all directions.
+    """
+    minimum = fit.minimum
+    noise = max(not_held(fit) * TAPE, LEAST)
+    sizes = np.full(len(minimum.directions), TAPE)
+    sizes[: minimum.rank] = noise / minimum.singular[: minimum.rank]
+    return minimum.directions.T * sizes
 
 
 def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> Fit:

@@ -72,6 +72,11 @@ class Calibration:
         """Names of numbers that data do not hold: they stayed near their start values."""
         return tuple(name for fit in self.fits for name in undetermined(fit))
 
+    @property
+    def rank(self) -> int:
+        """How many combinations of the identified numbers data hold."""
+        return sum(fit.minimum.rank for fit in self.fits)
+
     def undetermined_part(self, name: str) -> bool:
         """Whether data do not hold a number, or an element of a vector."""
         return any(lost == name or lost.rpartition("[")[0] == name for lost in self.undetermined)

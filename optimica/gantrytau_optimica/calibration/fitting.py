@@ -8,10 +8,13 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.gauss_newton import Minimum
-from gantrytau_optimica.calibration.groups import Group, minimise, problem
+from gantrytau_optimica.calibration.gauss_newton import RELATIVE, Minimum, gauss_newton
+from gantrytau_optimica.calibration.groups import Group, Problem, Taped, minimise, problem
 
 TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
+CLEARLY = 10.0  # times better than TAPE, from which on its pull would be negligible
+FAR = 0.5  # m, from the start values; fits that data do not hold may run off further
+NOISES, SETTLED = 10, 0.01  # rounds of estimating the noise with a tape measure, until it changes by less
 ROUNDS = 60  # of reweighting
 HUBER, TUKEY = 1.345, 4.685  # of the standard deviation, 95 % efficient for normal noise (Huber, 1981)
 
@@ -51,27 +54,55 @@ class Fit:
         return self.group.errors(self.x) / (2 * lengths)
 
 
-def fit_group(group: Group, weights: np.ndarray | None = None, truncated: float = 0.0) -> Fit:
-    """The minimum from the start values of the group; what data hold worse than TAPE stays there.
+def fit_group(
+    group: Group,
+    weights: np.ndarray | None = None,
+    *,
+    begin: np.ndarray | None = None,
+    smallest: float | None = None,
+) -> Fit:
+    """The minimum of a group; what data hold worse than TAPE stays near the start values.
 
-    weights: of the poses, (N,), or None; truncated: singular value below which directions are known not to be held.
+    weights: of the poses, (N,), or None; begin: where the search begins, instead of the start values; smallest: singular
+    value below which directions are known not to be held.
+
+    Where data do not hold everything, closure errors curve so much along what they do not hold that steps without it end
+    in wrong places. So all numbers are first held by a tape measure, which has one minimum; what is held is decided there,
+    and moves on without the tape.
     """
-    all_weights = None if weights is None else [weights] * len(group.chains)
-    noise = 0.0
-    if group.prior:  # the weight of the prior follows from the noise that is left without it
-        noise = _noise(minimise(group, problem(group, all_weights)), group)
-    found = problem(group, all_weights, noise)
-    minimum = minimise(group, found, truncated)
-    if group.prior:
-        found = problem(group, all_weights, _noise(minimum, group))
-        minimum = minimise(group, found, truncated)
-    smallest = _noise(minimum, group) / TAPE
-    if truncated or (minimum.success and minimum.singular.min(initial=np.inf) > smallest):
-        return Fit(group, minimum, truncated, weights)
-    again = minimise(group, found, smallest)
-    if again.success or not minimum.success:
-        return Fit(group, again, smallest, weights)
-    return Fit(group, minimum, 0.0, weights)
+    x = group.x if begin is None else begin
+    found = problem(group, None if weights is None else [weights] * len(group.chains))
+    minimum = minimise(found, x)
+    for _ in range(2 if group.prior else 0):  # its weight follows from the noise that is left without it
+        found = replace(found, noise=_noise(minimum, group))
+        minimum = minimise(found, x)
+    limit = _noise(minimum, group) / TAPE if smallest is None else smallest
+    near = np.abs(minimum.x - x).max(initial=0.0) < FAR
+    if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * limit:
+        return Fit(group, minimum, 0.0, weights)
+    found, x, limit = _by_tape(found, _noise(minimum, group), smallest)
+    _, singular, directions = np.linalg.svd(found.slopes(x)[:, group.free], full_matrices=False)
+    held = int((singular > max(limit, RELATIVE * singular.max(initial=0.0))).sum())
+    minimum = minimise(found, x, directions=directions, movable=held)
+    return Fit(group, minimum, limit, weights)
+
+
+def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Problem, np.ndarray, float]:
+    """The problem, its numbers where a TAPE holds all about the start values, and `smallest`; from a guess of the noise,
+    which is found anew from what is left.
+    """
+    group, rounds = found.group, 0
+    while True:
+        limit = noise / TAPE if smallest is None else smallest
+        tape = Taped(replace(found, noise=noise), limit)
+        minimum = gauss_newton(tape.errors, tape.slopes, group.x, group.free)
+        left, J = tape.problem.errors(minimum.x), tape.problem.slopes(minimum.x)[:, group.free]
+        squares = np.linalg.svd(J, compute_uv=False) ** 2
+        told = float(np.sum(squares / np.maximum(squares + limit**2, 1e-300)))  # how many numbers data tell
+        before, noise = noise, float(np.sqrt(left @ left / max(1.0, _count(group) - told)))
+        rounds += 1
+        if smallest is not None or abs(noise - before) <= SETTLED * before or rounds == NOISES:
+            return tape.problem, minimum.x, limit
 
 
 def not_held(fit: Fit) -> float:
@@ -81,8 +112,11 @@ def not_held(fit: Fit) -> float:
 
 def _noise(minimum: Minimum, group: Group) -> float:
     """Standard deviation of a closure error, m2."""
-    count = sum(len(c.q) for c in group.chains)
-    return float(np.sqrt(minimum.cost / max(1, count - minimum.rank)))
+    return float(np.sqrt(minimum.cost / max(1, _count(group) - minimum.rank)))
+
+
+def _count(group: Group) -> int:
+    return sum(len(c.q) for c in group.chains)
 
 
 def fit_robust(groups: Sequence[Group]) -> list[Fit]:
@@ -97,7 +131,7 @@ def fit_robust(groups: Sequence[Group]) -> list[Fit]:
             else:
                 square = np.minimum(1.0, HUBER / np.maximum(size, 1e-12))
             old, weights = weights, np.sqrt(square)
-            fits = [fit_group(replace(g, x=f.x.copy()), weights) for g, f in zip(groups, fits, strict=True)]
+            fits = [fit_group(g, weights, begin=f.x) for g, f in zip(groups, fits, strict=True)]
             if np.abs(weights - old).max() < 1e-6:
                 break
     return fits

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 ITERATIONS = 60
-NEGLIGIBLE = 1e-11  # m, of a step; rounding leaves 1e-13 of lengths of metres
+NEGLIGIBLE = 1e-9  # m, of a step: it is still taken, and what is left after it is less by far
 UNSEEN = (
     1e-18  # of the cost, what a step may still gain; with the noise of a tracker it then moves by 1e-12 m
 )
 ROUNDING = 1e-12  # of the cost
+JITTER = 1e-9  # of the cost: steps of less gain end at rounding errors, which reach 1e-10 of it with some ten poses
+SMALLEST_ERROR = 1e-14  # m, of the closure of links of metres
 SHARES = 0.5 ** np.arange(12)  # of a step that are tried
 RELATIVE = 1e-10  # of the largest singular value, below which data say nothing
 
@@ -19,8 +21,8 @@ RELATIVE = 1e-10  # of the largest singular value, below which data say nothing
 class Minimum:
     """Where Gauss-Newton ended.
 
-    x: all numbers; errors: (m,) there; slopes: (m, n) for the free numbers; rank: how many directions were moved;
-    singular: singular values of the slopes; directions: the rows that belong to them, (n, n); success: whether the
+    x: all numbers; errors: (m,) there; slopes: (m, n) for the free numbers; rank: how many directions were moved, the
+    first; singular: of the slopes along these; directions: the rows that belong to them, (n, n); success: whether the
     last step was negligible.
     """
 
@@ -46,30 +48,37 @@ def gauss_newton(
     free: np.ndarray,
     *,
     smallest: float = 0.0,
+    directions: np.ndarray | None = None,
+    movable: int | None = None,
 ) -> Minimum:
     """Minimise |errors(x)|^2 over x[free], beginning at x.
 
     Directions in which the slopes have a singular value below `smallest` (or 1e-10 of the largest) are left alone, so
     that what data do not hold stays where it began. Steps that do not make the errors smaller are halved.
+    directions (n, n), orthonormal rows: only along the first, `movable` of them, is moved at all.
     """
+    count = int(np.count_nonzero(free))
+    whole = np.eye(count) if directions is None else directions
+    inside, outside = whole[:movable], whole[len(whole) if movable is None else movable :]
     x, e, success, iteration = x.copy(), errors(x), False, 0
     cost = float(e @ e)
-    step, gain, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
+    step, gain, singular, right, J = _step(slopes(x)[:, free], e, smallest, inside)
     while iteration < ITERATIONS and np.isfinite(step).all():
         iteration += 1
         done = np.abs(step).max(initial=0.0) < NEGLIGIBLE or gain < UNSEEN * cost
         moved = _shortened(errors, x, free, step, cost)
         if moved is None:
-            success = done
+            success = done or gain < JITTER * cost or gain < (SMALLEST_ERROR * singular.max(initial=0.0)) ** 2
             break
         x, e = moved
         cost = float(e @ e)
-        step, gain, singular, directions, J = _step(slopes(x)[:, free], e, smallest)
+        step, gain, singular, right, J = _step(slopes(x)[:, free], e, smallest, inside)
         if done:
             success = True
             break
     rank = int((singular > _limit(singular, smallest)).sum())
-    return Minimum(x, e, J, singular, directions, rank, iteration, success)
+    singular = np.concatenate([singular, np.linalg.norm(J @ outside.T, axis=0)])
+    return Minimum(x, e, J, singular, np.vstack([right, outside]), rank, iteration, success)
 
 
 def _shortened(errors, x: np.ndarray, free: np.ndarray, step: np.ndarray, cost: float):
@@ -87,14 +96,15 @@ def _limit(singular: np.ndarray, smallest: float) -> float:
     return max(smallest, RELATIVE * float(singular.max(initial=0.0)))
 
 
-def _step(J: np.ndarray, e: np.ndarray, smallest: float):
-    """The step of least norm among those that make |e - J step| least, by the directions that count.
+def _step(J: np.ndarray, e: np.ndarray, smallest: float, inside: np.ndarray):
+    """The step of least norm among those that make |e - J step| least, by the directions inside that count.
 
     With it what it would gain, singular values and directions, and J.
     """
     if not np.isfinite(J).all() or not np.isfinite(e).all():
-        return np.full(J.shape[1], np.nan), 0.0, np.zeros(J.shape[1]), np.eye(J.shape[1]), J
-    left, singular, right = np.linalg.svd(J, full_matrices=False)
+        return np.full(J.shape[1], np.nan), 0.0, np.zeros(len(inside)), inside, J
+    left, singular, right = np.linalg.svd(J @ inside.T, full_matrices=False)
+    right = right @ inside
     counts = singular > _limit(singular, smallest)
     along = left[:, counts].T @ e
     return right[counts].T @ (along / singular[counts]), float(along @ along), singular, right, J

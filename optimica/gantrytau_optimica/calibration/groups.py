@@ -80,6 +80,27 @@ def problem(group: Group, weights: Sequence[np.ndarray] | None = None, noise: fl
     return Problem(group, condensed, noise)
 
 
-def minimise(group: Group, found: Problem, smallest: float = 0.0) -> Minimum:
-    """Gauss-Newton from the start values of the group."""
-    return gauss_newton(found.errors, found.slopes, group.x, group.free, smallest=smallest)
+def minimise(
+    found: Problem, x: np.ndarray, *, directions: np.ndarray | None = None, movable: int | None = None
+) -> Minimum:
+    """Gauss-Newton from x; directions, movable: along which it moves, as `gauss_newton` says."""
+    return gauss_newton(
+        found.errors, found.slopes, x, found.group.free, directions=directions, movable=movable
+    )
+
+
+@dataclass(frozen=True)
+class Taped:
+    """The squares of a problem, and those of all its free numbers about the start values, by a weight in m2 for each m."""
+
+    problem: Problem
+    weight: float
+
+    def errors(self, x: np.ndarray) -> np.ndarray:
+        """All rows."""
+        free = self.problem.group.free
+        return np.concatenate([self.problem.errors(x), self.weight * (x - self.problem.group.x)[free]])
+
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Their derivatives by all of x."""
+        return np.vstack([self.problem.slopes(x), self.weight * np.eye(len(x))[self.problem.group.free]])

@@ -192,9 +192,22 @@ def _in_doubt(found: Calibration) -> Iterator[Finding]:
         advice = (
             "turn the plate more" if found.plate_turns else "measure more poses, spread over the workspace"
         )
-        names = ", ".join(found.undetermined)
-        words = f"data do not hold {names}; they stay near their start values; {advice}, or give a prior"
+        names = ", ".join(_whole_vectors(found.undetermined))
+        words = (
+            f"data do not hold {names} (rank {found.rank} of {len(found.names)}); they stay near their start values; "
+            f"{advice}, or give a prior"
+        )
         yield Finding("undetermined", found.rows, words)
+
+
+def _whole_vectors(names: Sequence[str]) -> list[str]:
+    """Names of numbers, the three of a vector by its name."""
+    found = []
+    for name in names:
+        vector = name.rpartition("[")[0]
+        whole = name.endswith("]") and all(f"{vector}[{k}]" in names for k in range(3))
+        found.append(vector if whole else name)
+    return list(dict.fromkeys(found))
 
 
 def _mistaken(found: Calibration, seen: Suspicion) -> list[Finding]:

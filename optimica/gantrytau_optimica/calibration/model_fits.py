@@ -95,7 +95,7 @@ def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
     """
     few = thinned(len(link.chain.q))
     trials = on_rail(_with_poses(link, few), rail)
-    fits = [fit_group(grouped([trial])[0], truncated=truncated) for trial in trials]
+    fits = [fit_group(grouped([trial])[0], smallest=truncated) for trial in trials]
     best = int(np.argmin([f.minimum.cost if np.isfinite(f.minimum.cost) else np.inf for f in fits]))
     if len(few) == len(link.chain.q):
         return fits[best]

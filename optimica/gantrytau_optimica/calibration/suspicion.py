@@ -80,7 +80,7 @@ def suspicion(found: "Calibration") -> Suspicion:
         weights = 1.0 - np.isin(found.rows, bad)
         if weights.sum() < KEPT * len(weights):
             break
-        fits = [fit_group(fit.group.started(fit.x), weights) for fit in fits]
+        fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
         sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
     links = rod_links(fits, found.measurements.rails)
 

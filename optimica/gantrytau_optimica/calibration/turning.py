@@ -104,6 +104,11 @@ class TurningCalibration(Calibration):
         return tuple(found)
 
     @property
+    def rank(self) -> int:
+        """How many combinations of the identified numbers data hold."""
+        return sum(fit.rank for fit in self.arm_fits)
+
+    @property
     def success(self) -> bool:
         """Whether the last step of every arm was negligible."""
         return all(fit.success for fit in self.arm_fits)
