@@ -1,7 +1,8 @@
 """Obstacles around a robot, and how far its links and plate are from them.
 
 Links and plate are capsules: all points within a radius of a segment. Obstacles are convex, so the signed distance along
-a segment is a convex function of the place on it, and its minimum is found by golden section for any of them.
+a segment is a convex function of the place on it, and its minimum is found by golden section for any of them. Boxes,
+cylinders and capsules know most of these minima in closed form.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from gantrytau.kinematics.poses import floats, real, told
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _SECTIONS = 30  # of a segment, which leave 0.5e-6 of it
 _LEAST = 1e-12  # of a length that is divided by
+_TOUCH = 1e-9  # m, below which a segment counts as touching, and closed forms as exact
 _REMEDY = "give numbers in m, in the axes of the base"
 
 
@@ -53,6 +55,48 @@ class Box:
         outside = np.maximum(beyond, 0.0)
         return np.sqrt((outside**2).sum(-1)) + np.minimum(beyond.max(-1), 0.0)
 
+    def from_segment(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """See `segment_distance`: the slope of the squared distance rises piecewise linearly, and its zero is known."""
+        middle, half = (self.high + self.low) / 2, (self.high - self.low) / 2
+        at, way = (start - middle) @ self.R, (end - start) @ self.R
+        with np.errstate(divide="ignore", invalid="ignore"):
+            passed = np.stack([(sign * half - at) / way for sign in (1, -1)])
+        passed = np.where(way == 0, 0.0, np.clip(passed, 0.0, 1.0))  # along a face it is never passed
+        ends = np.zeros((2, *way.shape[:-1]))
+        ends[1] = 1.0
+        place = np.concatenate([*np.moveaxis(passed, -1, 0), ends])
+        slope = np.zeros_like(place)
+        for k in range(3):
+            point = at[..., k] + place * way[..., k]
+            slope += (point - np.clip(point, -half[k], half[k])) * way[..., k]
+        falls = slope < 0
+        t0, t1 = np.where(falls, place, 0.0).max(axis=0), np.where(falls, 1.0, place).min(axis=0)
+        g0, g1 = np.where(falls, slope, -np.inf).max(axis=0), np.where(falls, np.inf, slope).min(axis=0)
+        with np.errstate(invalid="ignore"):
+            between = t0 + (t1 - t0) * g0 / (g0 - g1)
+        least = np.where(np.isfinite(g0) & np.isfinite(g1), between, np.where(g0 < 0, t0, t1))
+        nearest = at + least[..., None] * way
+        found = np.linalg.norm(nearest - np.clip(nearest, -half, half), axis=-1)
+        within = found < _TOUCH
+        if within.any():
+            found[within] = _deepest(at[within], way[within], half)
+        return found
+
+
+def _deepest(at: np.ndarray, way: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Least of max(|x| - half) for x = at + t way, (n, 3), t from 0 to 1: where two of these lines meet, or at an end."""
+    value, slope = (
+        np.concatenate([sign * x.T - shift for sign in (1, -1)])
+        for x, shift in ((at, half[:, None]), (way, 0.0))
+    )
+    first, second = np.triu_indices(6, 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place = (value[second] - value[first]) / (slope[first] - slope[second])
+    ends = np.zeros((2, len(at)))
+    ends[1] = 1.0
+    place = np.concatenate([np.clip(np.nan_to_num(place), 0.0, 1.0), ends])
+    return np.max([value[k] + place * slope[k] for k in range(6)], axis=0).min(axis=0)
+
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
@@ -80,6 +124,12 @@ class Cylinder:
         outside = np.maximum(beyond, 0.0)
         return np.sqrt((outside**2).sum(0)) + np.minimum(beyond.max(0), 0.0)
 
+    def from_segment(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """See `segment_distance`: the capsule around the cylinder is no farther, and as near beside its round face."""
+        place, apart = _nearest(start, end, self.start, self.end)
+        found = self.distance(start + place[..., None] * (end - start))
+        return _searched(self, start, end, found, found > apart - self.radius + _TOUCH)
+
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
@@ -98,6 +148,10 @@ class Capsule:
         gap = points - self.start
         place = np.clip((gap @ axis) / max(axis @ axis, _LEAST), 0.0, 1.0)
         return np.linalg.norm(gap - place[..., None] * axis, axis=-1) - self.radius
+
+    def from_segment(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """See `segment_distance`."""
+        return between_segments(start, end, self.start, self.end) - self.radius
 
 
 def _hold_segment(body: Any, kind: str) -> None:
@@ -119,6 +173,23 @@ def segment_distance(obstacle: Obstacle, start: np.ndarray, end: np.ndarray) -> 
 
     It is too large by no more than 0.5e-6 of the length of a segment. NaN ends give NaN.
     """
+    if not isinstance(obstacle, (Box, Cylinder, Capsule)):
+        return _golden_section(obstacle, start, end)
+    start, end = np.broadcast_arrays(start, end)
+    found = obstacle.from_segment(start.reshape(-1, 3), end.reshape(-1, 3))
+    return found.reshape(start.shape[:-1])[()]
+
+
+def _searched(
+    obstacle: Obstacle, start: np.ndarray, end: np.ndarray, found: np.ndarray, unsure: np.ndarray
+) -> np.ndarray:
+    """Distances (n,) of n segments, those that are not sure by search."""
+    if unsure.any():
+        found[unsure] = _golden_section(obstacle, start[unsure], end[unsure])
+    return found
+
+
+def _golden_section(obstacle: Obstacle, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     way = end - start
 
     def at(place: np.ndarray) -> np.ndarray:
@@ -141,6 +212,11 @@ def segment_distance(obstacle: Obstacle, start: np.ndarray, end: np.ndarray) -> 
 
 def between_segments(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Distance of segments from a to b and from c to d, all (..., 3): (...) in m."""
+    return _nearest(a, b, c, d)[1]
+
+
+def _nearest(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of segments from a to b and from c to d: the place on the first, 0 to 1, where they are nearest, and how far apart."""
     first, second, gap = b - a, d - c, a - c
     aa, bb = np.maximum((first**2).sum(-1), _LEAST), np.maximum((second**2).sum(-1), _LEAST)
     ab, ag, bg = (first * second).sum(-1), (first * gap).sum(-1), (second * gap).sum(-1)
@@ -152,4 +228,4 @@ def between_segments(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray)
     on_second = np.clip((ab * on_first + bg) / bb, 0.0, 1.0)
     on_first = np.clip((ab * on_second - ag) / aa, 0.0, 1.0)
     apart = gap + on_first[..., None] * first - on_second[..., None] * second
-    return np.linalg.norm(apart, axis=-1)
+    return on_first, np.linalg.norm(apart, axis=-1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
+from gantrytau.kinematics import obstacles
 from gantrytau.kinematics.obstacles import Box, Capsule, Cylinder, between_segments, segment_distance
 
 WORD: Any = "thick"  # where a number is asked for
@@ -42,6 +43,39 @@ def test_the_distance_of_a_segment_is_the_least_of_its_points(body):
     found = segment_distance(body, start, end)
     assert (found <= sampled + 0.5e-6 * np.linalg.norm(end - start, axis=-1)).all()
     assert found == pytest.approx(sampled, abs=1e-3)  # steps between the samples are up to 1.7 mm
+
+
+class Hidden:
+    """A body of which nothing is known but its distance."""
+
+    def __init__(self, body):
+        self.distance = body.distance
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: type(body).__name__)
+@pytest.mark.parametrize("size", [0.3, 2.0])
+def test_closed_forms_are_the_search(body, size):
+    # segments within the body, through it and beside it, some along its axes, some of no length
+    start, end = np.random.default_rng(6).uniform(-size, size, (2, 4000, 3))
+    end[::7], end[1::7, 0], end[2::7, :2] = start[::7], start[1::7, 0], start[2::7, :2]
+    searched = segment_distance(Hidden(body), start, end)
+    found = segment_distance(body, start, end)
+    assert (found <= searched + obstacles._TOUCH).all()
+    assert (searched - found <= 1e-6 * np.linalg.norm(end - start, axis=1) + 1e-12).all()
+    if size == 0.3:
+        assert 0.2 < (found < 0).mean() < 0.9
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: type(body).__name__)
+def test_segments_of_any_shape(body):
+    start, end = np.random.default_rng(7).normal(size=(2, 3, 2, 3))
+    every = segment_distance(body, start, end)
+    assert every.shape == (3, 2)
+    assert segment_distance(body, start[1, 1], end[1, 1]) == pytest.approx(every[1, 1], abs=1e-12)
+    assert segment_distance(body, start[0, 0], end).shape == (3, 2)  # from one point to many
+    assert segment_distance(body, start[:0], end[:0]).shape == (0, 2)
+    end[0, 1] = np.nan
+    np.testing.assert_array_equal(np.isnan(segment_distance(body, start, end)), np.isnan(end[..., 0]))
 
 
 def test_segments_among_each_other_are_capsules_as_obstacles():
