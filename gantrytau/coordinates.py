@@ -64,8 +64,12 @@ class Coordinates:
         """Whether there are signals that are known interval by interval."""
         return bool(self.sampled or self.held)
 
-    def integrator(self, count: int, tolerance: float, *, compiled: bool = False) -> ca.Function:
+    def integrator(
+        self, count: int, tolerance: float, *, size: float = 1.0, compiled: bool = False
+    ) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
+
+        size: of algebraics, which need not be more exact than `tolerance` of it.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -96,6 +100,8 @@ class Coordinates:
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
             options["linear_solver"] = "csparse"
+            if size > 1:
+                options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)

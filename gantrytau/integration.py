@@ -57,6 +57,7 @@ class Run:
         self.done = 0
         self.seen = -1  # the last interval of the mesh that was looked at closely
         self.integrators: dict[int, ca.Function] = {}
+        self.size = 1.0  # of algebraics, below which their errors do not count
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics and held variables at the output points that were reached."""
@@ -76,6 +77,8 @@ class Run:
                 try:
                     self._advance(count)
                 except RuntimeError as error:
+                    if "IDACalcIC" in str(error) and self._rounded():
+                        continue
                     if count == 1:
                         raise self._stopped(error) from error
                     size = 1
@@ -129,8 +132,6 @@ class Run:
 
     def _advance(self, count: int) -> None:
         here = self.done
-        if count not in self.integrators:
-            self.integrators[count] = self.coordinates.integrator(count, self.tolerance)
         stepwise = self.coordinates.stepwise
         self.held[here + 1 : here + count + 1] = self.held[here]
         found = self._integrate(
@@ -240,8 +241,6 @@ class Run:
     def _step(self, point: Point, step: float) -> Point:
         """The point a step later, in s."""
         x, z, t, inputs = point
-        if 1 not in self.integrators:
-            self.integrators[1] = self.coordinates.integrator(1, self.tolerance)
         half = len(self.samples)
         found = self._integrate(
             1,
@@ -258,7 +257,19 @@ class Run:
         near = self.coordinates.project(near[None], when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
+    def _rounded(self) -> bool:
+        """Whether small algebraics may have the rounding errors of large ones, which they did not so far.
+
+        What `settle` found solves the equations as well as rounding allows: where large forces decide a small one, the
+        integrator cannot make it better, gives up at once, and is asked for less.
+        """
+        before, self.size = self.size, float(np.abs(self.z[self.done]).max(initial=1.0))
+        self.integrators.clear()
+        return self.size > before
+
     def _integrate(self, count: int, **arguments: Any) -> dict[str, ca.DM]:
         """One call of an integrator, which else writes its complaints to the screen."""
+        if count not in self.integrators:
+            self.integrators[count] = self.coordinates.integrator(count, self.tolerance, size=self.size)
         with contextlib.redirect_stderr(io.StringIO()):
             return self.integrators[count](**arguments)
