@@ -42,6 +42,26 @@ def test_positions_only_and_guideways(tmp_path):
     assert "3 guideways" in repr(read)
 
 
+def test_columns_are_known_by_their_names(tmp_path):
+    path = tmp_path / "m.csv"
+    text = "number,y,x,z,q2,q1,remark,measured\n4,5,4,6,2,1,warm,1\n9,0,0,0,0,0,passed,0\n\n7,50,40,60,20,10,,1\n"
+    path.write_text(text, encoding="utf-8")
+    read = Measurements.read(path)
+    assert read.q.tolist() == [[1, 2], [10, 20]]
+    assert read.r.tolist() == [[4, 5, 6], [40, 50, 60]]
+    assert read.numbers.tolist() == [4, 7]  # type: ignore[union-attr]
+    assert read.lines.tolist() == [2, 5]  # type: ignore[union-attr]
+    assert read.select([1]).numbers.tolist() == [7]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_spreadsheets_with_decimal_commas(tmp_path, separator):
+    path = write(tmp_path / "m.csv", "q1,q2,q3,x,y,z", np.hstack([Q, T]))
+    text = path.read_text(encoding="utf-8").replace(",", separator).replace(".", ",")
+    (tmp_path / "n.csv").write_text("\ufeff" + text, encoding="utf-8")
+    assert np.array_equal(Measurements.read(tmp_path / "n.csv").r, Measurements.read(path).r)
+
+
 def test_arrays_cannot_be_changed_later():
     q = Q.copy()
     measurements = Measurements(q, T)
@@ -61,10 +81,15 @@ def test_empty_cells_are_nan(tmp_path):
     ("text", "words"),
     [
         ("", "empty file"),
-        ("a,b,c\n1,2,3\n", "header a,b,c"),
-        ("q1,q2,q3,y,x,z\n1,2,3,4,5,6\n", "header q1,q2,q3,y,x,z"),
+        ("a,b,c\n1,2,3\n", "header a,b,c: found no column q1, x, y, z"),
+        ("q1,q3,x,y,z\n1,2,3,4,5\n", "found no column q2"),
+        ("q1,q2,q3,x,y,Z\n1,2,3,4,5,6\n", "found no column z"),
+        ("q1,q2,q3,x,y,z,qw\n1,2,3,4,5,6,7\n", "found no column qx, qy, qz"),
+        ("q1,q2,q3,x,y,z,x\n1,2,3,4,5,6,7\n", "found several columns x"),
+        ("q1,q2,q3,x,y,z\n1,0,2,0,3,0,4,0,5,0,6,0\n", "line 2 has 12 cells.*separate cells by semicolons"),
+        ("q1;q2;q3;x;y;z\n1;2;3;4;5,5;1.234,5\n", "line 2, column z: found '1.234,5'.*between thousands"),
         ("q1,q2,q3,x,y,z\n1,2,3,4,5\n", "line 2 has 5 cells"),
-        ("q1,q2,q3,x,y,z\n1,2,3,4,5,six\n", "line 2"),
+        ("q1,q2,q3,x,y,z\n1,2,3,4,5,six\n", "line 2, column z: found 'six'"),
     ],
 )
 def test_files_that_are_no_measurements(tmp_path, text, words):

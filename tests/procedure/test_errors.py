@@ -106,8 +106,14 @@ def test_plans_that_cannot_be_loaded(tmp_path):
     with pytest.raises(ModelError, match=r"that is no JSON"):
         load_plan(tmp_path)
     file.write_text("[]", encoding="utf-8")
-    with pytest.raises(ModelError, match=r"that is no calibration plan of format 1"):
+    with pytest.raises(ModelError, match=r"that is no calibration plan, expected one"):
         load_plan(tmp_path)
-    file.write_text(json.dumps({"kind": "gantrytau calibration plan", "format": 1}), encoding="utf-8")
-    with pytest.raises(ModelError, match=r"with a part missing .*plan again"):
+    for older in ({"format": 1}, {}):
+        file.write_text(json.dumps({"kind": "gantrytau calibration plan", **older}), encoding="utf-8")
+        with pytest.raises(
+            ModelError, match=r"of format (1|without a number), of another version .*plan again"
+        ):
+            load_plan(file)
+    file.write_text(json.dumps({"kind": "gantrytau calibration plan", "format": 2}), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"without 'robot', expected a whole plan; plan again"):
         load_plan(file)

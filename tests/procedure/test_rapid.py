@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_optimica import plan_calibration
+from gantrytau_optimica import Measurements, load_plan, plan_calibration
 from tests.procedure import cells
 
+DONE = 'TPReadFK keyCalibration,"Measure {}, {} of {}",stEmpty,stEmpty,stEmpty,stEmpty,"Done";'
 TARGET = re.compile(r"CONST jointtarget (\w+):=\[\[([^\]]*)\],\[([^\]]*)\]\];")
 MOVE = re.compile(r"MoveAbsJ (\w+),(\w+),fine,(\w+);")
 
@@ -56,7 +57,50 @@ def test_it_settles_and_triggers_at_measured_poses_only(plan):
         assert part[0] == r"WaitTime \InPos,0.5;"
         assert part[1].startswith('TPWrite "Measure p')
         assert part[2:] == [r"PulseDO \PLength:=0.2,doMeasure;", "WaitTime 1.25;"]
-    assert "PulseDO" not in plan.program()
+    assert "PulseDO" not in plan.program(trigger="TPWrite")
+
+
+def test_without_a_trigger_it_waits_for_who_measures(plan):
+    text = plan.program()
+    _, body = read(text)
+    joined = "\n".join(body).replace(",\n", ",").splitlines()
+    asked = [line.replace('", stEmpty', '",stEmpty') for line in joined if line.startswith("TPReadFK")]
+    numbers = np.flatnonzero(plan.measured) + 1
+    assert asked == [
+        DONE.format(f"p{number:03d}", k, len(numbers)).replace(", ", ",").replace("Measure ", "Measure ")
+        for k, number in enumerate(numbers, 1)
+    ]
+    assert "VAR num keyCalibration;" in text
+    assert not any(line.startswith(("TPWrite", "PulseDO")) for line in body)
+    # one rest before each question and no other: the key says when to go on
+    assert sum(line.startswith("WaitTime") for line in body) == len(numbers)
+    assert "VAR num" not in plan.program(trigger="TPWrite")
+
+
+def test_the_program_of_the_rest_keeps_the_numbers_of_the_plan(plan, tmp_path):
+    numbers = np.flatnonzero(plan.measured) + 1
+    left = numbers[[1, 4, 7]]
+    done = ~np.isin(np.arange(1, len(plan.q) + 1), left) & plan.measured
+    rest = plan.remaining(Measurements(plan.q[done], plan.r[done]))
+    targets, body = read(rest.program(name="Rest"))
+    asked = {int(line[line.index("Measure p") + 9 :][:3]) for line in body if "Measure p" in line}
+    assert asked == set(left.tolist())
+    for number in left:
+        np.testing.assert_allclose(
+            targets[f"p{number:03d}"][0][:3], plan.q[number - 1] * 1e3, atol=0.51e-4, rtol=0
+        )
+    moves = [MOVE.fullmatch(line)[1] for line in body if line.startswith("MoveAbsJ")]
+    assert set(moves) == set(targets)
+    for name in set(moves) - {"pHome"}:
+        np.testing.assert_allclose(
+            targets[name][0][:3], plan.q[int(re.sub(r"\D", "", name)) - 1] * 1e3, atol=0.51e-4, rtol=0
+        )
+    rest.write(tmp_path, name="Rest")
+    lines = (tmp_path / "measurements-template.csv").read_text().splitlines()
+    assert lines[0] == "number,q1,q2,q3,x,y,z"
+    assert sorted(int(line.split(",")[0]) for line in lines[1:]) == left.tolist()
+    assert all(line.endswith(",,,") for line in lines[1:])
+    assert load_plan(tmp_path).numbers.tolist() == rest.numbers.tolist()
 
 
 def test_lines_and_names_are_those_that_rapid_takes(plan):

@@ -2,7 +2,8 @@
 
 import copy
 import csv
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -15,6 +16,8 @@ from gantrytau_optimica.calibration.findings import Finding
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
+_ACTUATOR = re.compile(r"q[1-9]\d*")
+_SEPARATORS = (";", "\t", ",")
 
 
 class Measurements:
@@ -22,12 +25,15 @@ class Measurements:
 
     q: actuator positions (N, n), carts in m first, then angles in rad; r: tool positions (N, 3) in m; R: orientations of
     the plate (N, 3, 3), world = R @ plate, or unit quaternions (N, 4), scalar first, or None; rails: for each guideway
-    (k, 4) the columns q, x, y, z of points measured along it, k from 2, in any frame, or None.
+    (k, 4) the columns q, x, y, z of points measured along it, k from 2, in any frame, or None. numbers: of the poses in
+    a plan (N,), or None; lines: of the rows in the file that they were read from (N,), or None.
     Arrays are copied and cannot be written to. Raises ModelError for shapes that do not fit; what is doubtful about the
     numbers stands in `findings`.
     """
 
-    def __init__(self, q: Any, r: Any, R: Any = None, rails: Sequence[Any] | None = None):
+    def __init__(
+        self, q: Any, r: Any, R: Any = None, rails: Sequence[Any] | None = None, *, numbers: Any = None
+    ):
         self.q = _numbers("q", q)
         self.r = _numbers("r", r)
         if self.q.ndim != 2 or self.r.shape != (len(self.q), 3):
@@ -37,28 +43,35 @@ class Measurements:
             )
         self.R = None if R is None else _orientations(R, len(self.q))
         self.rails = None if rails is None else tuple(_rail(k, rail) for k, rail in enumerate(rails))
+        self.numbers = None if numbers is None else np.array(numbers, dtype=int).reshape(len(self.q))
+        self.lines: np.ndarray | None = None
         for array in (self.q, self.r, self.R, *(self.rails or ())):
             if array is not None:
                 array.flags.writeable = False
 
     @classmethod
     def read(cls, path: str | Path, rails: Sequence[Any] | None = None) -> Self:
-        """Measurements from a CSV file with the header q1..qn,x,y,z[,qw,qx,qy,qz], in m and rad.
+        """Measurements from a CSV file with the columns q1..qn, x, y, z and perhaps qw, qx, qy, qz, in m and rad.
 
-        rails: as above, or paths of CSV files with the header q,x,y,z, one for each guideway. Empty cells count as NaN.
-        Raises ModelError for another header or cells that are no numbers, with the line.
+        Columns are known by the names in the first line, in any order. `number` is that of a pose in a plan; rows whose
+        `measured` is 0 are left out; columns with other names are not read. Cells are separated by commas, or by
+        semicolons or tabs: then decimals may have a comma. Empty cells count as NaN. rails: as above, or paths of CSV
+        files with the columns q, x, y, z, one for each guideway.
+        Raises ModelError for columns that are missing and cells that are no numbers, with the line.
         """
-        header, table = _table(Path(path))
-        n = len(header) - 3 - 4 * (header[-4:] == list(_QUATERNION))
-        expected = [f"q{k + 1}" for k in range(n)] + list(_POSITION)
-        if n < 1 or header[: n + 3] != expected or len(header) not in (n + 3, n + 7):
-            raise ModelError(
-                f"{path}: found the header {','.join(header)}, expected q1,q2,q3,x,y,z as many q as actuators, then "
-                "qw,qx,qy,qz if orientations were measured; write it as the first line"
-            )
-        q, r, R = table[:, :n], table[:, n : n + 3], table[:, n + 3 :] if len(header) > n + 3 else None
+        columns, lines = _table(Path(path), _needed)
+        if "measured" in columns:
+            chosen = columns["measured"] != 0
+            columns, lines = {name: column[chosen] for name, column in columns.items()}, lines[chosen]
+        joints = sorted(
+            (name for name in columns if _ACTUATOR.fullmatch(name)), key=lambda name: int(name[1:])
+        )
+        q, r = (np.column_stack([columns[name] for name in names]) for names in (joints, _POSITION))
+        R = np.column_stack([columns[name] for name in _QUATERNION]) if "qw" in columns else None
         read = [_rail_file(Path(r)) if isinstance(r, (str, Path)) else r for r in rails] if rails else None
-        return cls(q, r, R, read)
+        found = cls(q, r, R, read, numbers=_whole(columns.get("number")))
+        found.lines = lines
+        return found
 
     def __len__(self) -> int:
         return len(self.q)
@@ -92,6 +105,8 @@ class Measurements:
         found = copy.copy(self)
         found.__dict__ = {"q": self.q[rows], "r": self.r[rows], "R": None if self.R is None else self.R[rows]}
         found.rails = self.rails
+        found.numbers = None if self.numbers is None else self.numbers[rows]
+        found.lines = None if self.lines is None else self.lines[rows]
         return found
 
 
@@ -152,31 +167,89 @@ def _rail(k: int, rail: Any) -> np.ndarray:
     return found
 
 
-def _table(path: Path) -> tuple[list[str], np.ndarray]:
-    """Header and numbers of a CSV file; empty cells are NaN."""
+def _needed(names: Sequence[str]) -> str:
+    """What is wrong with the columns of measurements, in words; empty for nothing."""
+    joints = [name for name in names if _ACTUATOR.fullmatch(name)]
+    expected = [f"q{k + 1}" for k in range(max(1, len(joints)))] + list(_POSITION)
+    if any(name in names for name in _QUATERNION):
+        expected += _QUATERNION
+    missing = [name for name in expected if name not in names]
+    if not missing:
+        return ""
+    return (
+        f"found no column {', '.join(missing)}, expected q1,q2,q3,x,y,z, as many q as actuators, and qw,qx,qy,qz if "
+        "orientations were measured; write these names in the first line"
+    )
+
+
+def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns of a CSV file by the names that are read, empty cells NaN, and the line of each row.
+
+    wrong: says what is wrong with the names of columns.
+    """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [(k, row) for k, row in enumerate(csv.reader(file), 1) if row and "".join(row).strip()]
+            first = file.readline()
+            separator = next((one for one in _SEPARATORS if one in first), ",")
+            file.seek(0)
+            reader = csv.reader(file, delimiter=separator)
+            rows = [(reader.line_num, row) for row in reader if "".join(row).strip()]
     except OSError as error:
         raise ModelError(f"{path}: found no file to read ({error.strerror}), expected a CSV file") from None
-    if not lines:
+    if not rows:
         raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
-    header = [name.strip() for name in lines[0][1]]
-    numbers = []
-    for k, row in lines[1:]:
-        if len(row) != len(header):
-            raise ModelError(f"{path}: line {k} has {len(row)} cells, expected {len(header)} as the header")
+    header = [name.strip() for name in rows[0][1]]
+    if words := _twice(header) or wrong(header):
+        raise ModelError(f"{path}: found the header {','.join(header)}: {words}")
+    numbers = [_cells(path, line, row, header, separator) for line, row in rows[1:]]
+    table = np.array(numbers, dtype=float).reshape(len(numbers), len(header))
+    return dict(zip(header, table.T, strict=True)), np.array([line for line, _ in rows[1:]], dtype=int)
+
+
+def _twice(header: Sequence[str]) -> str:
+    twice = sorted({name for name in header if name and header.count(name) > 1})
+    return f"found several columns {', '.join(twice)}, expected one of each name" if twice else ""
+
+
+def _cells(path: Path, line: int, row: Sequence[str], header: Sequence[str], separator: str) -> list[float]:
+    """The numbers of a line; of columns that are not read NaN."""
+    if len(row) != len(header):
+        commas = separator == "," and len(row) > len(header)
+        remedy = "; where decimals have commas, separate cells by semicolons" if commas else ""
+        raise ModelError(
+            f"{path}: line {line} has {len(row)} cells, expected {len(header)} as the header{remedy}"
+        )
+    found = []
+    for name, cell in zip(header, row, strict=True):
+        text = cell.strip() if _read(name) else ""
         try:
-            numbers.append([float(cell) if cell.strip() else np.nan for cell in row])
-        except ValueError as error:
+            found.append(float(text if separator == "," else text.replace(",", ".")) if text else np.nan)
+        except ValueError:
+            decimals = "" if separator == "," else ", or a comma"
             raise ModelError(
-                f"{path}: line {k}: {error}; expected numbers, with a point before decimals"
+                f"{path}: line {line}, column {name}: found {text!r}, expected a number, with a point{decimals} before "
+                "decimals and nothing between thousands"
             ) from None
-    return header, np.array(numbers).reshape(len(numbers), len(header))
+    return found
+
+
+def _read(name: str) -> bool:
+    """Whether a column of this name is read."""
+    return bool(_ACTUATOR.fullmatch(name)) or name in (*_POSITION, *_QUATERNION, "q", "number", "measured")
+
+
+def _whole(numbers: np.ndarray | None) -> np.ndarray | None:
+    """Numbers of poses, -1 for none."""
+    if numbers is None:
+        return None
+    whole = np.isfinite(numbers) & (numbers == np.round(numbers)) & (np.abs(numbers) < 1e9)
+    return np.where(whole, numbers, -1).astype(int)
 
 
 def _rail_file(path: Path) -> np.ndarray:
-    header, table = _table(path)
-    if header != ["q", *_POSITION]:
-        raise ModelError(f"{path}: found the header {','.join(header)}, expected q,x,y,z of a guideway")
-    return table
+    def wrong(names: Sequence[str]) -> str:
+        missing = [name for name in ("q", *_POSITION) if name not in names]
+        return f"found no column {', '.join(missing)}, expected q,x,y,z of a guideway" if missing else ""
+
+    columns, _ = _table(path, wrong)
+    return np.column_stack([columns[name] for name in ("q", *_POSITION)])

@@ -15,13 +15,15 @@ from gantrytau.result_files import replacing
 from gantrytau_optimica.procedure.choice import CRITERION, Choice
 from gantrytau_optimica.procedure.fleet import build_fleet
 from gantrytau_optimica.procedure.plan import CalibrationPlan, Cell
+from gantrytau_optimica.procedure.rapid import OPERATOR
 from gantrytau_optimica.procedure.settling import SettledWorkspace
 from gantrytau_optimica.procedure.trials import Trials
 from gantrytau_optimica.procedure.verdict import Verdict
 
 KIND = "gantrytau calibration plan"
-FORMAT = 1
+FORMAT = 2
 Record = TypeVar("Record")
+TEMPLATE = "measurements-template.csv"
 PLACES = ("r", "R", "q")  # of the workspace, which JSON leaves out
 
 
@@ -39,11 +41,11 @@ def write_plan(plan: CalibrationPlan, folder: Path, program: dict[str, Any]) -> 
         picture = folder / "workspace.png"
         draw_plan(plan, picture)
     name = f"{program.get('name', 'Calibration')}.mod"
+    page = html_page(plan, picture, name, folder=folder, trigger=program.get("trigger", OPERATOR))
     _write(folder / "poses.csv", lambda path: _write_poses(plan, path))
+    _write(folder / TEMPLATE, lambda path: _write_template(plan, path))
     _write(folder / name, lambda path: path.write_text(text, encoding="ascii"))
-    _write(
-        folder / "plan.html", lambda path: path.write_text(html_page(plan, picture, name), encoding="utf-8")
-    )
+    _write(folder / "plan.html", lambda path: path.write_text(page, encoding="utf-8"))
     _write(
         folder / "plan.json",
         lambda path: path.write_text(json.dumps(plan_numbers(plan), indent=1), encoding="utf-8"),
@@ -69,8 +71,19 @@ def _write_poses(plan: CalibrationPlan, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["number", *(f"q{k + 1}" for k in range(plan.q.shape[1])), "x", "y", "z", "measured"])
-        for k, (q, r, measured) in enumerate(zip(plan.q, plan.r, plan.measured, strict=True)):
-            writer.writerow([k + 1, *(f"{x:.9g}" for x in q), *(f"{x:.6f}" for x in r), int(measured)])
+        for number, q, r, measured in zip(plan.numbers, plan.q, plan.r, plan.measured, strict=True):
+            writer.writerow([number, *(f"{x:.9g}" for x in q), *(f"{x:.6f}" for x in r), int(measured)])
+
+
+def _write_template(plan: CalibrationPlan, path: Path) -> None:
+    """The poses to measure, with empty cells for what is measured."""
+    filled = [f"q{k + 1}" for k in range(plan.q.shape[1])]
+    empty = ["x", "y", "z"] + ([] if plan.kind == "three links" else ["qw", "qx", "qy", "qz"])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["number", *filled, *empty])
+        for k in np.flatnonzero(plan.measured):
+            writer.writerow([plan.numbers[k], *(f"{x:.9g}" for x in plan.q[k]), *[""] * len(empty)])
 
 
 def plan_numbers(plan: CalibrationPlan) -> dict[str, Any]:
@@ -91,7 +104,7 @@ def plan_numbers(plan: CalibrationPlan) -> dict[str, Any]:
         "workspace": _numbers(plan.workspace, without=PLACES),
         "prediction": _numbers(plan.prediction) | {"error": plan.prediction.error},
         "trials": _numbers(plan.trials),
-        "program": {name: _plain(getattr(plan, name)) for name in ("q", "r", "R", "measured")},
+        "program": {name: _plain(getattr(plan, name)) for name in ("q", "r", "R", "measured", "numbers")},
         "lost": _plain(plan.lost),
         "unseen": _plain(plan.unseen),
     }
@@ -136,15 +149,22 @@ def load_plan(
         raise ModelError(
             f"load_plan: found '{path}' that is no JSON ({error}), expected a plan; write it anew"
         ) from None
-    if not isinstance(numbers, dict) or numbers.get("kind") != KIND or numbers.get("format") != FORMAT:
+    if not isinstance(numbers, dict) or numbers.get("kind") != KIND:
+        raise ModelError(f"load_plan: found '{path}' that is no calibration plan, expected one; plan again")
+    if numbers.get("format") != FORMAT:
         raise ModelError(
-            f"load_plan: found '{path}' that is no calibration plan of format {FORMAT}, expected one; plan again"
+            f"load_plan: found '{path}' of format {numbers.get('format', 'without a number')}, of another version of "
+            f"gantrytau, expected format {FORMAT}; plan again, which goes on from the stages that are still right"
         )
     try:
         plan = _plan_of(numbers)
-    except (KeyError, TypeError, ValueError) as error:
+    except KeyError as error:
         raise ModelError(
-            f"load_plan: found '{path}' with a part missing ({error!r}), expected a whole plan; plan again"
+            f"load_plan: found '{path}' without {error.args[0]!r}, expected a whole plan; plan again"
+        ) from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ModelError(
+            f"load_plan: found '{path}' with something else than a plan has ({error}), expected a whole plan; plan again"
         ) from None
     return plan if robot is None or limits is None else _with_cell(plan, robot, limits)
 
@@ -170,6 +190,7 @@ def _plan_of(numbers: dict[str, Any]) -> CalibrationPlan:
         verdict=_record(Verdict, numbers["verdict"]),
         lost=np.array(numbers["lost"], dtype=float).reshape(-1, 3),
         unseen=np.array(numbers["unseen"], dtype=float).reshape(-1, 3),
+        numbers=np.array(program["numbers"], dtype=int),
     )
 
 

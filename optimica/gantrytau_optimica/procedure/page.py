@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau_optimica.procedure.choice import CRITERION
+from gantrytau_optimica.procedure.rapid import OPERATOR
 from gantrytau_optimica.procedure.verdict import um
 
 if TYPE_CHECKING:
     from gantrytau_optimica.procedure.plan import CalibrationPlan
 
+DOUBT, USUAL = 0.05, 20  # of 95 % confidence; robots that are usually drawn
 STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
@@ -25,14 +27,39 @@ th:first-child, td:first-child { text-align: left; white-space: nowrap; }
 """
 
 
-def html_page(plan: "CalibrationPlan", picture: Path | None, program: str) -> str:
-    """The page, complete in itself; picture: a PNG file that goes into it."""
+def command(plan: "CalibrationPlan", folder: str | Path = ".") -> str:
+    """What is given on the command line once the poses of a plan in a folder are measured."""
+    prior = plan.settings.get("prior") or {}
+    words = " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
+    return f"gantrytau calibrate {Path(folder) / 'measurements.csv'}{words}"
+
+
+def drawn(plan: "CalibrationPlan") -> str:
+    """What so many simulated robots say of the safety of all others."""
+    robots = int(plan.settings["robots"])
+    share = 1 - DOUBT ** (1 / robots)
+    words = (
+        f"none of {robots} robots drawn within the tape error breaks a limit on the way: with 95 % confidence up to "
+        f"{share:.0%} of such robots may still do so"
+    )
+    return words if robots >= USUAL else f"{words}; {USUAL} or more robots say more"
+
+
+def html_page(
+    plan: "CalibrationPlan",
+    picture: Path | None,
+    program: str,
+    *,
+    folder: str | Path = ".",
+    trigger: str = OPERATOR,
+) -> str:
+    """The page, complete in itself; picture: a PNG file that goes into it; folder: where it is to stand."""
     title = f"Calibration plan of {plan.robot_name}"
     parts = [
         f"<h1>{escape(title)}</h1>",
         _verdict(plan),
         "<h2>What to do</h2>",
-        _steps(plan, program),
+        _steps(plan, program, folder, trigger),
         "<h2>The cell</h2>",
         _image(picture),
         "<h2>In numbers</h2>",
@@ -56,29 +83,36 @@ def _verdict(plan: "CalibrationPlan") -> str:
     return f'<div class="verdict{"" if plan.verdict.good else " bad"}"><h2>{word}</h2>{said}</div>'
 
 
-def _steps(plan: "CalibrationPlan", program: str) -> str:
+def _steps(plan: "CalibrationPlan", program: str, folder: str | Path, trigger: str) -> str:
     count, header = int(plan.measured.sum()), ",".join(f"q{k + 1}" for k in range(plan.q.shape[1]))
     turned = ",qw,qx,qy,qz" if plan.kind != "three links" else ""
     place = ", ".join(f"{x:.3g}" for x in np.asarray(plan.settings["device_r"], dtype=float))
     home = ", ".join(_joint(plan, k, x) for k, x in enumerate(plan.q[0]))
+    waits = (
+        "It stops at {} poses, says which, and waits until Done is pressed on the pendant."
+        if trigger == OPERATOR
+        else "It stops at {} poses, says which, and goes on by itself after a time."
+    ).format(count)
     steps = [
         f"Put the {plan.settings['device']} at ({place}) m in the axes of the robot base. A few centimetres do not "
         "matter, the "
         "measurements may stay in its own axes.",
         f"Jog the robot to home by hand: {home}. The way there is yours; all others were checked.",
-        f"Load {program} and run it slowly, with a hand on the stop. It stops at {count} poses and says when to measure. "
-        "Do not "
-        "change the order or the kind of move: only these ways were checked.",
-        f"Write measurements.csv with the header {header},x,y,z{turned}: a line for each measured pose, q as commanded in "
-        "poses.csv (m and rad), x, y, z as measured in m. Leave out what was not seen.",
-        "Run: gantrytau calibrate measurements.csv" + _prior(plan),
+        f"Load {program} and run it slowly, with a hand on the stop. {waits} Do not change the order or the kind of move: "
+        f"only these ways were checked. Safe means: {drawn(plan)}.",
+        f"Save measurements-template.csv as measurements.csv and fill in x, y, z{turned} as measured, in m"
+        f"{_target(plan)}; q stands there as commanded (m and rad). Leave empty what was not seen. A file of your own needs "
+        f"the header {header},x,y,z{turned}.",
+        "Run: " + command(plan, folder),
     ]
     return "<ol>" + "".join(f"<li>{escape(step)}</li>" for step in steps) + "</ol>"
 
 
-def _prior(plan: "CalibrationPlan") -> str:
-    prior = plan.settings.get("prior") or {}
-    return " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
+def _target(plan: "CalibrationPlan") -> str:
+    """Which point x, y, z is: devices that find orientations know where the tool is, a tracker only its target."""
+    if plan.settings["device"] == "LaserTracker":
+        return ", of the target (the reflector), which is the tool of the robot that is found"
+    return ", of the tool frame, which the device finds from its target"
 
 
 def _joint(plan: "CalibrationPlan", k: int, value: float) -> str:
@@ -108,7 +142,8 @@ def _facts(plan: "CalibrationPlan") -> str:
         ["condition number", f"{found.condition:.4g}"],
         ["observability index", f"{found.observability:.4g}"],
         ["criterion", CRITERION],
-        ["checked", f"{asked['robots'] + 1} robots within the tape error, on all of their ways"],
+        ["worst simulated robot", f"{um(plan.verdict.error)} after calibration"],
+        ["checked", f"the nominal robot, and {drawn(plan)}"],
         ["not reached and replaced", _lost(plan)],
     ]
     body = "".join(
@@ -148,10 +183,11 @@ def _poses(plan: "CalibrationPlan") -> str:
     names = [f"{name} [{'mm' if k < plan.carts else 'deg'}]" for k, name in enumerate(plan.joints)]
     heads = ["number", *names, "x [m]", "y [m]", "z [m]", ""]
     rows = "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in heads) + "</tr>"
-    for k, (q, r, measured) in enumerate(zip(plan.q, plan.r, plan.measured, strict=True)):
+    rows_of_plan = zip(plan.numbers, plan.q, plan.r, plan.measured, strict=True)
+    for k, (number, q, r, measured) in enumerate(rows_of_plan):
         joints = [f"{x * 1e3:.4f}" if i < plan.carts else f"{np.degrees(x):.5f}" for i, x in enumerate(q)]
         word = "measure" if measured else "home" if k in (0, len(plan.q) - 1) else "pass"
-        cells = [str(k + 1), *joints, *(f"{x:.3f}" for x in r), word]
+        cells = [str(number), *joints, *(f"{x:.3f}" for x in r), word]
         style = "" if measured else ' class="passed"'
         rows += f"<tr{style}>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
     return f"<table>{rows}</table>"

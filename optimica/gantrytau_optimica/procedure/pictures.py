@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 VIEWS = (("from above", 0, 1), ("from the side", 0, 2), ("from the front", 1, 2))
 FINE, DEEP = 160, 60  # points along the sides of a picture and into it, by which obstacles are seen
 AROUND = 0.08  # of the extent, that is left around the workspace
+CLOSE = 0.03  # of the extent, within which numbers of poses share a place
 WAY = 12  # poses that draw the way of a move, which is no straight line in space
 
 
@@ -134,16 +135,26 @@ def _poses(axis: Any, plan: "CalibrationPlan", across: int, up: int) -> None:
         label="to measure, numbered as in poses.csv",
         zorder=5,
     )
-    for number, point in zip(np.flatnonzero(plan.measured) + 1, at, strict=True):
+    _numbers(axis, plan.numbers[plan.measured], at[:, [across, up]])
+    axis.plot(*plan.r[0, [across, up]], "s", color="black", markersize=7, label="home", zorder=5)
+
+
+def _numbers(axis: Any, numbers: np.ndarray, at: np.ndarray) -> None:
+    """Numbers (n,) beside points (n, 2): those of points on top of each other in one row of words."""
+    apart = np.ptp(at, axis=0).max() * CLOSE
+    left = list(range(len(at)))
+    while left:
+        first = left[0]
+        here = [k for k in left if np.abs(at[k] - at[first]).max() <= apart]
+        left = [k for k in left if k not in here]
         axis.annotate(
-            f"{number}",
-            point[[across, up]],
+            ", ".join(str(numbers[k]) for k in here),
+            at[here[-1]],
             xytext=(3, 3),
             textcoords="offset points",
             fontsize=6.5,
             zorder=6,
         )
-    axis.plot(*plan.r[0, [across, up]], "s", color="black", markersize=7, label="home", zorder=5)
 
 
 def _way(plan: "CalibrationPlan") -> np.ndarray:

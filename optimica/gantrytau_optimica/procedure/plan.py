@@ -15,7 +15,7 @@ from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.choice import Choice
 from gantrytau_optimica.procedure.fleet import Fleet
-from gantrytau_optimica.procedure.rapid import rapid_program
+from gantrytau_optimica.procedure.rapid import OPERATOR, rapid_program
 from gantrytau_optimica.procedure.settling import SettledWorkspace
 from gantrytau_optimica.procedure.tours import Roadmap, find_tour
 from gantrytau_optimica.procedure.trials import Trials, matched, placed
@@ -42,7 +42,8 @@ class CalibrationPlan:
     trials: simulated calibrations, `.before` and `.after`; verdict: `.good` and `.reasons`. lost: poses that were wanted,
     (m, 3), but cannot be reached without a collision. kind, joints, carts, parameters: of the robot; settings: what was
     asked for. unseen (j, 3): safe places that the device does not see in all robots. cell: None where the plan was loaded
-    without its robot.
+    without its robot. numbers (k,): of the rows of the program in poses.csv, counted from 1; of what is left of a plan
+    they are those of the whole plan.
     """
 
     robot_name: str
@@ -62,6 +63,11 @@ class CalibrationPlan:
     lost: np.ndarray
     unseen: np.ndarray
     cell: Cell | None = field(default=None, repr=False)
+    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def __post_init__(self):
+        if len(self.numbers) != len(self.q):
+            object.__setattr__(self, "numbers", np.arange(1, len(self.q) + 1))
 
     def __repr__(self) -> str:
         state = "good" if self.verdict.good else "not good enough"
@@ -91,23 +97,24 @@ class CalibrationPlan:
         settle: float = 1.0,
         measure: float = 2.0,
         carts: Literal["robax", "extax"] = "robax",
-        trigger: str = "TPWrite",
+        trigger: str = OPERATOR,
         tool: str = "tool0",
     ) -> str:
         """The text of a RAPID module that drives through the poses.
 
         speed: m/s; settle: s of rest before a measurement, measure: s after its trigger; carts: which axes of a joint
-        target move the robot, turntables after the carts; trigger: "TPWrite" for words on the pendant alone, or the name
-        of a digital output that gets a pulse too; tool: name of its tool data. Raises ModelError for words that RAPID
-        does not take.
+        target move the robot, turntables after the carts; trigger: "operator" waits for a key on the pendant, "TPWrite"
+        only tells and goes on after `measure`, and so does the name of a digital output, which gets a pulse too; tool:
+        name of its tool data. Raises ModelError for words that RAPID does not take.
         """
         return rapid_program(
             self, name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
         )
 
     def write(self, folder: str | Path, **program: Any) -> Path:
-        """Write workspace.png, poses.csv, plan.json, plan.html and the program into a folder, each whole or not at all.
+        """Write workspace.png, poses.csv, measurements-template.csv, plan.json, plan.html and the program into a folder.
 
+        Each is written whole or not at all; the template has the poses to measure, and cells to be filled in.
         program: as of `program`; its name is that of the file, Calibration.mod. Returns the folder, which is made where
         it does not exist; ModelError where the folder around it does not.
         """
@@ -117,10 +124,11 @@ class CalibrationPlan:
 
     def placed(self, measurements: Measurements) -> Measurements:
         """Measurements in any frame, such as the axes of the device, laid over the poses that are expected, by their q."""
-        return placed(measurements, self.q[self.measured], self.r[self.measured])
+        found = placed(self._as_planned(measurements), self.q[self.measured], self.r[self.measured])
+        return Measurements(measurements.q, found.r, found.R, found.rails, numbers=measurements.numbers)
 
     def missing(self, measurements: Measurements) -> np.ndarray:
-        """Rows of the program that are to be measured and that measurements do not hold yet, by their q."""
+        """Rows of the program that are to be measured and that measurements do not hold yet, by their q, or by number."""
         wanted = np.flatnonzero(self.measured)
         return wanted[~self._held(measurements)]
 
@@ -141,8 +149,21 @@ class CalibrationPlan:
         tour = find_tour(roadmap, left)
         rows = tour.nodes
         return replace(
-            self, q=self.q[rows], r=self.r[rows], R=self.R[rows], measured=~tour.via & np.isin(rows, left)
+            self,
+            q=self.q[rows],
+            r=self.r[rows],
+            R=self.R[rows],
+            measured=~tour.via & np.isin(rows, left),
+            numbers=self.numbers[rows],
         )
+
+    def _as_planned(self, measurements: Measurements) -> Measurements:
+        """The same with q as planned where poses have their numbers."""
+        if measurements.numbers is None:
+            return measurements
+        known = dict(zip(self.numbers.tolist(), self.q, strict=True))
+        q = [known.get(n, own) for n, own in zip(measurements.numbers.tolist(), measurements.q, strict=True)]
+        return Measurements(q, measurements.r, measurements.R, measurements.rails)
 
     def _held(self, measurements: Measurements) -> np.ndarray:
         """Which of the poses to measure the measurements hold with finite numbers, (m,)."""
@@ -152,7 +173,7 @@ class CalibrationPlan:
                 f"the plan ({', '.join(self.joints)}); check the columns q1, q2, ..."
             )
         good = measurements.finite
-        rows = matched(measurements.q[good], self.q[self.measured])
+        rows = matched(self._as_planned(measurements).q[good], self.q[self.measured])
         held = np.zeros(int(self.measured.sum()), dtype=bool)
         held[rows[rows >= 0]] = True
         return held

@@ -1,5 +1,7 @@
 """A plan as a robot program in RAPID (ABB): joint targets, moves in joint coordinates, a trigger for the device.
 
+At each pose to be measured it waits for who measures (TPReadFK), or for a time after a word or a pulse.
+
 Lengths in mm and angles in degrees. Numbers of RAPID are single precision: 0.1 um of a metre. Lines have 80 ASCII
 characters at most, names 32.
 """
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 AXES = 6  # of robax and of extax
+OPERATOR, WORDS = "operator", "TPWrite"  # triggers that are no digital outputs
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 RESERVED = {
     "module", "endmodule", "proc", "endproc", "const", "pers", "var", "local", "task", "func", "endfunc", "trap",
@@ -41,33 +44,54 @@ def rapid_program(
     tool: str,
 ) -> str:
     """See `CalibrationPlan.program`."""
-    if carts not in ("robax", "extax"):
-        raise ModelError(
-            f"program: found carts={carts!r}, expected 'robax' or 'extax', the axes of a joint target that move"
-        )
-    names = [("name", name), ("tool", tool), *([] if trigger == "TPWrite" else [("trigger", trigger)])]
-    for what, word in names:
-        _check_name(what, word)
-    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
-        if not (np.isfinite(value) and value >= least):
-            unit = "m/s above 0" if what == "speed" else "s, not negative"
-            raise ModelError(f"program: found {what}={value!r}, expected a number in {unit}")
-    lines = [f"MODULE {name}", *_comments(plan, carts)]
+    check_program(
+        name=name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
+    )
+    lines = [f"MODULE {name}", *_comments(plan, carts, trigger)]
     lines += [
         f"  CONST speeddata speedCalibration:=[{_number(speed * 1e3, 3)},20,{_number(speed * 1e3, 3)},20];"
     ]
-    for number in range(1, len(plan.q)):  # the last is home again
-        lines += _target(_label(plan, number), plan.q[number - 1], plan.carts, carts)
+    lines += ["  VAR num keyCalibration;"] if trigger == OPERATOR else []
+    labels = [_label(plan, k) for k in range(len(plan.q))]
+    for label in dict.fromkeys(labels):
+        lines += _target(label, plan.q[labels.index(label)], plan.carts, carts)
     lines += ["", f"  PROC {_procedure(name)}()"]
     count, done = int(plan.measured.sum()), 0
-    for k, measured in enumerate(plan.measured):
-        label = _label(plan, 1 if k == len(plan.q) - 1 else k + 1)
+    for label, measured in zip(labels, plan.measured, strict=True):
         lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {tool};")
         if measured:
             done += 1
             lines += _trigger(trigger, f"{label}, {done} of {count}", settle, measure)
     lines += ["  ENDPROC", "ENDMODULE", ""]
     return "\n".join(lines)
+
+
+def check_program(
+    *,
+    name: str = "Calibration",
+    speed: float = 0.1,
+    settle: float = 1.0,
+    measure: float = 2.0,
+    carts: str = "robax",
+    trigger: str = OPERATOR,
+    tool: str = "tool0",
+) -> None:
+    """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
+    if carts not in ("robax", "extax"):
+        raise ModelError(
+            f"program: found carts={carts!r}, expected 'robax' or 'extax', the axes of a joint target that move"
+        )
+    names = [
+        ("name", name),
+        ("tool", tool),
+        *([] if trigger in (OPERATOR, WORDS) else [("trigger", trigger)]),
+    ]
+    for what, word in names:
+        _check_name(what, word)
+    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
+        if not (np.isfinite(value) and value >= least):
+            unit = "m/s above 0" if what == "speed" else "s, not negative"
+            raise ModelError(f"program: found {what}={value!r}, expected a number in {unit}")
 
 
 def _procedure(name: str) -> str:
@@ -82,11 +106,12 @@ def _check_name(what: str, word: str) -> None:
         )
 
 
-def _label(plan: "CalibrationPlan", number: int) -> str:
-    """Name of the target of a row of the program, counted from 1, as in poses.csv."""
-    if number == 1:
+def _label(plan: "CalibrationPlan", row: int) -> str:
+    """Name of the target of a row of the program, by its number in poses.csv of the whole plan."""
+    number = int(plan.numbers[row])
+    if number == 1 or row == len(plan.q) - 1:
         return "pHome"
-    return f"p{number:03d}" if plan.measured[number - 1] else f"via{number:03d}"
+    return f"p{number:03d}" if plan.measured[row] else f"via{number:03d}"
 
 
 def _target(label: str, q: np.ndarray, count: int, carts: str) -> list[str]:
@@ -103,31 +128,45 @@ def _number(value: float, decimals: int) -> str:
 
 
 def _trigger(trigger: str, words: str, settle: float, measure: float) -> list[str]:
-    told = f'    TPWrite "Measure {words}";'
-    pulse = [] if trigger == "TPWrite" else [f"    PulseDO \\PLength:=0.2, {trigger};"]
+    rest = f"    WaitTime \\InPos, {_number(settle, 3)};"
+    if trigger == OPERATOR:
+        return [
+            rest,
+            f'    TPReadFK keyCalibration, "Measure {words}", stEmpty, stEmpty,',
+            '      stEmpty, stEmpty, "Done";',
+        ]
+    pulse = [] if trigger == WORDS else [f"    PulseDO \\PLength:=0.2, {trigger};"]
     return [
-        f"    WaitTime \\InPos, {_number(settle, 3)};",
-        told,
+        rest,
+        f'    TPWrite "Measure {words}";',
         *pulse,
         f"    WaitTime {_number(measure, 3)};",
     ]
 
 
-def _comments(plan: "CalibrationPlan", carts: str) -> list[str]:
+def _comments(plan: "CalibrationPlan", carts: str, trigger: str) -> list[str]:
     unused = "unused robax 0, extax 9E9" if carts == "robax" else "carts are external axes, unused extax 9E9"
     said = [
         f"Calibration of {plan.robot_name}: {int(plan.measured.sum())} poses to measure, "
         f"{int((~plan.measured).sum())} only passed (home at begin and end).",
         f"Joint targets: carts in mm, turntables in degrees; {unused}. Moves are linear in these axes and were checked "
-        "on all of their way; do not change order, targets or kind of move. Rows of poses.csv have the same numbers.",
-        f"Expected error of the tool after calibration with all {len(plan.prediction.rows)} poses of the plan "
-        f"{um(plan.verdict.error)}, wanted {um(plan.verdict.wanted)}: "
-        f"{'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
+        "on all of their way; do not change order, targets or kind of move. p041 is row 41 of poses.csv of the whole plan.",
+        _waiting(trigger),
+        f"Expected error of the tool by noise after calibration with all {len(plan.prediction.rows)} poses of the plan "
+        f"{um(plan.prediction.error)}; of the worst simulated robot {um(plan.verdict.error)}, wanted "
+        f"{um(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
         f"Poses: {CRITERION}.",
         f"Nominal parameters in m ({plan.kind}):",
         *_parameters(plan),
     ]
     return [line for words in said for line in _wrapped(words)] + [""]
+
+
+def _waiting(trigger: str) -> str:
+    if trigger == OPERATOR:
+        return "At each pose to measure it waits until Done is pressed on the pendant."
+    pulse = "" if trigger == WORDS else f", pulses {trigger}"
+    return f"At each pose to measure it says so on the pendant{pulse}, and goes on by itself after a time."
 
 
 def _parameters(plan: "CalibrationPlan") -> Sequence[str]:
