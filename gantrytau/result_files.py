@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.errors import GantryTauError, ModelError, did_you_mean
+from gantrytau.interruption import uninterrupted
 
 if TYPE_CHECKING:
     import xarray
@@ -34,14 +35,15 @@ def save(result: "Result", path: str | os.PathLike[str]) -> Path:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A name beside `path` to write to; it takes the place of `path` at the end, or vanishes on an error."""
+    """A name beside `path` to write to; it takes the place of `path` at the end, or vanishes on an error; Ctrl-C waits."""
     path = Path(path)
     if not path.parent.is_dir():
         raise ModelError(f"{path}: the folder '{path.parent}' does not exist; create it, or name another one")
     partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        yield partial
-        os.replace(partial, path)
+        with uninterrupted():
+            yield partial
+            os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
 

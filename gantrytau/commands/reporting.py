@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from gantrytau.errors import GantryTauError
+from gantrytau.interruption import heeding_interrupts
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
@@ -38,7 +39,8 @@ class Commands(TyperGroup):
         json = "--json" in [*getattr(ctx, "_protected_args", ()), *ctx.args]
         try:
             try:
-                return super().invoke(ctx)
+                with heeding_interrupts():
+                    return super().invoke(ctx)
             finally:
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
