@@ -187,10 +187,15 @@ class Calibration:
         """Distances of measured and predicted positions of the held-out poses (5.5), (N,) in m."""
         return np.sqrt(np.einsum("ij,ij->i", self.error_vectors, self.error_vectors))
 
+    @cached_property
+    def left_out(self) -> np.ndarray:
+        """Rows that a robust loss leaves without weight, as findings say: `.error` and `.angle_error` leave them out too."""
+        return self.suspicion.rows if self.loss == "robust" else self.held_out[:0]
+
     @property
     def error(self) -> np.float64:
-        """Mean of `errors`, m: the error to expect of a pose that was not fitted."""
-        return _mean(self.errors)
+        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted."""
+        return _mean(self.errors[~np.isin(self.held_out, self.left_out)])
 
     @cached_property
     def angle_errors(self) -> np.ndarray:
@@ -203,8 +208,8 @@ class Calibration:
 
     @property
     def angle_error(self) -> np.float64:
-        """Mean of `angle_errors`, rad; NaN where no orientations were measured."""
-        return _mean(self.angle_errors)
+        """Mean of `angle_errors`, rad, without `left_out`; NaN where no orientations were measured."""
+        return _mean(self.angle_errors[~np.isin(self.held_out, self.left_out)])
 
     @property
     def plate_turns(self) -> bool:
@@ -246,6 +251,7 @@ class Calibration:
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
 
+        A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
         Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
         """
         from gantrytau_optimica.calibration.report import write_report

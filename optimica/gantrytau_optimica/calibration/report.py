@@ -2,39 +2,81 @@
 
 import json
 import os
-from html import escape
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau_optimica.calibration.report_page import html_report
 from gantrytau_optimica.calibration.residual_tests import residual_tests
 
 if TYPE_CHECKING:
     from gantrytau_optimica.calibration.calibration import Calibration
 
 BINS = 24
-STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
-table { border-collapse: collapse; font-size: .9rem; margin: .5rem 0 1.5rem; }
-th, td { text-align: right; padding: .15rem .8rem .15rem 0; border-bottom: 1px solid #8886; }
-th:first-child, td:first-child { text-align: left; font-family: ui-monospace, monospace; }
-.matrix { overflow-x: auto; } .matrix td { font-size: .7rem; padding-right: .4rem; }
-rect { fill: #4a7ebb; } svg text { font: 12px system-ui; fill: currentColor; }
-"""
+OTHERS = (
+    ".pdf",
+    ".csv",
+    ".txt",
+    ".md",
+    ".xlsx",
+    ".xls",
+    ".docx",
+    ".doc",
+    ".odt",
+    ".xml",
+    ".toml",
+    ".png",
+    ".svg",
+)
+LISTED = 2000  # poses, of more the worst
 
 
-def report_numbers(found: "Calibration") -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """From the frame of measurements to the base of the robot: base = rotation @ measured + translation, m."""
+
+    rotation: np.ndarray
+    translation: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class About:
+    """What a report says beside the calibration itself, as far as that is known.
+
+    robot: its name with its prototype; facts: in words by heading, such as goal and device; good, verdict: whether it is
+    good enough; notes: sentences; lines: of the rows in their file (N,); numbers: of the poses in a plan (N,); validation:
+    distances of poses from where fits without them expect them, m by row, NaN where there is none; motion: which laid
+    measurements over the plan.
+    """
+
+    robot: str = ""
+    facts: Mapping[str, str] = field(default_factory=dict)
+    good: bool | None = None
+    verdict: str = ""
+    notes: Sequence[str] = ()
+    lines: np.ndarray | None = None
+    numbers: np.ndarray | None = None
+    validation: np.ndarray | None = None
+    motion: Motion | None = None
+
+
+def report_numbers(found: "Calibration", about: About | None = None) -> dict[str, Any]:
     """Everything that the report says, as plain numbers and lists; lengths in m, angles in rad."""
+    about = about or About()
     errors, vectors = found.errors, found.error_vectors
-    good = np.isfinite(errors)
+    good = np.isfinite(errors) & ~np.isin(found.held_out, found.left_out)
     known = [n for n in found.names if n not in found.undetermined]
-    axes = principal_axes(vectors[good])
     counts, edges = np.histogram(errors[good], bins=BINS)
     return {
-        "robot": found.geometry.name,
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "robot": about.robot or found.geometry.name,
+        "facts": dict(about.facts),
+        "verdict": {"good": about.good, "words": about.verdict},
         "model": found.model,
         "method": found.method,
         "loss": found.loss,
@@ -42,18 +84,108 @@ def report_numbers(found: "Calibration") -> dict[str, Any]:
         "iterations": found.iterations,
         "poses_fitted": len(found.rows),
         "poses_held_out": len(found.held_out),
+        "errors_of": "fitted poses" if fits_all(found) else "held-out poses",
         "error_m": _spread(errors[good]),
-        "angle_error_rad": _spread(found.angle_errors[np.isfinite(found.angle_errors)]),
+        "angle_error_rad": _spread(found.angle_errors[good & np.isfinite(found.angle_errors)]),
+        "left_out_rows": found.left_out.tolist(),
+        "validation_error_m": _validation(found, about),
         "noise_m": found.noise if np.isfinite(found.noise) else None,
+        "transformation": _transformation(about.motion or frame_motion(found)),
         "parameters": {n: np.asarray(v).tolist() for n, v in found.parameters.items()},
+        "nominal": nominal_values(found),
         "deviations": {n: d if np.isfinite(d) else None for n, d in found.deviations.items()},
         "undetermined": list(found.undetermined),
         "covariance": {"names": known, "values": found.covariance().tolist()},
-        "principal_axes": axes,
+        "principal_axes": principal_axes(vectors[good]),
         "residual_tests": residual_tests(found),
         "histogram": {"counts": counts.tolist(), "edges_m": edges.tolist()},
         "findings": [{"kind": f.kind, "rows": f.rows.tolist(), "message": f.message} for f in found.findings],
+        "notes": list(about.notes),
+        "poses": _poses(found, about),
     }
+
+
+def fits_all(found: "Calibration") -> bool:
+    """Whether errors are those of the fitted poses, as none were held out."""
+    return np.array_equal(found.held_out, found.rows)
+
+
+def frame_motion(found: "Calibration") -> Motion | None:
+    """From the frame of the measurements to that of the nominal values, None where they are the same."""
+    from gantrytau_optimica.calibration.arm_frames import frame_of
+    from gantrytau_optimica.calibration.models import nominal_links, six_links
+    from gantrytau_optimica.calibration.plausibility import compare
+
+    if not any(finding.kind == "frame" for finding in found.findings):
+        return None
+    data = found.measurements.select(found.rows)
+    if found.geometry.kind == "turning":
+        assert found.nominal is not None
+        fitting = frame_of(found.geometry.robot, found.nominal, data)
+    else:
+        links = nominal_links(found.geometry, data, six_links(found.model, found.geometry))
+        fitting = compare(links, data.q, data.r, data.R)
+    if fitting is None:
+        return None
+    return Motion(fitting.turn.T, -fitting.turn.T @ fitting.shift)
+
+
+def _transformation(motion: Motion | None) -> dict[str, Any] | None:
+    if motion is None:
+        return None
+    return {
+        "law": "base = rotation @ measured + translation",
+        "rotation": motion.rotation.tolist(),
+        "translation_m": motion.translation.tolist(),
+    }
+
+
+def _validation(found: "Calibration", about: About) -> dict[str, float | None] | None:
+    """Of poses that were left out of fits in turn, or of those held out; None where all errors are those of the fit."""
+    if about.validation is not None:
+        errors = np.delete(about.validation, found.left_out)
+        return _spread(errors[np.isfinite(errors)])
+    if fits_all(found):
+        return None
+    good = np.isfinite(found.errors) & ~np.isin(found.held_out, found.left_out)
+    return _spread(found.errors[good])
+
+
+def nominal_values(found: "Calibration") -> dict[str, float]:
+    """The numbers by name that the robot had before, of those that were looked for."""
+    values = found.geometry.values
+    return scalars({name: values[name] for name in found.parameters if name in values})
+
+
+def scalars(values: Mapping[str, Any]) -> dict[str, float]:
+    """Numbers by name; of a vector `v` the elements `v[0]`, `v[1]` and so on."""
+    found = {}
+    for name, value in values.items():
+        elements = [name] if np.ndim(value) == 0 else [f"{name}[{k}]" for k in range(len(value))]
+        found |= dict(zip(elements, np.atleast_1d(value).tolist(), strict=True))
+    return found
+
+
+def _poses(found: "Calibration", about: About) -> list[dict[str, Any]]:
+    """The error of each pose, in the order of rows; of very many poses the worst."""
+    sizes, angles = found.errors, found.angle_errors
+    places = np.arange(len(sizes))
+    if len(places) > LISTED:
+        places = np.sort(np.argsort(-np.where(np.isfinite(sizes), sizes, np.inf))[:LISTED])
+    rows = found.held_out
+    more = {"line": about.lines, "number": about.numbers, "without_it_m": about.validation}
+    listed = []
+    for k in places:
+        row = int(rows[k])
+        one = {"row": row, "q": found.measurements.q[row].tolist()}
+        one |= {name: _plain(values[row]) for name, values in more.items() if values is not None}
+        one |= {"error_m": _plain(sizes[k]), "vector_m": [_plain(x) for x in found.error_vectors[k]]}
+        listed.append(one | {"angle_rad": _plain(angles[k])})
+    return listed
+
+
+def _plain(value: Any) -> float | int | None:
+    return None if not np.isfinite(value) else int(value) if isinstance(value, np.integer) else float(value)
 
 
 def principal_axes(vectors: np.ndarray) -> dict[str, Any]:
@@ -85,14 +217,22 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     }
 
 
-def write_report(found: "Calibration", path: Path) -> Path:
-    """Both files, whole or not at all; the path of the page, which ends in .html."""
+def write_report(found: "Calibration", path: Path, about: About | None = None) -> Path:
+    """Both files, whole or not at all; the path of the page, which ends in .html.
+
+    Raises ModelError for names that end in that of another format, and for what cannot be written.
+    """
+    if path.suffix.lower() in OTHERS:
+        raise ModelError(
+            f"report: found the name '{path.name}', expected one that ends in .html, for a page with a .json beside it; "
+            "print the page from a browser for other formats"
+        )
     page = (
         path
         if path.suffix in (".html", ".htm")
         else path.with_name(path.name.removesuffix(".json") + ".html")
     )
-    numbers = report_numbers(found)
+    numbers = report_numbers(found, about)
     texts = {
         page: html_report(numbers),
         page.with_suffix(".json"): json.dumps(numbers, indent=1, allow_nan=False),
@@ -117,122 +257,3 @@ def write_report(found: "Calibration", path: Path) -> Path:
             if temporary.exists():
                 temporary.unlink()
     return page
-
-
-def html_report(numbers: dict[str, Any]) -> str:
-    """The page of the numbers of a report."""
-    title = f"Calibration of {numbers['robot']}"
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        _summary(numbers),
-        "<h2>Findings</h2>",
-        _list(f"{f['kind']}: {f['message']}" for f in numbers["findings"]),
-        "<h2>Errors of poses that were held out</h2>",
-        _errors(numbers),
-        histogram(numbers["histogram"]),
-        "<h2>Principal axes of the errors</h2>",
-        _axes(numbers["principal_axes"]),
-        "<h2>Residual tests</h2>",
-        _tests(numbers["residual_tests"]),
-        "<h2>Parameters</h2>",
-        _parameters(numbers),
-        "<h2>Correlations</h2>",
-        _correlations(numbers["covariance"]),
-    ]
-    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n'
-        + "\n".join(parts)
-        + "\n</body></html>\n"
-    )
-
-
-def _summary(numbers: dict[str, Any]) -> str:
-    model = "of the robot" if numbers["model"] is None else numbers["model"]
-    verdict = "converged" if numbers["success"] else "did not converge"
-    noise = "nothing" if numbers["noise_m"] is None else f"{numbers['noise_m'] * 1e6:.4g} um"
-    poses = f"{numbers['poses_fitted']} poses fitted, {numbers['poses_held_out']} held out"
-    name = f"Model {escape(str(model))}, loss {escape(numbers['loss'])}"
-    return (
-        f"<p>{name}, {poses}; {escape(numbers['method'])} {verdict} after "
-        f"{numbers['iterations']} steps. What is left is explained by {noise} in each measured coordinate.</p>"
-    )
-
-
-def _list(items: Any) -> str:
-    rows = "".join(f"<li>{escape(item)}</li>" for item in items)
-    return f"<ul>{rows}</ul>" if rows else "<p>none</p>"
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    top = "".join(f"<th>{escape(h)}</th>" for h in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
-
-
-def _errors(numbers: dict[str, Any]) -> str:
-    rows = []
-    for name, key, scale, unit in (
-        ("position", "error_m", 1e6, "um"),
-        ("orientation", "angle_error_rad", 180e3 / np.pi, "mdeg"),
-    ):
-        spread = numbers[key]
-        if spread["mean"] is not None:
-            cells = [f"{spread[k] * scale:.4g}" for k in ("mean", "median", "p95", "max")]
-            rows.append([f"{name}, {unit}", *cells])
-    return _table(["", "mean", "median", "95 %", "largest"], rows)
-
-
-def histogram(bars: dict[str, Any], width: int = 640, height: int = 180) -> str:
-    """A histogram of errors as SVG."""
-    counts, edges = bars["counts"], np.array(bars["edges_m"]) * 1e6
-    if not any(counts):
-        return "<p>There is no error to show.</p>"
-    tallest, step = max([*counts, 1]), width / max(1, len(counts))
-    shapes = "".join(
-        f'<rect x="{k * step:.1f}" y="{height - height * c / tallest:.1f}" width="{step - 1:.1f}" '
-        f'height="{height * c / tallest:.1f}"><title>{edges[k]:.4g} to {edges[k + 1]:.4g} um: {c}</title></rect>'
-        for k, c in enumerate(counts)
-    )
-    words = f'<text x="0" y="{height + 16}">{edges[0]:.4g} um</text>'
-    words += f'<text x="{width}" y="{height + 16}" text-anchor="end">{edges[-1]:.4g} um</text>'
-    return f'<svg viewBox="0 0 {width} {height + 24}" width="{width}" role="img">{shapes}{words}</svg>'
-
-
-def _axes(axes: dict[str, Any]) -> str:
-    rows = [
-        [", ".join(f"{x:+.3f}" for x in direction), f"{size * 1e6:.4g}", f"{100 * share:.1f} %"]
-        for direction, size, share in zip(
-            axes["directions"], axes["root_mean_squares_m"], axes["shares"], strict=True
-        )
-    ]
-    return _table(["direction", "root mean square, um", "share"], rows)
-
-
-def _tests(tests: list[dict[str, Any]]) -> str:
-    rows = [[t["link"], t["test"], f"{t['value']:.4g}", f"{t['probability']:.3g}"] for t in tests]
-    return _table(["link", "test", "value", "probability by chance"], rows)
-
-
-def _parameters(numbers: dict[str, Any]) -> str:
-    rows = []
-    for name, value in numbers["parameters"].items():
-        elements = [name] if np.ndim(value) == 0 else [f"{name}[{k}]" for k in range(len(value))]
-        for element, x in zip(elements, np.atleast_1d(value), strict=True):
-            deviation = numbers["deviations"].get(element, 0.0)
-            shown = "not held" if deviation is None else f"{deviation * 1e6:.4g}" if deviation else "-"
-            rows.append([element, f"{x:.7f}", shown])
-    return _table(["name", "value (m, 1, rad)", "deviation, 1e-6"], rows)
-
-
-def _correlations(covariance: dict[str, Any]) -> str:
-    names, C = covariance["names"], np.array(covariance["values"])
-    if not names:
-        return "<p>none</p>"
-    d = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    rows = [
-        [f"{k} {name}", *(f"{100 * x:.0f}" for x in row)]
-        for k, (name, row) in enumerate(zip(names, C / np.outer(d, d), strict=True))
-    ]
-    words = "In per cent; the covariance itself, in m2, stands in the JSON file beside this page."
-    return f'<p>{words}</p><div class="matrix">{_table(["", *map(str, range(len(names)))], rows)}</div>'
