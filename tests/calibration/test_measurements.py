@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_optimica import Measurements
+from gantrytau_optimica.calibration.findings import rows_in_words
 
 RNG = np.random.default_rng(0)
 Q, T = RNG.uniform(size=(12, 3)), RNG.uniform(size=(12, 3))
@@ -128,3 +129,37 @@ def test_guideways_in_millimetres_are_found():
     rail = np.column_stack([np.linspace(0, 1, 10), 1e3 * np.linspace(0, 1, 10), np.zeros(10), np.zeros(10)])
     spread = RNG.uniform(size=(12, 3))
     assert [f.kind for f in Measurements(spread, spread, None, [rail] * 3).findings] == ["guideway"] * 3
+
+
+@pytest.mark.parametrize(
+    ("rows", "of", "words"),
+    [
+        ([3], 10, "row 3"),
+        ([3, 4], 10, "rows 3 and 4"),
+        ([3, 4, 9], 10, "rows 3, 4 and 9"),
+        ([3, 4, 5, 6, 12, *range(20, 32)], 40, "rows 3 to 6, 12 and 20 to 31"),
+        (range(779), 779, "rows 0 to 778"),
+        ([*range(154), *range(210, 779)], 779, "all but rows 154 to 209"),
+        ([*range(154), *range(155, 779)], 779, "all but row 154"),
+        ([*range(154), *range(210, 779)], None, "rows 0 to 153 and 210 to 778"),
+        (range(400, 779), 779, "rows 400 to 778"),
+        (range(0, 18, 2), 100, "rows 0, 2, 4, 6, 8, 10, 12 and 2 more"),
+        (range(0, 100, 2), 100, "rows 0, 2, 4, 6, 8, 10, 12, 14 and 42 more"),
+    ],
+)
+def test_rows_in_words(rows, of, words):
+    assert rows_in_words(list(rows), of) == words
+
+
+def test_one_row_and_many_in_words():
+    q, r = (np.random.default_rng(k).uniform(0, 1, (30, 3)) for k in (0, 1))
+    for bad, words in (
+        ([4], "row 4 holds no finite numbers and is"),
+        ([4, 6], "rows 4 and 6 hold no finite numbers and are"),
+    ):
+        broken = r.copy()
+        broken[bad] = np.nan
+        assert words in Measurements(q, broken).findings[0].message
+    one, two = ([*range(30), *more] for more in ([3], [3, 5]))
+    assert "row 30 repeats earlier rows" in Measurements(q[one], r[one]).findings[0].message
+    assert "rows 30 and 31 repeat earlier rows" in Measurements(q[two], r[two]).findings[0].message

@@ -163,7 +163,7 @@ def all_in_millimetres(rows):
         (turn, "rotated frame", [*range(2, 82)], "turned by 180 degrees about z in lines 2 to 81"),
         (flatten, "plane", [*range(2, 82)], "lie in a plane"),
         (outlying, "outliers", [12, 22], "lines 12 and 22 close worse"),
-        (millimetres, "millimetres", [7], "r of line 7 extend over"),
+        (millimetres, "millimetres", [7], "r of line 7 extends over"),
         (all_in_millimetres, "millimetres", [*range(2, 82)], "divide by 1000"),
     ],
 )

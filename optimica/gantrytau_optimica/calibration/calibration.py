@@ -231,13 +231,14 @@ class Calibration:
 
     def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
         """For each actuator its column in q, errors (N, m) of a group of m links at some fitted poses, their slopes by the
-        numbers (N, m, p), and by the actuator (N, m), zero for links of others; by weights where a loss gave them.
+        numbers, those that were held too (N, m, p), and by the actuator (N, m), zero for links of others; by weights
+        where a loss gave them.
         """
         for fit in self.fits:
             errors, jacobian, by_cart = [], [], []
             weights = np.ones(len(few)) if fit.weights is None else fit.weights[few]
             chains = [chain.at(few) for chain in fit.group.chains]
-            here = replace(fit.group, chains=tuple(chains))
+            here = replace(fit.group, chains=tuple(chains), free=np.ones_like(fit.group.free))
             for k, chain in enumerate(chains):
                 p = here.numbers(k, fit.x)
                 errors.append(weights * chain.error(p))

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.findings import Finding, rows_in_words
+from gantrytau_optimica.calibration.findings import Finding, agreeing, rows_in_words
 
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
@@ -37,7 +37,9 @@ def check_data(
 def _not_finite(finite: np.ndarray) -> Iterator[Finding]:
     bad = np.flatnonzero(~finite)
     if bad.size:
-        yield Finding("nan", bad, f"{rows_in_words(bad)} hold no finite numbers and are left out")
+        hold, left = agreeing(bad, "hold"), agreeing(bad, "are")
+        words = f"{rows_in_words(bad, len(finite))} {hold} no finite numbers and {left} left out"
+        yield Finding("nan", bad, words)
 
 
 def _few(rows: np.ndarray) -> Iterator[Finding]:
@@ -50,10 +52,11 @@ def _few(rows: np.ndarray) -> Iterator[Finding]:
 def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     later = repeated_rows(np.column_stack([q, r]))
     if later.size:
+        repeat = agreeing(later, "repeat")
         yield Finding(
             "duplicates",
             rows[later],
-            f"{rows_in_words(rows[later])} repeat earlier rows to the last digit; a copied row adds no knowledge but "
+            f"{rows_in_words(rows[later])} {repeat} earlier rows to the last digit; a copied row adds no knowledge but "
             "counts twice in every deviation; it is left out",
         )
 
@@ -66,7 +69,8 @@ def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
         places = places[(np.abs(moving[places] - moving[places - 1]) > MOVED).any(axis=1)]
         if places.size:
             bad = rows[places]
-            words = f"{name} of {rows_in_words(bad)} is that of the row before while {other} moved; they are left out"
+            left = agreeing(bad, "they are")
+            words = f"{name} of {rows_in_words(bad)} is that of the row before while {other} moved; {left} left out"
             yield Finding("stuck", bad, words)
 
 
@@ -132,11 +136,12 @@ def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     far = {name: _far(x) for name, x in (("q", q), ("r", r))}
     found = np.union1d(far["q"], far["r"]) if any(len(k) for k in far.values()) else ()
     if len(found):
-        names = " and ".join(name for name, k in far.items() if len(k))
+        both = [name for name, k in far.items() if len(k)]
+        names, extend = " and ".join(both), "extend" if len(both) > 1 else "extends"
         yield Finding(
             "millimetres",
             rows[found],
-            f"{names} of {rows_in_words(rows[found])} extend over more than {LARGEST:g} m, expected m; divide by 1000 if "
+            f"{names} of {rows_in_words(rows[found])} {extend} over more than {LARGEST:g} m, expected m; divide by 1000 if "
             "they are mm",
         )
 

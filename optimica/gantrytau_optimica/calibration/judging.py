@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.findings import CalibrationError, Finding, rows_in_words
+from gantrytau_optimica.calibration.findings import CalibrationError, Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.measurements import Measurements
 from gantrytau_optimica.calibration.models import Link, moved
@@ -18,7 +18,7 @@ from gantrytau_optimica.calibration.plausibility import (
     misses_of,
     thinned,
 )
-from gantrytau_optimica.calibration.slips import slip
+from gantrytau_optimica.calibration.slips import slip, smooth_functions
 from gantrytau_optimica.calibration.suspicion import OUTLIER, Suspicion
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
@@ -116,8 +116,14 @@ def judged(found: Calibration) -> list[Finding]:
     findings = _mistaken(found, seen)
     others = np.setdiff1d(seen.rows, np.concatenate([seen.rows[:0], *(f.rows for f in findings)]))
     if others.size:
-        advice = "they had little weight" if found.loss == "robust" else "look at them, or take loss='robust'"
-        words = f"{rows_in_words(others)} close worse than {OUTLIER:g} standard deviations; {advice}"
+        one = len(others) == 1
+        advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
+        if found.loss == "robust":
+            advice = f"{'it' if one else 'they'} had little weight"
+        words = (
+            f"{rows_in_words(others, len(found.measurements))} {agreeing(others, 'close')} worse than {OUTLIER:g} standard "
+            f"deviations; {advice}"
+        )
         findings.append(Finding("outliers", others, words))
     findings += _slipped(found)
     return [*findings, *_misfit(found, seen, findings), *_far(found), *_in_doubt(found)]
@@ -146,7 +152,8 @@ def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Ite
     if seen.typical < MISFIT:
         return
     rows = np.union1d(found.rows, found.held_out)
-    words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {rows_in_words(rows)} with the best parameters"
+    where = rows_in_words(rows, len(found.measurements))
+    words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {where} with the best parameters"
     remedy = (
         "q, r and R of the same pose in each row; look at order, units and signs of columns, or take loss='robust' where "
         "many rows are wrong"
@@ -164,7 +171,8 @@ def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Ite
 def _slipped(found: Calibration) -> Iterator[Finding]:
     few = thinned(len(found.rows), LOOKED_AT)
     for column, errors, jacobian, slopes in found.systems(few):
-        seen = slip(errors, jacobian, slopes)
+        data = found.measurements.select(found.rows[few])
+        seen = slip(errors, jacobian, slopes, smooth_functions(data.r))
         if seen is None:
             continue
         first = found.rows[few[seen.first]]
@@ -173,8 +181,9 @@ def _slipped(found: Calibration) -> Iterator[Finding]:
         rows = rows[(rows >= first) & (rows < last)]
         cart = column < len(found.geometry.arms)
         size = f"{seen.size * 1e3:+.3g} mm" if cart else f"{seen.size * 1e3:+.3g} mrad"
+        where = rows_in_words(rows, len(found.measurements))
         words = (
-            f"q{column + 1} is off by {size} in {rows_in_words(rows)}, beside the other rows; the encoder slipped or was "
+            f"q{column + 1} is off by {size} in {where}, beside the other rows; the encoder slipped or was "
             "referenced anew, or the robot or the device was moved; calibrate the parts apart, or measure again"
         )
         yield Finding("slip", rows, words)
@@ -183,7 +192,8 @@ def _slipped(found: Calibration) -> Iterator[Finding]:
 def _in_doubt(found: Calibration) -> Iterator[Finding]:
     lost = found.held_out[~np.isfinite(found.errors)]
     if lost.size:
-        words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; they are left out of .error"
+        left = f"{agreeing(lost, 'they are')} left out of .error"
+        words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; {left}"
         yield Finding("no pose", lost, words)
     if not found.success:
         words = "the fit did not converge; its numbers are those of the last step; measure more poses, or give a prior"
@@ -220,7 +230,7 @@ def _mistaken(found: Calibration, seen: Suspicion) -> list[Finding]:
         Finding(
             mistake.kind,
             rows[places],
-            f"{mistake.words} in {rows_in_words(rows[places])}; correct these rows",
+            f"{mistake.words} in {rows_in_words(rows[places])}; correct {'this row' if len(places) == 1 else 'these rows'}",
         )
         for mistake, places in explained_rows(
             found.geometry, seen.misses, limit, data.q[rows], data.r[rows], R

@@ -2,17 +2,20 @@
 
     e = J dp + s_k d [k >= first]       gain(first) = (h'e)^2 / h'h,   h the column s [k >= first] less its part in J
 
-s is the derivative of the closure errors by the actuator. One step that explains most of the squares is told; errors of
-guideways do not do that. Rows are taken in the order measured.
+s is the derivative of the closure errors by the actuator. One step that explains most of the squares is told, if it
+explains them much better than smooth functions of the pose do: those are errors of the model, bends of guideways or
+directions that were held at wrong values. Rows are taken in the order measured.
 """
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 SHARE = 0.5  # of the squares, that a step must explain, or two
 DEVIATIONS = 7.0  # of its own, that a step must have
 ROWS = 5  # at the least on each side of a step: fewer are outliers
+SMOOTHER = 2.0  # times the variance that a step leaves, which smooth functions must leave at the least
 FREEDOM = 30  # errors more than numbers; fewer hardly tell a step from noise
 
 
@@ -25,31 +28,56 @@ class Slip:
     size: float
 
 
-def slip(errors: np.ndarray, jacobian: np.ndarray, slopes: np.ndarray) -> Slip | None:
-    """Errors (N, m) of m links over N poses, jacobian (N, m, p) of what was identified, slopes (N, m) by the actuator."""
+def slip(errors: np.ndarray, jacobian: np.ndarray, slopes: np.ndarray, smooth: np.ndarray) -> Slip | None:
+    """Errors (N, m) of m links over N poses, jacobian (N, m, p) of their numbers, slopes (N, m) by the actuator, smooth
+    functions of the pose (N, s).
+    """
     count, links = errors.shape
     known = np.linalg.qr(jacobian.reshape(count * links, -1))[0]
     freedom = count * links - known.shape[1] - 2
     if freedom < FREEDOM:
         return None
     left = errors.ravel() - known @ (known.T @ errors.ravel())
-    whole = float(left @ left)
+    found, rest = _steps(left, known, slopes, freedom)
+    if found is None:
+        return None
+    columns = np.kron(np.eye(links), smooth[:, None, :]).reshape(count, links, -1)
+    wide = np.linalg.qr(np.column_stack([known, columns.reshape(count * links, -1)]))[0]
+    rival, rival_freedom = left - wide @ (wide.T @ left), count * links - wide.shape[1]
+    if rival_freedom < FREEDOM or float(rival @ rival) / rival_freedom < SMOOTHER * rest / freedom:
+        return None
+    return found
+
+
+def smooth_functions(r: np.ndarray) -> np.ndarray:
+    """Polynomials of the third degree in r (N, 3), so (N, 20); not in q, which is where it should not be."""
+    x = 2 * (r - r.min(axis=0)) / np.maximum(np.ptp(r, axis=0), 1e-300) - 1
+    x = np.column_stack([np.ones(len(x)), x])
+    return np.column_stack(
+        [x[:, i] * x[:, j] * x[:, k] for i, j, k in combinations_with_replacement(range(4), 3)]
+    )
+
+
+def _steps(
+    left: np.ndarray, known: np.ndarray, slopes: np.ndarray, freedom: int
+) -> tuple[Slip | None, float]:
+    """The step, or two, that explain most of what is left, and the squares that remain."""
+    count, whole = len(slopes), float(left @ left)
     first, gain = _step(left, known, slopes)
     column = _column(first, slopes, known)
     size = float(column @ left) / float(column @ column)
-    rest = left - size * column
     if gain > SHARE * whole and gain > DEVIATIONS**2 * (whole - gain) / freedom:
-        return Slip(first, count, size)
+        return Slip(first, count, size), whole - gain
     known = np.column_stack([known, column / np.linalg.norm(column)])
-    second, more = _step(rest, known, slopes)
+    second, more = _step(left - size * column, known, slopes)
     left_over = whole - gain - more
-    if gain + more > SHARE * whole and min(gain, more) > DEVIATIONS**2 * left_over / freedom:
-        ends = sorted((first, second))
-        if ends[1] - ends[0] < ROWS:
-            return None
-        inside = _column(ends[0], slopes, known[:, :-1]) - _column(ends[1], slopes, known[:, :-1])
-        return Slip(ends[0], ends[1], float(inside @ left) / float(inside @ inside))
-    return None
+    ends = sorted((first, second))
+    if gain + more < SHARE * whole or min(gain, more) < DEVIATIONS**2 * left_over / freedom:
+        return None, left_over
+    if ends[1] - ends[0] < ROWS:
+        return None, left_over
+    inside = _column(ends[0], slopes, known[:, :-1]) - _column(ends[1], slopes, known[:, :-1])
+    return Slip(ends[0], ends[1], float(inside @ left) / float(inside @ inside)), left_over
 
 
 def _column(first: int, slopes: np.ndarray, known: np.ndarray) -> np.ndarray:
