@@ -226,6 +226,12 @@ def test_another_robot_and_too_few_poses(fails, measured, poses):
         (("--model", "6"), "--model 6: expected one of parallel, 1, 2"),
         (("--prior", "length"), "--prior length: expected NAME=DEVIATION"),
         (("--prior", "length=0"), "the deviation above 0"),
+        (
+            ("--constraint", "length"),
+            "--constraint length: expected NAME=VALUE, NAME=[LEAST,MOST] or NAME=NAME",
+        ),
+        (("--constraint", "length=2=3"), "expected a number"),
+        (("--constraint", "a=1", "--constraint", "a=2"), "found a twice"),
         (("--prior", "length=[1,2,3]"), "or NAME=[VALUE,DEVIATION]"),
         (("--rails", "nowhere.csv"), "nowhere.csv: found no file to read"),
         (("--robot", "GantryTau(X1)"), "there is no such robot; did you mean 'L1'"),
@@ -348,3 +354,24 @@ def test_a_fit_that_does_not_settle_is_no_result(fails, measured, poses, tmp_pat
 )
 def test_python_words_become_options(said, spoken):
     assert policy.in_options(said) == spoken
+
+
+def test_constraints_are_kept(answer, fails, measured, poses):
+    file = measured(poses)
+    length = "arms[0].length=[2.05,2.06]"
+    kept = (
+        "--constraint",
+        f"{length},arms[1].length=arms[2].length",
+        "--constraint",
+        "|arms[0].direction|=1",
+    )
+    found = answer("calibrate", file, *ROBOT, "--method", "ipopt", *kept)
+    values = found["parameters"]
+    assert 2.05 - 1e-9 <= values["arms[0].length"] <= 2.06 + 1e-9
+    assert values["arms[1].length"] == pytest.approx(values["arms[2].length"], abs=1e-9)
+    assert np.linalg.norm(values["arms[0].direction"]) == pytest.approx(1.0, abs=1e-9)
+    assert "found --constraint with --method gauss-newton" in fails(FAULT, "calibrate", file, *ROBOT, *kept)
+    wrong = ("--method", "ipopt", "--constraint", "arms[7].length=2")
+    assert "--constraint on 'arms[7].length', which is not identified" in fails(
+        FAULT, "calibrate", file, *ROBOT, *wrong
+    )

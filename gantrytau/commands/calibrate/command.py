@@ -60,6 +60,16 @@ Prior = Annotated[
         show_default=False,
     ),
 ]
+Constraints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--constraint",
+        metavar="NAME=VALUE",
+        help="What numbers keep, with --method ipopt: 'arms[0].length=2.05', limits as 'arms[0].length=[2.0,2.1]', "
+        "'arms[1].links[0].length=arms[1].links[1].length', or '|arms[0].direction|=1' of a vector's length. Repeatable.",
+        show_default=False,
+    ),
+]
 Output = Annotated[
     Path | None,
     typer.Option(help="Folder for what is written.", show_default="beside the file, with its name"),
@@ -79,6 +89,7 @@ def calibrate(
         str, typer.Option(metavar="local|unit|free", help="How quaternions of turntables are free.")
     ] = "local",
     prior: Prior = None,
+    constraint: Constraints = None,
     robust: Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")] = False,
     holdout: Annotated[
         str | None,
@@ -114,12 +125,11 @@ def calibrate(
                 "gantrytau calibrate --example > cell.toml"
             )
         if file.suffix.lower() == parameter_files.SUFFIX:
-            _refuse_others(
-                file, dict(robot=robot, rails=rails, model=model, prior=prior, set=set_, prototype=prototype)
-            )
+            others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior)
+            _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
             planning.plan(file, output, json)
             return
-        how = policy(model, method, start, orientation, holdout or "second", prior, robust)
+        how = policy(model, method, start, orientation, holdout or "second", prior, constraint or (), robust)
         folder = output or results.folder_beside(file)
         results.rehearse(folder)
         choice = _robot(file, robot, prototype, set_ or ())

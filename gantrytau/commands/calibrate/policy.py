@@ -1,6 +1,7 @@
 """How `gantrytau calibrate measurements.csv` is to calibrate: its options as arguments of `calibrate`."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ _IN_OPTIONS = (
     (r"found model=None", "found no --model"),
     (r"expected None; those models", "expected no --model; those models"),
     (r"\b(start|method|orientation|holdout|model)='?([\w-]+)'?", r"--\1 \2"),
+    (r"\bfound constraints with\b", "found --constraint with"),
+    (r"\bconstraint (on )?'", r"--constraint \1'"),
     (r"\bgive a prior\b", "give --prior NAME=DEVIATION"),
     (r"^calibrate: ", ""),
 )
@@ -37,6 +40,7 @@ def policy(
     orientation: str,
     holdout: str,
     prior: str | None,
+    constraints: Sequence[str],
     robust: bool,
 ) -> dict[str, Any]:
     """Keywords of `calibrate`; CommandError for words that it does not know."""
@@ -55,6 +59,7 @@ def policy(
         orientation=orientation,
         holdout=None if holdout == "none" else holdout,
         prior=_prior(prior),
+        constraints=_constraints(constraints),
         loss="robust" if robust else "linear",
     )
 
@@ -75,6 +80,26 @@ def _prior(text: str | None) -> dict[str, Any] | None:
         if len(pair) != 2 or any(isinstance(x, (bool, list)) for x in pair) or not pair[1] > 0:
             raise wrong
         found[name] = tuple(deviation) if isinstance(deviation, list) else deviation
+    return found or None
+
+
+def _constraints(texts: Sequence[str]) -> dict[str, Any] | None:
+    """`arms[0].length=2.05`, `arms[0].length=[2.0,2.1]`, `|arms[0].direction|=1`, `arms[0].length=arms[1].length`."""
+    found: dict[str, Any] = {}
+    for entry in listed(list(texts)):
+        name, _, value = (part.strip() for part in entry.partition("="))
+        if not (name and value):
+            raise CommandError(
+                f"--constraint {entry}: expected NAME=VALUE, NAME=[LEAST,MOST] or NAME=NAME, as 'arms[0].length=[2.0,2.1]'; "
+                "|NAME| is the length of a vector"
+            )
+        if name in found:
+            raise CommandError(f"--constraint {entry}: found {name} twice, expected once; give [LEAST,MOST]")
+        if value.strip("|")[:1].isalpha():
+            found[name] = value
+            continue
+        numbers = number("--constraint", name, value)
+        found[name] = tuple(numbers) if isinstance(numbers, list) and len(numbers) == 2 else numbers
     return found or None
 
 
