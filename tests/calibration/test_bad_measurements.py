@@ -84,6 +84,40 @@ def test_swapped_columns_in_some_rows(poses):
     assert kinds(robust)["swapped columns"] == [4, 8]
 
 
+def test_rows_with_the_same_mistake_are_told_together():
+    q, r = grid(TRUTH, 200)
+    q = q.copy()
+    q[[4, 9]] = q[[4, 9]][:, [1, 0, 2]]
+    for seed in range(
+        4
+    ):  # in row 9 x and z are nearly alike: as they are exchanged too, by chance links close as well
+        noisy = r + NOISE * np.random.default_rng(seed).standard_normal(r.shape)
+        error = refused(q, noisy, nominal(1e-2, seed))
+        assert "q1 stands in column q2, q2 stands in column q1 in rows 4 and 9; correct these rows" in str(
+            error
+        )
+        assert len(error.findings) == 1
+
+
+@pytest.mark.parametrize("columns", [[1, 0, 2], [0, 2, 1], [2, 0, 1]])
+def test_swapped_columns_in_another_frame(poses, columns):
+    q, r = poses
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    error = refused(q[:, columns], r @ turn.T + [1, 2, 3])
+    assert error.kind == "swapped columns"
+    for k, c in enumerate(np.argsort(columns)):
+        assert (f"q{k + 1} stands in column q{c + 1}" in str(error)) == (k != c)
+    assert len(error.rows) == 779
+
+
+def test_a_left_handed_frame(poses):
+    q, r = poses
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    error = refused(q, r * [1, -1, 1] @ turn.T + [1, 2, 3])
+    assert error.kind == "sign"
+    assert "left-handed frame" in str(error)
+
+
 @pytest.mark.parametrize(("scale_q", "scale_r"), [(1.0, 1e3), (1e3, 1.0), (1e3, 1e3)])
 def test_millimetres(poses, scale_q, scale_r):
     q, r = poses

@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.plausibility import (
     explained_rows,
     miss,
     misses_of,
+    swapped_carts,
     thinned,
 )
 from gantrytau_optimica.calibration.slips import slip, smooth_functions
@@ -81,6 +82,15 @@ def in_frame(
             f"{fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, of a robot with "
             "linear guideways",
             kind="another robot",
+            rows=rows,
+        )
+    if fitting.off > NEAR and (swapped := swapped_carts(links, fitting.off, data.q, data.r, data.R)):
+        words, off = swapped
+        raise CalibrationError(
+            f"Measurements: found {words} in {rows_in_words(rows)} (guideways lie {fitting.off:.3g} m off those of "
+            f"{geometry.name} however the frame is placed, {off:.3g} m with that undone); correct the columns of the "
+            "measurements",
+            kind="swapped columns" if "column" in words else "sign",
             rows=rows,
         )
     if fitting.off > NEAR:

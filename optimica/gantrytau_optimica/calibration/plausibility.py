@@ -6,6 +6,7 @@ median decides, so that outliers do not.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -14,10 +15,11 @@ from gantrytau_optimica.calibration.findings import CalibrationError, rows_in_wo
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.linear_start import linear_start
 from gantrytau_optimica.calibration.mistakes import Mistake, mistakes
-from gantrytau_optimica.calibration.models import Link, mean_rotation
+from gantrytau_optimica.calibration.models import Link, mean_rotation, moved
 
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
 BETTER = 10.0  # times smaller errors that undoing a mistake must leave
+ALIKE = 0.05  # m; a D1 is within 75 mm of an L1 whose q2 and q3 are exchanged
 POSES = 200
 TRIMMINGS = 8  # rounds of placing a frame without the points that fit it worst
 
@@ -63,23 +65,56 @@ def mistakes_of(geometry: Geometry) -> Iterator[Mistake]:
 def explained_rows(
     geometry: Geometry, misses: Misses, limit: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> Iterator[tuple[Mistake, np.ndarray]]:
-    """Mistakes that explain some of these rows: links close within `limit` once it is undone; places of these rows."""
+    """Mistakes that explain some of these rows: links close within `limit` once it is undone; places of these rows.
+
+    First the mistake that explains most of them, of these the simplest: of a row with like numbers in two columns more
+    than one is true.
+    """
     found = misses(q, r, R)
     known = list(mistakes_of(geometry))
     left = np.array([misses(*mistake.undo(q, r, R)) for mistake in known])
-    best = np.argmin(left, axis=0)
-    least = left[best, np.arange(len(found))]
-    good = (least < limit) & (least * BETTER < found)
-    for k, mistake in enumerate(known):
-        places = np.flatnonzero(good & (best == k))
-        if places.size:
-            yield mistake, places
+    good = (left < limit) & (left * BETTER < found)
+    while good.any():
+        best = min(
+            range(len(known)),
+            key=lambda k: (-good[k].sum(), known[k].words.count(","), left[k, good[k]].sum()),
+        )
+        places = np.flatnonzero(good[best])
+        yield known[best], places
+        good[:, places] = False
 
 
 def miss(misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> float:
     """How far links are from their nominal lengths, median over some of the poses of the worst link, m."""
     few = thinned(len(q))
     return float(np.median(misses(q[few], r[few], None if R is None else R[few])))
+
+
+def swapped_carts(
+    links: Sequence[Link], off: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+) -> tuple[str, float] | None:
+    """What stands in the wrong columns, and by how much guideways are off then, m; None if no other order of the carts, nor
+    a mirrored frame, brings guideways to their nominal places in any frame. off: m, by which they are off as it is.
+    """
+    count = q.shape[1]
+    undone = [
+        (
+            ", ".join(f"q{k + 1} stands in column q{c + 1}" for k, c in enumerate(order) if k != c),
+            q[:, order],
+            r,
+        )
+        for order in permutations(range(count))
+    ][1:]
+    if all(link.chain.R is None for link in links):
+        words = "x, y and z of a left-handed frame (one with the opposite sign, or two exchanged)"
+        undone.append((words, q, -r))
+    trials = []
+    for words, carts, places in undone:
+        fitting = compare(links, carts, places, R)
+        there = misses_of(moved(links, fitting.turn, fitting.shift))
+        trials.append((max(fitting.off, miss(there, carts, places, R)), words))  # by lengths too
+    left, words = min(trials)
+    return (words, left) if left < ALIKE and left * BETTER < off else None
 
 
 def misses_of(links: Sequence[Link]) -> Misses:
