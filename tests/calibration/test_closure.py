@@ -7,7 +7,13 @@ from gantrytau_optimica.calibration.closure import Chain, condense
 from gantrytau_optimica.calibration.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.guideway_points import between, slope, straight
 from gantrytau_optimica.calibration.linear_start import linear_start
-from gantrytau_optimica.calibration.rotations import rotation, rotation_vector, rotations, turning
+from gantrytau_optimica.calibration.rotations import (
+    rotation,
+    rotation_vector,
+    rotations,
+    told_vector,
+    turning,
+)
 
 RNG = np.random.default_rng(0)
 N = 5000  # three blocks of rows
@@ -110,6 +116,18 @@ def test_rotation_vectors_go_back_and_forth():
     R = rotations(w)
     assert rotation_vector(R) == pytest.approx(w, abs=1e-8)
     assert R[0] == pytest.approx(rotation(w[0]))
+    for w in (
+        [0.0, -np.pi + 1e-3, 2e-3],
+        [0.0, np.pi + 1e-3, 2e-3],
+        [1.0, -2.0, 0.5],
+        [0.0, 0.0, 0.0],
+        [-3.0, 0.1, 0.9],
+    ):
+        told = told_vector(rotation(np.array(w)))
+        assert rotation(told) == pytest.approx(rotation(np.array(w)), abs=1e-9)
+        assert (
+            np.linalg.norm(told) < np.pi - 0.05 or told[np.argmax(np.abs(told))] > 0
+        )  # either side of half a turn
     for a, b in RNG.normal(size=(5, 2, 3)):
         assert turning(a, b) @ a / np.linalg.norm(a) == pytest.approx(b / np.linalg.norm(b))
     a = np.array([1.0, 2.0, 3.0])

@@ -15,7 +15,7 @@ import numpy as np
 
 from gantrytau_optimica.calibration.closure import ALONG, PLATE
 from gantrytau_optimica.calibration.fitting import Fit
-from gantrytau_optimica.calibration.rotations import left_jacobian, rotation_vector
+from gantrytau_optimica.calibration.rotations import left_jacobian, told_vector
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
 MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
@@ -154,7 +154,7 @@ def as_told(fit: Fit) -> np.ndarray:
     for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
         if chain.points is not None:
             p, turn = fit.x[places], places[ALONG]
-            W = rotation_vector(chain.frame(p))
+            W = told_vector(chain.frame(p))
             whole[np.ix_(turn, turn)] = np.linalg.solve(left_jacobian(W), left_jacobian(p[ALONG]))
     return whole[np.ix_(fit.group.free, fit.group.free)]
 

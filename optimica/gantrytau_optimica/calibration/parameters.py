@@ -11,7 +11,7 @@ from gantrytau_optimica.calibration.closure import ALONG, OFFSET, PLATE
 from gantrytau_optimica.calibration.fitting import Fit
 from gantrytau_optimica.calibration.forward import Guideway, RodLink
 from gantrytau_optimica.calibration.geometry import Geometry
-from gantrytau_optimica.calibration.rotations import rotation_vector
+from gantrytau_optimica.calibration.rotations import told_vector
 
 
 class Named(Mapping[str, Any]):
@@ -59,7 +59,7 @@ def named_parameters(geometry: Geometry, fits: Sequence[Fit]) -> dict[str, Any]:
             p = fit.x[places]
             names = [fit.group.names[k] for k in places]
             offset = p[OFFSET] - (geometry.arms[arm_of(chain.name)].base if chain.R is not None else 0.0)
-            along = p[ALONG] if chain.points is None else rotation_vector(chain.frame(p))
+            along = p[ALONG] if chain.points is None else told_vector(chain.frame(p))
             direction = names[4].rsplit("[", 1)[0]
             if direction == "direction":
                 direction = f"arms[{arm_of(chain.name)}].direction"

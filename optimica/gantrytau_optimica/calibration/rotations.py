@@ -4,6 +4,8 @@ import numpy as np
 
 from gantrytau.kinematics.rotations import skewed, turned
 
+NEAR_HALF_A_TURN = 0.05  # rad
+
 
 def rotation(w: np.ndarray) -> np.ndarray:
     """exp([w]x), (3, 3) (Rodrigues)."""
@@ -39,6 +41,17 @@ def rotation_vector(R: np.ndarray) -> np.ndarray:
         axes = np.take_along_axis(columns, best[:, None, None], axis=-1)[..., 0]
         found[half_turn] = np.pi * axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     return found
+
+
+def told_vector(R: np.ndarray) -> np.ndarray:
+    """The rotation vector by which a rotation (3, 3) is reported: near half a turn that whose largest element is positive.
+
+    There noise would change its sign; so its angle may be a little above pi.
+    """
+    w = rotation_vector(R)
+    angle = float(np.linalg.norm(w))
+    near = angle > np.pi - NEAR_HALF_A_TURN
+    return w * (1 - 2 * np.pi / angle) if near and w[np.argmax(np.abs(w))] < 0 else w
 
 
 def turning(a: np.ndarray, b: np.ndarray) -> np.ndarray:
