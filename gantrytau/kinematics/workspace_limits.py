@@ -1,6 +1,7 @@
 """What limits the poses of a robot: reach, strokes, ball joints, obstacles; and by how much poses keep these limits."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from gantrytau.kinematics.rotations import angle_between
 from gantrytau.model import Model
 
 REASONS = ("inside", "out of reach", "stroke", "ball joint", "collision")
+_MISS = 1e-6  # m by which links of a pose may miss their lengths
 _BLOCK = 1024  # poses, whose links and their distances stay in the cache
 
 
@@ -124,19 +126,52 @@ class Examiner:
         self.carts = len(self.geometry.offset)
         self.strokes = _strokes(self.kinematics, self.carts, limits.strokes)
         self.around, self.reach = self.geometry.reach()
+        self._touching = _pairs(self.geometry) if limits.link_radius else []
         self._axes = self._joint_axes() if math.isfinite(limits.ball_joint) else None
 
     def __call__(self, r: ArrayLike, R: ArrayLike | None = None) -> Examined:
         """See `examine`."""
         at = poses(r, R, self.name)
-        parts = [slice(k, k + _BLOCK) for k in range(0, len(at.r), _BLOCK)] or [slice(0)]
-        blocks = [self._of_block(at.r[part], None if at.R is None else at.R[part]) for part in parts]
-        return Examined(
-            r=at.r, **{name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-        )
 
-    def _of_block(self, r: np.ndarray, R: np.ndarray | None) -> dict[str, np.ndarray]:
-        q, R = self._joints_and_orientation(r, R)
+        def block(part: slice) -> dict[str, np.ndarray]:
+            place, turn = at.r[part], None if at.R is None else at.R[part]
+            q, turn = self._joints_and_orientation(place, turn)
+            return self._of_block(q, place, turn)
+
+        return _in_blocks(at.r, block)
+
+    def judge(self, q: ArrayLike, r: ArrayLike, R: ArrayLike) -> Examined:
+        """The same for poses whose actuators are known, q (N, n), r (N, 3), R (N, 3, 3), such as `fk` gives them.
+
+        Out of reach are NaN, poses in which links miss their lengths, and an arm on the other side of its cart than at
+        the start of the model. Raises ModelError for other shapes.
+        """
+        at, joints = poses(r, R, self.name), floats(q)
+        if at.R is None or joints.shape != (len(at.r), len(self.kinematics.joints)):
+            raise ModelError(
+                f"{self.name}: found actuators {told(q)} and orientations {told(R)} of {len(at.r)} poses, expected q "
+                f"({len(at.r)}, {len(self.kinematics.joints)}) and R; take both from Kinematics.fk"
+            )
+        turns = at.R
+
+        def block(part: slice) -> dict[str, np.ndarray]:
+            known, place, turn = joints[part], at.r[part], turns[part]
+            good = self._assembled(known, place, turn)
+            return self._of_block(np.where(good[:, None], known, np.nan), place, turn)
+
+        return _in_blocks(at.r, block)
+
+    def _assembled(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Whether links are as long as they are, each arm on its side, (N,)."""
+        with np.errstate(invalid="ignore"):
+            length, u, _, _ = self.geometry.slopes(q, r, R, joints=False)
+            good: np.ndarray = np.all(np.abs(length - self.geometry.length) < _MISS, axis=1)
+            along = np.sum(u * self.geometry.direction[self.geometry.arm], axis=2)
+            for arm, side in enumerate(self.linked.sides):
+                good = good & (along[:, self.geometry.links_of(arm)].mean(axis=1) * side > 0)
+        return good
+
+    def _of_block(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> dict[str, np.ndarray]:
         reached = np.isfinite(q).all(axis=1)
         reason = np.where(reached, 0, REASONS.index("out of reach"))
         stroke, turn = self._strokes_left(q)
@@ -217,11 +252,16 @@ class Examiner:
             for body in self.limits.plate:
                 plate = segment_distance(obstacle, r + R @ body.start, r + R @ body.end) - body.radius
                 least = np.minimum(least, plate)
-        if self.limits.link_radius:
-            for i, j in _pairs(self.geometry):
-                apart = between_segments(start[:, i], end[:, i], start[:, j], end[:, j])
-                least = np.minimum(least, apart - 2 * self.limits.link_radius)
+        for i, j in self._touching:
+            apart = between_segments(start[:, i], end[:, i], start[:, j], end[:, j])
+            least = np.minimum(least, apart - 2 * self.limits.link_radius)
         return least - self.limits.clearance
+
+
+def _in_blocks(r: np.ndarray, block: Callable[[slice], dict[str, np.ndarray]]) -> Examined:
+    parts = [slice(k, k + _BLOCK) for k in range(0, len(r), _BLOCK)] or [slice(0)]
+    blocks = [block(part) for part in parts]
+    return Examined(r=r, **{name: np.concatenate([each[name] for each in blocks]) for name in blocks[0]})
 
 
 def _pairs(geometry: Geometry) -> list[tuple[int, int]]:

@@ -133,7 +133,7 @@ def test_remaining_poses_go_again_without_collision(plan):
 def test_files_hold_the_plan(plan, tmp_path):
     folder = plan.write(tmp_path / "cell", name="CalibrateL1")
     assert sorted(path.name for path in folder.iterdir()) == [
-        "CalibrateL1.mod", "plan.html", "plan.json", "poses.csv", "workspace.png",
+        "CalibrateL1.mod", "measurements-template.csv", "plan.html", "plan.json", "poses.csv", "workspace.png",
     ]  # fmt: skip
     with (folder / "poses.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -8,7 +8,7 @@ from gantrytau import ModelError
 from gantrytau.kinematics.rotations import turned
 from gantrytau.kinematics.workspace_limits import REASONS
 from gantrytau_optimica.calibration.devices import Device
-from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.fleet import WIDER, Fleet
 from gantrytau_optimica.procedure.settling import SettledWorkspace
 
 TRIED = {"three links": 1500, "six links": 1000, "turntables": 1000}  # poses; more hardly change the choice
@@ -97,7 +97,7 @@ def _tried(fleet: Fleet, places: SettledWorkspace, count: int, random: np.random
     R = turned(places.R[rows], size * axis / np.linalg.norm(axis, axis=1, keepdims=True))
     q = fleet.nominal.joints(places.r[rows], R)
     q = q[np.isfinite(q).all(axis=1)]
-    return q[fleet.nominal.judged(q).safe]
+    return q[fleet.nominal.judged(q).inside]
 
 
 def _check(fleet: Fleet, device: Device, q: np.ndarray, reason: np.ndarray, seen: np.ndarray) -> None:
@@ -108,8 +108,8 @@ def _check(fleet: Fleet, device: Device, q: np.ndarray, reason: np.ndarray, seen
             f"{counts[k] / len(reason):.0%} {REASONS[k]}" for k in np.argsort(-counts) if counts[k]
         )
         raise ModelError(
-            f"plan_calibration: found no safe place among {len(q)} tried: in one or another of {len(fleet.members)} "
-            f"robots that the tape measure cannot tell apart {shares}; expected some; measure the robot better by hand "
+            f"plan_calibration: found no safe place among {len(q)} tried: in one or another of {len(fleet.judges)} "
+            f"robots with the tape error or {WIDER:g} times that {shares}; expected some; measure the robot better by hand "
             "(tape=), give smaller margins and obstacles, or larger strokes"
         )
     if not seen.any():

@@ -14,13 +14,17 @@ A_j'': of joints on turntables. As far as speeds then stay below what was assume
 moves by more than V h + C h^2 / 2. An interval of a way is clear if that is less than what the sample at its middle
 leaves; else it is halved, until it is clear, or a sample breaks a limit, or hardly anything moves in it. Nothing that
 happens between two samples can be missed; a way that is refused may be free by a hair.
+
+A plate that turns has several poses for the same q, and an iteration may find one to which no motion leads: where two
+intervals meet, both must lead to the same pose, and at the ends of a way to that of its places.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from gantrytau.kinematics.rotations import cross
+from gantrytau.kinematics.workspace_limits import Examined
 from gantrytau_optimica.procedure.fleet import Fleet, Member
 
 FIRST = 4  # intervals that a way begins with, or so many times more where the plate turns
@@ -28,6 +32,7 @@ TURNING = 8
 LEAST = 2.5e-4  # m, motion within an interval below which it is not halved again
 LITTLE = 0.1  # of the speed of the fastest cart, by which motion may differ from twice that at a sample
 LEVER = 0.1  # m, to compare rotations with where the plate has no levers
+SAME = 1e-6  # m and of a rotation matrix, between poses that are the same
 TINY = 1e-12
 
 
@@ -51,7 +56,7 @@ class _Bounds:
 def clear_ways(fleet: Fleet, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Which of the ways from a (N, n) to b (N, n) all robots of a fleet can go, (N,)."""
     clear = np.ones(len(a), dtype=bool)
-    for member in fleet.members:
+    for member in fleet.judges:
         left = np.flatnonzero(clear)
         if left.size:
             clear[left] = _clear_of(member, a[left], b[left])
@@ -60,35 +65,39 @@ def clear_ways(fleet: Fleet, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _clear_of(member: Member, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     clear = np.ones(len(a), dtype=bool)
-    ends = np.concatenate([a, b])
-    broken = ~member.judged(ends).safe
-    clear[broken[: len(a)] | broken[len(a) :]] = False
+    ends = member.judged(np.concatenate([a, b]))
+    clear[~ends.inside[: len(a)] | ~ends.inside[len(a) :]] = False
     first = FIRST * TURNING if member.turns else FIRST
     way: np.ndarray = np.repeat(np.arange(len(a)), first)
     half: np.ndarray = np.full(len(way), 0.5 / first)
     middle: np.ndarray = np.tile((np.arange(first) + 0.5) / first, len(a))
+    pieces: list[_Pieces] = []
     while True:
         kept = clear[way]
         way, middle, half = way[kept], middle[kept], half[kept]
         if not way.size:
-            return clear
-        covered, hopeless = _covered(member, a[way] + middle[:, None] * (b - a)[way], (b - a)[way], half)
+            break
+        found = member.judged(a[way] + middle[:, None] * (b - a)[way])
+        covered, hopeless = _covered(member, found, (b - a)[way], half)
         clear[way[hopeless]] = False
+        pieces.append(
+            _Pieces(way[covered], middle[covered], half[covered], found.r[covered], found.R[covered])
+        )
         way, middle, half = way[~covered], middle[~covered], half[~covered] / 2
         middle = np.concatenate([middle - half, middle + half])
         way, half = np.tile(way, 2), np.tile(half, 2)
+    return clear & _continuous(member, a, b, ends, pieces, clear) if member.turns else clear
 
 
 def _covered(
-    member: Member, q: np.ndarray, rate: np.ndarray, half: np.ndarray
+    member: Member, found: Examined, rate: np.ndarray, half: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which samples answer for all of their intervals, (k,); and which break a limit or cannot be told, (k,)."""
-    found = member.judged(q)
-    covered, hopeless = np.zeros(len(q), dtype=bool), ~found.safe
-    rows = np.flatnonzero(found.safe)
+    covered, hopeless = np.zeros(len(half), dtype=bool), ~found.inside
+    rows = np.flatnonzero(found.inside)
     if not rows.size:
         return covered, hopeless
-    bounds = _bounds(member, q[rows], found.r[rows], found.R[rows], rate[rows])
+    bounds = _bounds(member, found.q[rows], found.r[rows], found.R[rows], rate[rows])
     h = half[rows]
     both = 2.0 if member.limits.link_radius else 1.0  # links may move towards each other
     near = both * bounds.moved(h) <= found.clearance[rows]
@@ -96,6 +105,46 @@ def _covered(
     covered[rows] = good
     hopeless[rows] = ~good & (h * bounds.speed < LEAST)
     return covered, hopeless
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Intervals that are clear: number of their way (k,), middle and half of them, 0 to 1, and the pose in the middle."""
+
+    way: np.ndarray
+    middle: np.ndarray
+    half: np.ndarray
+    r: np.ndarray
+    R: np.ndarray
+
+
+def _continuous(
+    member: Member, a: np.ndarray, b: np.ndarray, ends: Examined, pieces: list[_Pieces], clear: np.ndarray
+) -> np.ndarray:
+    """Which of the ways that are `clear` lead from the pose of one end to that of the other without a jump, (N,)."""
+    one = _Pieces(*(np.concatenate([getattr(p, f.name) for p in pieces]) for f in fields(_Pieces)))
+    rows = np.flatnonzero(clear[one.way])
+    rows = rows[np.lexsort((one.middle[rows], one.way[rows]))]
+    way, near = one.way[rows], (one.r[rows], one.R[rows])
+    if not rows.size:
+        return clear
+    before, after = (
+        _flat(*member.kinematics.fk(a[way] + at[:, None] * (b - a)[way], near=near))
+        for at in (one.middle[rows] - one.half[rows], one.middle[rows] + one.half[rows])
+    )
+    places = _flat(ends.r, ends.R)
+    starts = np.append(True, way[1:] != way[:-1])
+    comes = np.where(starts[:, None], places[way], np.roll(after, 1, axis=0))
+    lasts = np.roll(starts, -1)
+    apart = np.abs(before - comes).max(axis=1)
+    apart[lasts] = np.maximum(apart[lasts], np.abs(after - places[len(a) + way])[lasts].max(axis=1))
+    found = clear.copy()
+    found[way[~(apart < SAME)]] = False
+    return found
+
+
+def _flat(r: np.ndarray, R: np.ndarray) -> np.ndarray:
+    return np.hstack([r, R.reshape(len(R), 9)])
 
 
 def _bounds(member: Member, q: np.ndarray, r: np.ndarray, R: np.ndarray, rate: np.ndarray) -> _Bounds:

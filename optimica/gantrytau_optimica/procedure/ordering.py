@@ -62,7 +62,7 @@ def ordered(
     if not len(stops):
         raise ModelError(
             f"plan_calibration.home: found no clear way from home to any of {len(choice.rows)} chosen poses, which all "
-            "robots within the tape error could go; expected one; take a home in the free space where the poses are, "
+            "robots within twice the tape error could go; expected one; take a home in the free space where the poses are, "
             "smaller margins, or give smaller obstacles"
         )
     q = roadmap.q[tour.nodes]

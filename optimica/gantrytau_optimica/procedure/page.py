@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau_optimica.procedure.choice import CRITERION
+from gantrytau_optimica.procedure.fleet import WIDER
 from gantrytau_optimica.procedure.rapid import OPERATOR
 from gantrytau_optimica.procedure.verdict import um
 
 if TYPE_CHECKING:
     from gantrytau_optimica.procedure.plan import CalibrationPlan
 
-DOUBT, USUAL = 0.05, 20  # of 95 % confidence; robots that are usually drawn
+USUAL = 20  # robots that are drawn
 STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
@@ -37,10 +38,9 @@ def command(plan: "CalibrationPlan", folder: str | Path = ".") -> str:
 def drawn(plan: "CalibrationPlan") -> str:
     """What so many simulated robots say of the safety of all others."""
     robots = int(plan.settings["robots"])
-    share = 1 - DOUBT ** (1 / robots)
     words = (
-        f"none of {robots} robots drawn within the tape error breaks a limit on the way: with 95 % confidence up to "
-        f"{share:.0%} of such robots may still do so"
+        f"none of {robots} robots drawn with the tape error, and none of as many with {WIDER:g} times these errors, breaks "
+        "a limit on the way; a robot farther from its nominal values may"
     )
     return words if robots >= USUAL else f"{words}; {USUAL} or more robots say more"
 

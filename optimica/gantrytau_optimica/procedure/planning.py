@@ -62,12 +62,12 @@ def plan_calibration(
     robot: with the parameters that were measured by tape, any Gantry-Tau; limits: strokes, ball joints, obstacles, links
     and plate as bodies, margins; device: where it stands and what it sees. poses: how many to measure; wanted: error of
     the tool, m, that calibration must reach in the mean over the workspace; tape: standard deviation of joints and
-    lengths, m; robots: how many robots within it must be safe and are calibrated in simulation; seed: of all that is
-    drawn; spacing: of the grid of the workspace, m, None refines it until it has settled; margin: m (and rad) by which
-    poses keep more than the limits ask, so that there are ways between them; home: q (n,) where the program begins and
-    ends, None for the start of the model. folder: keeps finished stages there, so that the same call goes on after an
-    interruption; stages whose questions changed are done anew. progress: called with (stage, done, of). Raises ModelError
-    for what does not fit, where nothing is visible or safe, or home is in a collision.
+    lengths, m; robots: how many with such errors are calibrated in simulation; they must be safe, and as many with twice
+    these errors; seed: of all that is drawn; spacing: of the grid of the workspace, m, None refines it until it has
+    settled; margin: m (and rad) by which poses keep more than the limits ask, so that there are ways between them; home: q
+    (n,) where the program begins and ends, None for the start of the model. folder: keeps finished stages there, so that
+    the same call goes on after an interruption; stages whose questions changed are done anew. progress: called with
+    (stage, done, of). Raises ModelError for what does not fit, where nothing is visible or safe, or home is in a collision.
     """
     _check_numbers(wanted=wanted, tape=tape, margin=margin, robots=robots)
     _check_kinds(limits, device)

@@ -17,7 +17,7 @@ import numpy as np
 from gantrytau.result_files import replacing
 
 Record = TypeVar("Record")
-VERSION = "2"  # of what the stages compute; another one makes all anew
+VERSION = "3"  # of what the stages compute; another one makes all anew
 Progress = Callable[[str, int, int], None]
 
 
