@@ -6,7 +6,7 @@ import pytest
 
 from gantrytau.kinematics import Capsule
 from gantrytau_optimica import plan_calibration
-from gantrytau_optimica.procedure import planning
+from gantrytau_optimica.procedure import known_ways, planning
 from tests.procedure import cells
 
 FEW = dict(poses=9, robots=3, tape=0.003, spacing=0.25)
@@ -91,3 +91,24 @@ def test_a_damaged_stage_is_made_anew(plan, tmp_path):
     for file in (tmp_path / "stages").glob("*.npz"):
         file.write_bytes(file.read_bytes()[:100])
     cells.same(plan_calibration(*cells.l1(), **FEW, folder=tmp_path), plan)
+
+
+def test_ways_that_were_checked_are_not_checked_again(plan, tmp_path, monkeypatch):
+    monkeypatch.setattr(known_ways, "OFTEN", 0.0)
+    original, calls = known_ways.clear_ways, []
+
+    def counting(fleet, a, b):
+        if len(calls) == 2 and not (tmp_path / "again").exists():
+            raise KeyboardInterrupt
+        calls.append([(*start, *end) for start, end in zip(a.tolist(), b.tolist(), strict=True)])
+        return original(fleet, a, b)
+
+    monkeypatch.setattr(known_ways, "clear_ways", counting)
+    monkeypatch.setattr(known_ways, "PART", 4)
+    with pytest.raises(KeyboardInterrupt):
+        plan_calibration(*cells.l1(), **FEW, folder=tmp_path)
+    (tmp_path / "again").touch()
+    cells.same(plan_calibration(*cells.l1(), **FEW, folder=tmp_path), plan)
+    every = [way for call in calls for way in call]
+    assert len(calls) > 2
+    assert len(set(every)) == len(every)

@@ -1,5 +1,6 @@
 """The chosen poses in a collision-free order; what cannot be reached is replaced by the next best."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from gantrytau import ModelError
 from gantrytau_optimica.calibration.devices import Device
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.choice import Choice, choose
+from gantrytau_optimica.procedure.clear_ways import clear_ways
 from gantrytau_optimica.procedure.fleet import Fleet
 from gantrytau_optimica.procedure.tours import PLACES, Roadmap, find_tour, spread
 
@@ -37,17 +39,18 @@ def ordered(
     poses: int,
     tape: float,
     seed: int,
+    check: Callable[..., np.ndarray] = clear_ways,
 ) -> Order:
     """An order of the chosen poses with clear ways, from home and back; poses that have none are replaced.
 
-    Raises ModelError where no pose at all can be reached.
+    check: which ways are clear, as `clear_ways` says it. Raises ModelError where no pose at all can be reached.
     """
     safe = candidates.safe
     allowed = candidates.usable
     few = safe[spread(candidates.q[safe], PLACES)]
     rows, lost = choice.rows, []
     places = np.union1d(few, rows)
-    roadmap = Roadmap(fleet, np.concatenate([home[None], candidates.q[places]]))
+    roadmap = Roadmap(fleet, np.concatenate([home[None], candidates.q[places]]), check)
     tour = find_tour(roadmap, 1 + np.searchsorted(places, rows))
     for _ in range(ROUNDS):
         lost += places[tour.lost - 1].tolist()
@@ -55,7 +58,7 @@ def ordered(
         if not len(tour.lost) or not len(allowed):
             break
         rows = choose(fleet, candidates, device, allowed, poses, tape=tape, seed=seed).rows
-        places, roadmap = _extended(fleet, roadmap, places, rows, candidates)
+        places, roadmap = _extended(roadmap, places, rows, candidates)
         tour = find_tour(roadmap, 1 + np.searchsorted(places, rows))
     lost += places[tour.lost - 1].tolist()
     stops = tour.nodes[(~tour.via) & (tour.nodes > 0)]
@@ -81,13 +84,13 @@ def _apart(roadmap: Roadmap, places: np.ndarray, candidates: Candidates, allowed
 
 
 def _extended(
-    fleet: Fleet, roadmap: Roadmap, places: np.ndarray, rows: np.ndarray, candidates: Candidates
+    roadmap: Roadmap, places: np.ndarray, rows: np.ndarray, candidates: Candidates
 ) -> tuple[np.ndarray, Roadmap]:
     """The roadmap with more places, which keeps what it knows."""
     more = np.union1d(places, rows)
     if len(more) == len(places):
         return places, roadmap
-    found = Roadmap(fleet, np.concatenate([roadmap.q[:1], candidates.q[more]]))
+    found = roadmap.among(np.concatenate([roadmap.q[:1], candidates.q[more]]))
     where = np.concatenate([[0], 1 + np.searchsorted(more, places)])
     found.learn({(int(where[i]), int(where[j])): clear for (i, j), clear in roadmap.known.items()})
     return more, found

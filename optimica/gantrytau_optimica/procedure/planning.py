@@ -14,6 +14,7 @@ from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_
 from gantrytau_optimica.procedure.choice import Choice, choose, judge
 from gantrytau_optimica.procedure.files import check_folder
 from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
+from gantrytau_optimica.procedure.known_ways import KnownWays
 from gantrytau_optimica.procedure.ordering import Order, ordered
 from gantrytau_optimica.procedure.plan import CalibrationPlan, Cell
 from gantrytau_optimica.procedure.settling import SettledWorkspace, settled_workspace
@@ -162,14 +163,17 @@ class _Procedure:
 
     def _ways(self, candidates: Candidates, key: str) -> tuple[Choice, Order, str]:
         n, tape, seed, home = (self.asked[name] for name in ("poses", "tape", "seed", "home"))
-        key = digest(key, n)
+        known, key = KnownWays(self.stages, key), digest(key, n)
         at = (self.fleet, candidates, self.device)
         choice = self.stages.of(
             "choice", Choice, key, lambda: choose(*at, candidates.usable, n, tape=tape, seed=seed)
         )
         key = digest(key, home)
         order = self.stages.of(
-            "ways", Order, key, lambda: ordered(*at, choice, home=home, poses=n, tape=tape, seed=seed)
+            "ways",
+            Order,
+            key,
+            lambda: ordered(*at, choice, home=home, poses=n, tape=tape, seed=seed, check=known),
         )
         if not np.array_equal(np.sort(order.rows), choice.rows):
             choice = judge(*at, np.sort(order.rows), tape=tape)

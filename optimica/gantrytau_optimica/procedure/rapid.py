@@ -151,6 +151,8 @@ def _comments(plan: "CalibrationPlan", carts: str, trigger: str) -> list[str]:
         f"{int((~plan.measured).sum())} only passed (home at begin and end).",
         f"Joint targets: carts in mm, turntables in degrees; {unused}. Moves are linear in these axes and were checked "
         "on all of their way; do not change order, targets or kind of move. p041 is row 41 of poses.csv of the whole plan.",
+        "The first move goes home from wherever the robot stands; that way was not checked: jog the robot to pHome by hand "
+        "before the start, and after each stop begin there again.",
         _waiting(trigger),
         f"Expected error of the tool by noise after calibration with all {len(plan.prediction.rows)} poses of the plan "
         f"{um(plan.prediction.error)}; of the worst simulated robot {um(plan.verdict.error)}, wanted "

@@ -59,18 +59,23 @@ class Stages:
         self, name: str, kind: type[Record], depends: str, make: Callable[[], Record], *, tell: bool = True
     ) -> Record:
         """The record of a stage: from its file if that was made for the same digest, else made and filed."""
-        found = self._filed(name, kind, depends)
+        found = self.found(name, kind, depends)
         if found is None:
             if tell:
                 self.progress(name, 0, 1)
             found = make()
-            if self.folder is not None:
-                _file(self.folder, name, found, depends)
+            self.keep(name, found, depends)
         if tell:
             self.progress(name, 1, 1)
         return found
 
-    def _filed(self, name: str, kind: type[Record], depends: str) -> Record | None:
+    def keep(self, name: str, record: Any, depends: str) -> None:
+        """File a record, where there is a folder."""
+        if self.folder is not None:
+            _file(self.folder, name, record, depends)
+
+    def found(self, name: str, kind: type[Record], depends: str) -> Record | None:
+        """The record on file if it was made for the same digest and can be read."""
         if self.folder is None or not (path := _path(self.folder, name)).is_file():
             return None
         try:

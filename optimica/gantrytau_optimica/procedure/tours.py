@@ -45,6 +45,10 @@ class Roadmap:
         self._known: dict[tuple[int, int], bool] = {}
         self._near = _neighbours(self._scaled, NEIGHBOURS)
 
+    def among(self, q: np.ndarray) -> "Roadmap":
+        """A roadmap of other places for the same robots, which knows nothing yet."""
+        return Roadmap(self._fleet, q, self._check)
+
     def length(self, i: int | np.ndarray, j: int | np.ndarray) -> np.ndarray:
         """Of the straight way, in m of the carts."""
         return np.linalg.norm(self._scaled[i] - self._scaled[j], axis=-1)
