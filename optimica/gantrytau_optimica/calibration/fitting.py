@@ -72,15 +72,18 @@ def fit_group(
     """
     x = group.x if begin is None else begin
     found = problem(group, None if weights is None else [weights] * len(group.chains))
-    minimum = minimise(found, x)
-    for _ in range(2 if group.prior else 0):  # its weight follows from the noise that is left without it
-        found = replace(found, noise=_noise(minimum, group))
+    if smallest is None:
         minimum = minimise(found, x)
-    limit = _noise(minimum, group) / TAPE if smallest is None else smallest
-    near = np.abs(minimum.x - x).max(initial=0.0) < FAR
-    if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * limit:
-        return Fit(group, minimum, 0.0, weights)
-    found, x, limit = _by_tape(found, _noise(minimum, group), smallest)
+        for _ in range(2 if group.prior else 0):  # its weight follows from the noise that is left without it
+            found = replace(found, noise=_noise(minimum, group))
+            minimum = minimise(found, x)
+        noise = _noise(minimum, group)
+        near = np.abs(minimum.x - x).max(initial=0.0) < FAR
+        if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * noise / TAPE:
+            return Fit(group, minimum, 0.0, weights)
+    else:
+        noise = smallest * TAPE
+    found, x, limit = _by_tape(found, noise, smallest)
     _, singular, directions = np.linalg.svd(found.slopes(x)[:, group.free], full_matrices=False)
     held = int((singular > max(limit, RELATIVE * singular.max(initial=0.0))).sum())
     minimum = minimise(found, x, directions=directions, movable=held)
