@@ -71,16 +71,23 @@ def build(
     else:
         chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
-    for name, value in _settings(settings):
+    for name, value in _settings(settings, chosen.prototype):
         model = with_setting(model, name, value)
     return Chosen(model, chosen.prototype)
 
 
-def _settings(settings: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`."""
+def _settings(settings: Sequence[str], prototype: str | None) -> Iterator[tuple[str, Any]]:
+    """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`.
+
+    prototype: of the model; a file that says it belongs to another one is taken, with a warning.
+    """
     for setting in settings:
         if setting.endswith(parameter_files.SUFFIX) and "=" not in setting:
-            yield from parameter_files.read("--set", Path(setting)).items()
+            values = parameter_files.read("--set", Path(setting))
+            own = parameter_files.prototype_of(Path(setting))
+            if own and prototype and own != prototype:
+                note(f"--set {setting}: these are values of {own}, found with {prototype}; expected ({own})")
+            yield from values.items()
         else:
             name, value = split("--set", setting)
             yield name, number("--set", name, value)

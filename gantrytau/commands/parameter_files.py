@@ -4,6 +4,7 @@ They hold modifications of a model: `GantryTau(prototypes.L1, **tomllib.loads(te
 and so is `GantryTau(L1)` with `--set FILE.toml` on the command line.
 """
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 from gantrytau.commands.reporting import CommandError
 
 SUFFIX = ".toml"
+OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
 
 
 def read(option: str, file: Path) -> dict[str, Any]:
@@ -38,6 +40,13 @@ def read_toml(option: str, file: Path) -> dict[str, Any]:
         raise CommandError(
             f'{where}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
         ) from error
+
+
+def prototype_of(file: Path) -> str | None:
+    """The prototype that a file says its values belong to, in its first line, as `# Parameters of GantryTau(L1)`."""
+    with file.open(encoding="utf-8-sig") as opened:
+        found = re.fullmatch(rf"# {OF}\S+\((\w+)\)\s*", opened.readline())
+    return found[1] if found else None
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

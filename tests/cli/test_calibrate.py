@@ -211,7 +211,7 @@ def test_another_robot_and_too_few_poses(fails, measured, poses):
     assert "these are measurements of another robot" in fails(
         FAULT, "calibrate", measured(poses), "--robot", "GantryTau(D1)"
     )
-    few = fails(FAULT, "calibrate", measured(poses[:12]), *ROBOT)
+    few = fails(FAULT, "calibrate", measured(poses[:12]), *ROBOT, "--holdout", "second")
     assert "found 6 poses to fit 7 parameters of each link, expected 8" in few
     assert "or give --holdout none" in few
 
@@ -254,7 +254,10 @@ def test_models_that_lack_something_say_so_in_options(fails, measured, poses):
 
 def test_what_is_no_table_of_poses(fails, measured, poses, tmp_path):
     assert "found no FILE, expected measurements" in fails(MISUSE, "calibrate", *ROBOT)
-    assert "found no file to read" in fails(MISUSE, "calibrate", tmp_path / "nowhere.csv", *ROBOT)
+    for robot in (ROBOT, ()):  # without a robot too: a plan is not asked for beside a file that is not there
+        assert "nowhere.csv: there is no such file" in fails(
+            MISUSE, "calibrate", tmp_path / "nowhere.csv", *robot
+        )
     assert "found the header a,q2" in fails(MISUSE, "calibrate", measured(poses, ["a", *HEADER[1:]]), *ROBOT)
     file = measured(poses)
     file.write_bytes(bytes(range(128, 256)))

@@ -1,10 +1,6 @@
 """`gantrytau calibrate cell.toml`: plan, measure, calibrate; interrupted, wrong and incomplete."""
 
-import csv
 import json
-import re
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,58 +10,19 @@ from gantrytau.cli import app
 from gantrytau.commands.calibrate.example import EXAMPLE
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import LaserTracker
 from gantrytau_optimica.procedure import planning as procedure
+from tests.cli.cells import measure, read_poses, true_robot, with_lines
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
-SMALL = {"poses": "poses = 20", "robots": "robots = 2\nspacing = 0.25"}
-FILES = ["plan.html", "workspace.png", "poses.csv", "Calibration.mod", "plan.json", "plan.toml"]
-TAPE = 0.005  # m, as the example says
-
-
-def with_lines(**lines):
-    """The example with some of its lines replaced, by the key at their beginning."""
-    text = EXAMPLE
-    for key, line in {**SMALL, **lines}.items():
-        text, count = re.subn(
-            rf"^(# )?{key} = .*$", line.replace("\\", r"\\"), text, count=1, flags=re.MULTILINE
-        )
-        assert count == 1, key
-    return text
-
-
-def true_robot():
-    """An L1 that a tape measure cannot tell from the nominal one: joints and lengths off by its deviation."""
-    off = TAPE * np.random.default_rng(4).standard_normal((3, 4))
-    arms = [
-        replace(arm, length=arm.length + d[0], offset=tuple(np.add(arm.offset, d[1:])))
-        for arm, d in zip(prototypes.L1.arms, off, strict=True)
-    ]
-    return GantryTau(replace(prototypes.L1, arms=tuple(arms)))
-
-
-def read_poses(folder):
-    """Numbers (k,) and actuators (k, 3) of the poses to be measured."""
-    with (folder / "poses.csv").open() as file:
-        rows = [row for row in csv.DictReader(file) if row["measured"] == "1"]
-    return [int(row["number"]) for row in rows], np.array(
-        [[float(row[f"q{k}"]) for k in (1, 2, 3)] for row in rows]
-    )
-
-
-def measure(folder, rows: Any = slice(None), *, axes=None, change=lambda table: table):
-    """Write what a tracker with its own axes, turned by 143 degrees, reads of the true robot at planned poses."""
-    _, q = read_poses(folder)
-    r, R = Kinematics(true_robot()).fk(q)
-    c, s = np.cos(2.5), np.sin(2.5)
-    own = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) if axes is None else axes
-    tracker = LaserTracker((4.5, 2.9, -0.7), own, target=(0.05, 0.0, 0.0), facing=(1.0, 0.0, 0.0))
-    found = tracker.measure(r, R, seed=5, frame="device")
-    table = change(np.hstack([q, found.r])[rows])
-    file = folder / "measurements.csv"
-    with file.open("w", newline="") as opened:
-        csv.writer(opened).writerows([["q1", "q2", "q3", "x", "y", "z"], *table.tolist()])
-    return file
+FILES = [
+    "plan.html",
+    "workspace.png",
+    "poses.csv",
+    "measurements-template.csv",
+    "Calibration.mod",
+    "plan.json",
+    "plan.toml",
+]
 
 
 @pytest.fixture(scope="module")
@@ -167,14 +124,18 @@ def test_measured_poses_are_not_planned_anew(folder, fails, answer, tmp_path):
     assert (folder / "poses.csv").read_text() == before
 
 
-def test_without_validation_the_verdict_says_so(folder, answer):
-    found = answer("calibrate", measure(folder), "--holdout", "none")
-    assert found["good"] is True
-    assert found["validation_error_m"] is None
-    assert "of the fitted poses, as none were left to validate" in found["verdict"]
-    few = answer("calibrate", measure(folder, slice(0, 18, 2)))  # nine, of which seven are too few
-    assert few["validation_error_m"] is None
-    assert few["poses_fitted"] == 9
+def test_without_validation_the_verdict_says_so(folder, run):
+    for rows, options in (
+        (slice(None), ("--holdout", "none")),
+        (slice(0, 18, 2), ()),
+    ):  # nine: seven are too few
+        result = run("calibrate", measure(folder, rows), *options, "--json")
+        found = json.loads(result.stdout)
+        assert result.exit_code == FAULT
+        assert found["good"] is False
+        assert found["validation_error_m"] is None
+        assert "no poses that were not fitted validate this" in found["verdict"]
+    assert found["poses_fitted"] == 9
 
 
 def test_too_few_poses_still_say_which_are_missing(folder, run):

@@ -8,7 +8,8 @@ import typer
 
 from gantrytau.commands import parameter_files
 from gantrytau.commands.calibrate import finishing, planning, results
-from gantrytau.commands.calibrate.example import EXAMPLE
+from gantrytau.commands.calibrate.example import EXAMPLES
+from gantrytau.commands.calibrate.example import example as cell_of
 from gantrytau.commands.calibrate.finishing import Choice
 from gantrytau.commands.calibrate.measured import Measured
 from gantrytau.commands.calibrate.planned import Planned
@@ -96,14 +97,19 @@ def calibrate(
         typer.Option(
             metavar="second|none",
             help="Which poses validate: every second, or those of the fit.",
-            show_default="second; of a plan each fifth in turn",
+            show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
         ),
     ] = None,
     output: Output = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
     example: Annotated[
-        bool, typer.Option("--example", help="Print the file of a cell, to begin with.")
+        bool,
+        typer.Option(
+            "--example",
+            help="Print the file of a cell, to begin with: --example l1, --example six (links), --example f1 (turntables), "
+            "or of the --robot.",
+        ),
     ] = False,
     json: Json = False,
 ) -> None:
@@ -117,7 +123,7 @@ def calibrate(
     """
     with reporting(json, source_of(robot) if robot else None):
         if example:
-            typer.echo(EXAMPLE, nl=False)
+            typer.echo(cell_of(None if file is None else str(file), robot), nl=False)
             return
         if file is None:
             raise CommandError(
@@ -129,12 +135,20 @@ def calibrate(
             _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
             planning.plan(file, output, json)
             return
+        if not file.is_file():
+            raise CommandError(f"{file}: there is no such file{_kinds(file)}")
         how = policy(model, method, start, orientation, holdout or "second", prior, constraint or (), robust)
         folder = output or results.folder_beside(file)
         results.rehearse(folder)
         choice = _robot(file, robot, prototype, set_ or ())
         measured = Measured.read(file, rail_files(rails))
         finishing.finish(choice, measured, how, folder, validate=holdout is None, json=json)
+
+
+def _kinds(file: Path) -> str:
+    """What may have been meant by a file that is not there."""
+    known = str(file).lower() in EXAMPLES
+    return f"; for a cell to begin with give --example {file}" if known else "; check its path"
 
 
 def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> Choice:

@@ -1,52 +1,33 @@
-"""What `gantrytau calibrate --example` prints: the file of a cell, to be filled in."""
+"""What `gantrytau calibrate --example` prints: the file of a cell, to be filled in, for each kind of robot."""
 
-EXAMPLE = """\
-# A robot cell to be calibrated. Make this file your own, then: gantrytau calibrate cell.toml
-# Numbers are in SI, m and rad; a text may bring another unit, as "5 mm" or "40 deg". Positions are in the world.
+from gantrytau.commands.calibrate.cell_words import CELL, F1, L1, SIX
+from gantrytau.commands.reporting import CommandError
+from gantrytau.errors import did_you_mean
 
-[robot]
-model = "GantryTau(L1)"     # as the other commands name it; a class of your own: "robot.py:Robot"
-tape = "5 mm"               # standard deviation of the tape measure, from which values below are known
+EXAMPLES = {"l1": L1, "six": SIX, "f1": F1}
+OF_MODELS = {"GantryTau": "l1", "SixLinkGantryTau": "six", "F1GantryTau": "f1"}
 
-[values]                    # what the tape measure says, by the names of the model; all else is the model's own
-# "arms[0].length" = 2.061
-# "arms[0].offset" = [-1.809, 3.509, 0.004]
 
-[goal]
-error = "0.2 mm"            # of the tool, in the mean over the workspace, to be reached after calibration
-poses = 40                  # to be measured
+def example(kind: str | None, robot: str | None) -> str:
+    """The cell of a kind of robot, or of a model of that kind; CommandError for another."""
+    if kind is not None and kind.lower() not in EXAMPLES:
+        raise CommandError(
+            f"--example {kind}: there is no such example{did_you_mean(kind.lower(), EXAMPLES)}"
+        )
+    if robot is None:
+        return CELL.format(**EXAMPLES[(kind or "l1").lower()])
+    name = robot.partition("(")[0]
+    known = EXAMPLES[kind.lower()] if kind else EXAMPLES[OF_MODELS.get(name, "l1")]
+    if kind is None and name not in OF_MODELS:
+        raise CommandError(
+            f"--example --robot {robot}: expected {', '.join(OF_MODELS)}, or a kind beside it, as --example six, for "
+            "limits, device and home to begin with"
+        )
+    named = f'model = "{robot}"'
+    # limits, device and home of the example are those of its own robot
+    warning = "" if named in known["robot"] else OTHERS.format(known["robot"].split('"')[1])
+    return warning + CELL.format(**(known | {"robot": named.ljust(27)}))
 
-[limits]
-strokes = [0.0, 1.6]        # of all carts, or [[0.0, 1.6], [0.0, 1.6], [0.0, 1.4]], as the controller shows them
-ball_joint = "50 deg"       # largest angle of a link from the axis of its joint
-link_radius = "20 mm"
-stroke_margin = "20 mm"     # what must be left of each limit, for safety
-angle_margin = "3 deg"
-clearance = "50 mm"         # between links or plate and anything else
 
-[[limits.obstacles]]        # as many as there are, or none
-kind = "box"                # or "cylinder" and "capsule" with start, end, radius
-low = [0.9, 2.3, -1.6]
-high = [1.5, 2.6, -1.2]
-
-[[limits.plate]]            # capsules that stand for plate and tool, in the frame of the tool
-start = [0.0, 0.0, 0.0]
-end = [0.1, 0.0, 0.0]
-radius = "60 mm"
-
-[device]
-kind = "laser tracker"      # or "T-Mac", "single camera", "stereo cameras"; a camera says `at`, where it looks
-r = [4.5, 2.9, -0.7]        # where it stands, roughly; measurements may be in its own frame
-target = [0.05, 0.0, 0.0]   # the reflector, in the frame of the tool
-facing = [1.0, 0.0, 0.0]    # where the reflector looks, in the frame of the tool; left out: seen from everywhere
-
-[plan]
-robots = 10                 # simulated ones, with errors as the tape measure leaves them; all must be safe in all poses
-# home = [0.5, 0.5, 0.5]    # actuators at begin and end; left out: a place in the middle
-
-[program]                   # of the robot, in RAPID
-name = "Calibration"
-speed = "100 mm/s"
-settle = 1.0                # s, until the tool stands still
-carts = "robax"             # or "extax"
-"""
+OTHERS = "# Limits, device and home below fit {}: make them those of your robot.\n"
+EXAMPLE = example("l1", None)

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import typer
 
-from gantrytau.commands.calibrate import results, wording
+from gantrytau.commands.calibrate import results, validation, verdict, wording
 from gantrytau.commands.calibrate.measured import Measured, calibrated
 from gantrytau.commands.calibrate.planned import Planned
+from gantrytau.commands.calibrate.validation import Validation
 from gantrytau.commands.reporting import FAULT, as_json, note
 from gantrytau.model import Model
-
-FOLDS = 5
 
 
 @dataclass(frozen=True)
@@ -30,55 +28,87 @@ def finish(
 ) -> None:
     """Calibrate, write and print; leaves with exit code 1 where the error is larger than wanted.
 
-    validate: for a plan, which asks for few poses, fit all of them, and judge by fits without each fifth of them in turn.
+    validate: fit all of few poses, as a plan asks for, and judge by fits without each fifth of them in turn.
     """
-    planned, rest, told = choice.planned, {}, []
+    planned, motion, notes = choice.planned, None, []
     if planned is not None:
-        measured, words = planned.placed(measured)
-        told += [f"frame: {words}"] if words else []
-        missing = planned.missing(measured)
-        if missing:
-            rest = {"missing": missing, "program": str(planned.write_rest(measured))}
-            told.append(_missing(missing, rest["program"]))
-            if not json:
-                note(told.pop())  # also when the rest does not suffice
-    found, error, validated = _found(choice, measured, policy, validate and planned is not None, json)
-    written = results.write(found, folder, choice.name, measured.file)
-    verdict = {} if planned is None else _verdict(float(error), validated, planned)
-    if json:
-        numbers = wording.summary(found, measured, choice.name, written)
-        typer.echo(as_json({**numbers, **rest, **verdict, "notes": told}))
+        measured = planned.seen(measured)
+        original = measured
+        measured, motion = planned.placed(measured)
+        if motion is not None:
+            notes.append(wording.LAID_OVER)
+        policy, words = planned.with_prior(policy)
+        notes += words
+        rest = _rest(planned, measured, json)
     else:
-        wording.show(found, measured, written, told, verdict)
-    if verdict and not verdict["good"]:
+        original, rest = measured, None
+    cross = validate and (planned is not None or len(measured.data) < validation.FEW)
+    try:
+        found, checked = _found(choice, measured, policy, cross, json)
+    except typer.Exit:
+        if rest is not None and original.data.finite.any():
+            rest.write_first()
+        raise
+    expected = None if planned is None else planned.tool_error(measured, found, policy["orientation"])
+    found = verdict.with_expectation(found, planned, expected)
+    judged = {} if planned is None else verdict.verdict(found, checked, expected, planned)
+    if rest is not None:
+        rest.write()
+    about = wording.about(found, measured, choice, judged, notes, checked, motion)
+    written = results.write(found, folder, choice.name, measured.file, about)
+    if json:
+        numbers = wording.summary(found, measured, about, written)
+        typer.echo(as_json({**numbers, **(rest.record if rest else {}), **judged, "notes": notes}))
+    else:
+        wording.show(found, measured, about, written, judged)
+    if judged and not judged["good"]:
         raise typer.Exit(FAULT)
+
+
+@dataclass
+class Rest:
+    """The poses of a plan that are missing; their program is written when what was measured turns out to be good data."""
+
+    planned: Planned
+    measured: Measured
+    missing: list[int]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """For programs."""
+        return {"missing": self.missing, "program": str(self.planned.rest_program)}
+
+    def write(self) -> None:
+        """Write plan and program of what is missing."""
+        self.planned.write_rest(self.measured)
+
+    def write_first(self) -> None:
+        """The same if there is none yet: what was measured could not be used."""
+        if self.planned.rest_program.exists():
+            note(f"{self.planned.rest_program} is still that of an earlier run")
+        else:
+            self.write()
+
+
+def _rest(planned: Planned, measured: Measured, json: bool) -> Rest | None:
+    missing = planned.missing(measured)
+    if not missing:
+        return None
+    rest = Rest(planned, measured, missing)
+    if not json:
+        note(_missing(missing, str(planned.rest_program)))  # also when the others do not suffice
+    return rest
 
 
 def _found(
     choice: Choice, measured: Measured, policy: dict[str, Any], cross: bool, json: bool
-) -> tuple[Any, float, bool]:
-    """The calibration, its error, and whether that is of poses that were not fitted, if there are enough of them."""
+) -> tuple[Any, Validation | None]:
+    """The calibration, and how well it foretells poses that were not fitted, if there are enough of them."""
     if not cross:
         found = calibrated(choice.robot, measured, policy, json)
-        return found, found.error, policy["holdout"] is not None
+        return found, validation.held_out(found, len(measured.data))
     found = calibrated(choice.robot, measured, dict(policy, holdout=None), json)
-    error = cross_validated(choice.robot, measured, policy)
-    return (found, found.error, False) if error is None else (found, error, True)
-
-
-def cross_validated(robot: Model, measured: Measured, policy: dict[str, Any]) -> float | None:
-    """Mean error of poses foretold by fits without them, each fifth left out in turn, m; None if there are too few."""
-    from gantrytau_optimica import CalibrationError, calibrate
-
-    errors = []
-    for fold in range(FOLDS):
-        rows = np.arange(fold, len(measured.data), FOLDS)
-        try:
-            errors.append(calibrate(robot, measured.data, **dict(policy, holdout=rows)).errors)
-        except CalibrationError:
-            return None
-    found = np.concatenate(errors)
-    return float(found[np.isfinite(found)].mean())
+    return found, validation.left_out_in_turn(found, choice.robot, measured, policy)
 
 
 def _missing(numbers: list[int], program: str) -> str:
@@ -89,20 +119,3 @@ def _missing(numbers: list[int], program: str) -> str:
         f"{which} {shown} of poses.csv; the program of what is missing is {program}: measure, add the lines, and give the "
         "same command again"
     )
-
-
-def _verdict(error: float, validated: bool, planned: Planned) -> dict[str, Any]:
-    """Whether the error is as small as wanted; validated: whether it is of poses that were not fitted."""
-    wanted = planned.cell.wanted
-    good = bool(error <= wanted)
-    which = "poses that were not fitted" if validated else "the fitted poses, as none were left to validate"
-    words = f"{error * 1e6:.4g} um in the mean of {which}, {wanted * 1e6:.4g} um were wanted"
-    if not good:
-        words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
-    found: dict[str, Any] = {
-        "good": good,
-        "validation_error_m": error if validated else None,
-        "wanted_m": wanted,
-        "verdict": words,
-    }
-    return found if good else {**found, "error": words}

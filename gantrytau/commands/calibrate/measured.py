@@ -28,7 +28,7 @@ class Measured:
     def read(file: Path, rails: Sequence[Path] = ()) -> "Measured":
         """CommandError for files that cannot be read."""
         data, lines = read(file, rails)
-        return Measured(file, data, lines)
+        return Measured(file, data, lines if data.lines is None else data.lines)
 
     def words(self, message: str, said: Sequence[Any]) -> str:
         """A message with lines in place of rows, and options in place of arguments."""
@@ -58,7 +58,7 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
     told = tuple(replace(f, message=measured.words(f.message, [f])) for f in found.findings)
     if policy["loss"] == "linear":
         _refuse_outliers(found.error, told, measured, json)
-    return replace(found, findings=told)
+    return found.with_findings(told)
 
 
 def _refuse_outliers(error: float, findings: Sequence[Any], measured: Measured, json: bool) -> None:

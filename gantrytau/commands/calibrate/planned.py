@@ -16,6 +16,8 @@ from gantrytau.commands.reporting import CommandError
 from gantrytau.errors import ModelError
 
 SAME = 1e-4  # m and rad, by which measured actuators may be off those of the plan
+FAR = 0.02  # m and rad, by which actuators of a pose with the same number may be off
+AS_PLANNED = 1e-6  # m, of digits in poses.csv: nothing measures that well
 FEW = 3  # poses that hold a frame
 OF_TAPE = 5  # deviations of the tape measure by which a tool may be off its nominal place
 REST = "Rest"
@@ -43,25 +45,71 @@ class Planned:
         except ModelError as error:
             raise CommandError(f"{folder}: the plan cannot be used: {error}") from error
 
-    def placed(self, measured: Measured) -> tuple[Measured, str]:
-        """Measurements in the frame of the plan, and words about it if they were in another.
+    def seen(self, measured: Measured) -> Measured:
+        """Measurements without the rows that were left empty: poses that were not measured."""
+        data = measured.data
+        rows = np.flatnonzero(~np.isnan(data.r).all(axis=1))
+        return replace(measured, data=data.select(rows), lines=measured.lines[rows])
+
+    def placed(self, measured: Measured) -> tuple[Measured, Any]:
+        """Measurements in the frame of the plan, and the motion that brought them there if they were in another, or None.
 
         Positions in the world, and those that fit the plan in no frame, stay as they are. ModelError where actuators are
         not those of planned poses.
         """
         data, rows = measured.data, self._rows(measured)
         if len(data.findings) and any(f.kind in ("millimetres", OF_GUIDEWAYS) for f in data.findings):
-            return measured, ""
+            return measured, None
         known = rows >= 0
         expected, near = self.plan.r[self.plan.measured][rows[known]], OF_TAPE * self.cell.tape
+        self._check_measured(measured, known, expected)
         if _apart(data.r[known], expected) < near:
-            return measured, ""
+            return measured, None
         placed = self.plan.placed(data)
         if not _apart(placed.r[known], expected) < near:
             self._check_axes(measured, known, expected, near)
-            return measured, ""
-        words = "positions are in another frame than the plan; they were laid over the poses that it expects"
-        return replace(measured, data=placed), words
+            return measured, None
+        return replace(measured, data=placed), _motion(data.r, placed.r)
+
+    def _check_measured(self, measured: Measured, known: np.ndarray, expected: np.ndarray) -> None:
+        """ModelError if positions are those that the plan expects, to the last digit of its file."""
+        r = measured.data.r[known]
+        if len(r) >= FEW and np.nanmax(np.abs(r - expected), initial=0.0) < AS_PLANNED:
+            raise ModelError(
+                f"{measured.file}: found x, y, z as the plan expects them, expected what was measured; fill in the cells "
+                "of measurements-template.csv. Nothing was written"
+            )
+
+    def with_prior(self, policy: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+        """Keywords of `calibrate` with the prior of the plan's own simulations, unless another was given; words on it."""
+        prior = self.plan.settings.get("prior")
+        if policy["prior"] is not None or not prior or policy["model"] is not None:
+            return policy, []
+        told = ", ".join(f"{name}={value:g}" for name, value in prior.items())
+        return dict(policy, prior=dict(prior)), [f"prior: {told}, as the plan expects"]
+
+    def tool_error(self, measured: Measured, found: Any, orientation: Any) -> Any:
+        """The error of the tool to be expected at all planned poses, by those that were fitted."""
+        from gantrytau_optimica.calibration.identifiability import Poses
+        from gantrytau_optimica.calibration.tool_error import tool_error
+
+        plan = self.plan
+        where = np.flatnonzero(plan.measured)
+        turns = plan.kind != "three links"
+        every = Poses(plan.q[where], plan.r[where], plan.R[where] if turns else None)
+        rows = self._rows(measured)[np.setdiff1d(found.rows, found.left_out)]
+        rows = rows[rows >= 0]
+        fitted = Poses(every.q[rows], every.r[rows], None if every.R is None else every.R[rows])
+        noise = np.nanmax([found.noise, plan.prediction.noise])
+        return tool_error(
+            self.cell.robot,
+            fitted,
+            every,
+            noise=float(noise),
+            angle=float(plan.prediction.noise_angle),
+            tape=self.cell.tape,
+            orientation=orientation,
+        )
 
     def _check_axes(self, measured: Measured, known: np.ndarray, expected: np.ndarray, near: float) -> None:
         """ModelError if positions fit the plan once they are mirrored, which no frame does."""
@@ -81,7 +129,7 @@ class Planned:
                 f"{measured.file}: found {q.shape[1]} actuators, expected {planned.shape[1]} as the plan beside it, in the "
                 f"order {', '.join(self.plan.joints)}; check the columns q1, q2, ..."
             )
-        rows = nearest(q, planned)
+        rows = self._by_number(measured) if measured.data.numbers is not None else nearest(q, planned)
         good = measured.data.finite
         if np.count_nonzero(rows[good] >= 0) >= min(FEW, np.count_nonzero(good)):
             return rows
@@ -94,23 +142,45 @@ class Planned:
             f"name the robot, --robot '{self.cell.name}'. Nothing was written"
         )
 
+    def _by_number(self, measured: Measured) -> np.ndarray:
+        """The same by the numbers of poses; ModelError for a number whose pose is another."""
+        data, known = measured.data, self.plan.numbers[self.plan.measured].tolist()
+        rows = np.array([known.index(n) if n in known else -1 for n in data.numbers.tolist()], dtype=int)
+        planned = self.plan.q[self.plan.measured]
+        off = np.where(rows >= 0, np.abs(data.q - planned[rows]).max(axis=1), 0.0)
+        wrong = np.flatnonzero(off > FAR)
+        if wrong.size and wrong.size < len(rows) / 2:  # of more the columns are wrong
+            k = wrong[0]
+            raise ModelError(
+                f"{measured.file}: line {measured.lines[k]} has number {data.numbers[k]} and q = {_told(data.q[k])}, "
+                f"expected {_told(planned[rows[k]])} as in poses.csv; correct the number or q. Nothing was written"
+            )
+        return np.where(off > FAR, -1, rows)
+
     def missing(self, measured: Measured) -> list[int]:
         """Numbers in poses.csv of poses that were planned but are not measured."""
-        return [int(k) + 1 for k in self.plan.missing(measured.data)]
+        return [int(self.plan.numbers[k]) for k in self.plan.missing(measured.data)]
 
-    def write_rest(self, measured: Measured) -> Path:
-        """Write the plan of the poses that are missing, in a folder of its own; its program."""
-        options = dict(self.cell.program)
-        name = f"{options.pop('name', PROGRAM)[: 32 - len(REST)]}{REST}"
+    @property
+    def rest_program(self) -> Path:
+        """The program of the poses that are missing."""
+        return self.folder / REST.lower() / f"{self._rest_name}.mod"
+
+    @property
+    def _rest_name(self) -> str:
+        return f"{self.cell.program.get('name', PROGRAM)[: 32 - len(REST)]}{REST}"
+
+    def write_rest(self, measured: Measured) -> None:
+        """Write the plan of the poses that are missing, in a folder of its own."""
         from gantrytau_optimica import load_plan
 
-        folder = self.folder / REST.lower()
+        options = dict(self.cell.program, name=self._rest_name)
+        folder = self.rest_program.parent
         plan = load_plan(self.folder, self.cell.robot, self.cell.limits)
         try:
-            plan.remaining(measured.data).write(folder, name=name, **options)
+            plan.remaining(measured.data).write(folder, **options)
         except OSError as error:
             raise CommandError(f"Cannot write into {folder}: {error.strerror}") from error
-        return folder / f"{name}.mod"
 
 
 def nearest(q: np.ndarray, planned: np.ndarray) -> np.ndarray:
@@ -137,6 +207,19 @@ def _swaps(count: int) -> Iterator[list[int]]:
             order = list(range(count))
             order[i], order[k] = k, i
             yield order
+
+
+def _told(q: np.ndarray) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in q) + ")"
+
+
+def _motion(r: np.ndarray, placed: np.ndarray) -> Any:
+    """The rigid motion that was made of positions (N, 3)."""
+    from gantrytau_optimica.calibration.plausibility import motion
+    from gantrytau_optimica.calibration.report import Motion
+
+    good = np.isfinite(r).all(axis=1)
+    return Motion(*motion(r[good], placed[good]))
 
 
 def _apart(r: np.ndarray, expected: np.ndarray) -> float:

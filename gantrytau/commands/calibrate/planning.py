@@ -19,7 +19,7 @@ from gantrytau.errors import ModelError
 
 CELL = "plan.toml"  # in the folder of a plan: the cell that it was made for
 PROGRAM = "Calibration"
-MEASUREMENTS = "measurements.csv"
+MEASUREMENTS, TEMPLATE = "measurements.csv", "measurements-template.csv"
 SAME = 1e-6  # m and rad, by which poses of the same plan may differ
 STAGES = {
     "workspace": "workspace of the robot",
@@ -149,7 +149,7 @@ def header(found: Any) -> str:
 
 def _files(folder: Path, cell: Cell) -> list[Path]:
     program = f"{cell.program.get('name', PROGRAM)}.mod"
-    names = ("plan.html", "workspace.png", "poses.csv", program, "plan.json", CELL)
+    names = ("plan.html", "workspace.png", "poses.csv", TEMPLATE, program, "plan.json", CELL)
     return [folder / name for name in names if (folder / name).is_file()]
 
 

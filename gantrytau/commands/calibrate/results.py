@@ -50,13 +50,17 @@ def whole(folder: Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def write(found: Any, folder: Path, robot: str, source: Path) -> list[str]:
-    """Report and parameters; the files written. robot: as the command line names it; source: the measurements."""
+def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> list[str]:
+    """Report and parameters; the files written. robot: as the command line names it; source: the measurements; about: what
+    the report says besides.
+    """
+    from gantrytau_optimica.calibration.report import write_report
+
     with whole(folder) as partial:
-        found.report(partial / REPORT)
+        write_report(found, partial / REPORT, about)
         robot_values = modifications(found)
         if robot_values is not None:
-            heading = _heading(found, robot, source, folder / PARAMETERS)
+            heading = _heading(found, robot, source, folder / PARAMETERS, about.verdict)
             (partial / PARAMETERS).write_text(parameter_files.text(robot_values, heading), encoding="utf-8")
         names = sorted(file.name for file in partial.iterdir())
     if robot_values is None:
@@ -64,10 +68,12 @@ def write(found: Any, folder: Path, robot: str, source: Path) -> list[str]:
     return [str(folder / name) for name in names]
 
 
-def _heading(found: Any, robot: str, source: Path, file: Path) -> str:
+def _heading(found: Any, robot: str, source: Path, file: Path, verdict: str) -> str:
+    said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses"
     return (
-        f"Parameters of {found.geometry.name}, calibrated with {source.name}: lengths and offsets in m.\n"
-        f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses.\n"
+        f"{parameter_files.OF}{robot}\n"
+        f"Calibrated with {source.name}: lengths and offsets in m.\n"
+        f"{said}.\n"
         f"On the command line: gantrytau simulate '{robot}' --set {file.name}\n"
         f'In Python: robot.modified(tomllib.loads(Path("{file.name}").read_text()))'
     )

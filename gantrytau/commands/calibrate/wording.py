@@ -9,14 +9,60 @@ import typer
 from gantrytau.commands.calibrate import results
 from gantrytau.commands.calibrate.measured import Measured
 
+LAID_OVER = (
+    "frame: positions are in another frame than the plan; they were laid over the poses that it expects"
+)
 
-def summary(found: Any, measured: Measured, robot: str, files: list[str]) -> dict[str, Any]:
+
+def about(
+    found: Any,
+    measured: Measured,
+    choice: Any,
+    verdict: Mapping[str, Any],
+    notes: Sequence[str],
+    validation: Any,
+    motion: Any,
+) -> Any:
+    """What a report says besides the calibration. choice: of the robot, with its plan or None; motion: into its frame."""
+    from gantrytau_optimica.calibration.report import About, fits_all, frame_motion
+
+    facts = {"measurements": str(measured.file)}
+    if choice.planned is not None:
+        cell, plan = choice.planned.cell, choice.planned.plan
+        place = ", ".join(f"{x:.4g}" for x in np.asarray(plan.settings["device_r"], dtype=float))
+        facts |= {
+            "goal": f"{cell.wanted * 1e6:.4g} um, error of the tool in the mean over the workspace",
+            "device": f"{plan.settings['device']} at ({place}) m",
+            "nominal values": f"known by a tape measure to {cell.tape * 1e3:.3g} mm",
+            "plan": str(choice.planned.folder),
+        }
+    turned = found.geometry.kind != "three" or measured.data.R is not None
+    facts["x, y, z"] = (
+        "the tool"
+        if turned
+        else "the target that was measured, in the place of the tool; t of a frame holds its offset"
+    )
+    return About(
+        robot=choice.name,
+        facts=facts,
+        good=verdict.get("good"),
+        verdict=verdict.get("verdict", ""),
+        notes=list(notes),
+        lines=measured.lines,
+        numbers=measured.data.numbers,
+        validation=None if validation is None or not fits_all(found) else validation.errors,
+        motion=motion or frame_motion(found),
+    )
+
+
+def summary(found: Any, measured: Measured, about: Any, files: list[str]) -> dict[str, Any]:
     """The calibration as a record for programs: that of the report, with lines of the file in place of rows."""
     from gantrytau_optimica.calibration.report import report_numbers
 
-    numbers = report_numbers(found)
-    numbers["robot"] = robot
-    del numbers["covariance"]  # the report holds it
+    numbers = report_numbers(found, about)
+    for name in ("covariance", "verdict", "poses"):  # the report holds them
+        del numbers[name]
+    numbers["left_out_lines"] = measured.lines[numbers.pop("left_out_rows")].tolist()
     numbers["findings"] = [
         {"kind": f.kind, "lines": measured.lines[f.rows].tolist(), "message": f.message}
         for f in found.findings
@@ -24,27 +70,28 @@ def summary(found: Any, measured: Measured, robot: str, files: list[str]) -> dic
     return {"measurements": str(measured.file), **numbers, "files": files}
 
 
-def show(
-    found: Any, measured: Measured, files: list[str], notes: Sequence[str], verdict: Mapping[str, Any]
-) -> None:
+def show(found: Any, measured: Measured, about: Any, files: list[str], verdict: Mapping[str, Any]) -> None:
     """Verdict, error, findings and parameters, readable in a terminal."""
     if verdict:
         typer.echo(f"{'Good' if verdict['good'] else 'NOT GOOD ENOUGH'}: {verdict['verdict']}")
-    errors = found.errors[np.isfinite(found.errors)] * 1e6
+    good = np.isfinite(found.errors) & ~np.isin(found.held_out, found.left_out)
+    errors = found.errors[good] * 1e6
     kept = "of the fit itself" if np.array_equal(found.held_out, found.rows) else "not fitted"
     typer.echo(
         f"{found.geometry.name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
         f"{measured.file.name}, in {found.iterations} steps"
     )
     typer.echo(
-        f"Error: {errors.mean():.4g} um in the mean of {len(found.held_out)} poses {kept}, "
+        f"Error: {errors.mean():.4g} um in the mean of {len(errors)} poses {kept}, "
         f"95 % below {np.quantile(errors, 0.95):.4g} um, {errors.max():.4g} um at most"
     )
     if np.isfinite(found.angle_error):
         typer.echo(f"Angle error: {np.degrees(found.angle_error) * 1e3:.4g} mdeg in the mean")
     typer.echo(f"Noise of {found.noise * 1e6:.4g} um in each measured coordinate explains what is left")
-    for note in notes:
+    _show_validation(found, about)
+    for note in about.notes:
         typer.echo(note)
+    _show_motion(about.motion)
     if not found.findings:
         typer.echo("Nothing doubtful was found in the measurements")
     for finding in found.findings:
@@ -59,12 +106,34 @@ def show(
         )
 
 
+def _show_validation(found: Any, about: Any) -> None:
+    """Where all poses were fitted, how well fits without them foretell them."""
+    if about.validation is None:
+        return
+    errors = np.delete(about.validation, found.left_out)
+    errors = errors[np.isfinite(errors)] * 1e6
+    typer.echo(
+        f"Each fifth left out in turn: {errors.mean():.4g} um in the mean, {errors.max():.4g} um at most"
+    )
+
+
+def _show_motion(motion: Any) -> None:
+    if motion is None:
+        return
+    rows = "; ".join(" ".join(f"{x:+.7f}" for x in row) for row in motion.rotation)
+    shift = ", ".join(f"{x:.6f}" for x in motion.translation)
+    typer.echo("From the frame of the measurements to the base of the robot, base = R measured + t:")
+    typer.echo(f"  R = [{rows}], t = ({shift}) m")
+
+
 def _show_parameters(found: Any) -> None:
     """Each number with its deviation, and how far it is from the nominal one."""
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
+
+    from gantrytau_optimica.calibration.report import nominal_values, scalars
 
     table = Table(box=SIMPLE, pad_edge=False)
     table.add_column("parameter (m, rad)", no_wrap=True)
@@ -88,20 +157,3 @@ def _deviation(name: str, deviations: dict[str, float]) -> str:
         return "held" if "orientation" not in name else "-"
     value = deviations[name]
     return f"{value * 1e6:.3g}" if np.isfinite(value) else "not known"
-
-
-def scalars(values: Any) -> dict[str, float]:
-    """Numbers by name; of a vector `v` the elements `v[0]`, `v[1]` and so on."""
-    found = {}
-    for name, value in values.items():
-        elements = [name] if np.ndim(value) == 0 else [f"{name}[{k}]" for k in range(len(value))]
-        found |= dict(zip(elements, np.atleast_1d(value).tolist(), strict=True))
-    return found
-
-
-def nominal_values(found: Any) -> dict[str, float]:
-    """The numbers that the robot had before."""
-    from gantrytau import flatten
-    from gantrytau.parameters import parameter_table
-
-    return dict(parameter_table(flatten(found.geometry.robot)).values)
