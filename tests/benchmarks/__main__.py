@@ -2,10 +2,20 @@
 
 import sys
 
-from tests.benchmarks import answers, calibration, engine, fmus, growth, kinematics, mechanisms, motion
+from tests.benchmarks import (
+    answers,
+    calibration,
+    engine,
+    fmus,
+    growth,
+    kinematics,
+    mechanisms,
+    motion,
+    procedure,
+)
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
     mechanics = (engine.rows(), mechanisms.rows(), motion.rows(), kinematics.rows(), calibration.rows())
-    parts = (*mechanics, growth.rows(), answers.rows(), fmus.rows())
+    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), fmus.rows())
     sys.exit(print_table("Benchmarks", parts))
