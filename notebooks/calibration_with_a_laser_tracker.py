@@ -439,7 +439,7 @@ for title, mistaken in MISTAKES.items():
 assert concerned == {title: int(mistaken.finite.sum()) for title, mistaken in MISTAKES.items()}
 
 # %% [markdown]
-# Exchanged columns look like another robot, since the frame is not known either. Single rows that are wrong are named, and
+# Exchanged columns are told though the frame of the robot is not known. Single rows that are wrong are named, and
 # a robust loss leaves them without weight.
 
 # %%
