@@ -164,6 +164,17 @@ def test_a_loaded_plan_is_the_plan(plan, tmp_path):
     assert sorted(map(tuple, known.q[known.measured])) == sorted(map(tuple, q[8:]))
     kept.write(tmp_path / "rest")
     assert not (tmp_path / "rest" / "workspace.png").exists()
+    longer = robot.modified(dict(arms=[dict(length=2.1), dict(), dict()]))
+    with pytest.raises(
+        ModelError, match=r"arms\[0\].length = 2.1, expected 2.06.* as planned; .* or plan again"
+    ):
+        load_plan(tmp_path, longer, limits)
+    strict = replace(limits, clearance=limits.clearance + 0.05)  # the cell has changed since
+    less = load_plan(tmp_path, robot, strict)
+    anew = less.remaining(done)
+    assert less.cell is not None
+    assert clear_ways(less.cell.fleet, anew.q[:-1], anew.q[1:]).all()
+    assert anew.measured.sum() + len(anew.lost) - len(plan.lost) == 6
     limits = replace(limits, strokes=(-0.6, 0.9))
     with pytest.raises(
         ModelError, match=r"load_plan: found F1GantryTau with .* expected the robot of the plan, GantryTau"

@@ -134,7 +134,8 @@ def load_plan(
     """The plan that `CalibrationPlan.write` left in a folder, or its plan.json itself.
 
     robot, limits: as they were planned for; with both `remaining` seeks a new order, without them it keeps the old one.
-    Raises ModelError for a folder without a plan, a file that is none, and a robot of another kind.
+    Raises ModelError for a folder without a plan, a file that is none, and a robot of another kind or
+    with other parameters.
     """
     path = Path(folder)
     path = path / "plan.json" if path.is_dir() else path
@@ -223,4 +224,11 @@ def _with_cell(plan: CalibrationPlan, robot: Model, limits: Limits) -> Calibrati
             f"load_plan: found {type(robot).__name__} with {', '.join(fleet.nominal.kinematics.joints)}, expected the "
             f"robot of the plan, {plan.robot_name} with {', '.join(plan.joints)}"
         )
+    now = {name: arm.values[name] for arm in fleet.arms for name in arm.free}
+    for name, then in plan.parameters.items():
+        if name not in now or not np.allclose(now[name], then, rtol=0, atol=1e-9):
+            raise ModelError(
+                f"load_plan: found {type(robot).__name__} with {name} = {_plain(now.get(name))}, expected {_plain(then)} as "
+                "planned; give the robot with its nominal values of then, or plan again"
+            )
     return replace(plan, cell=Cell(fleet, limits))

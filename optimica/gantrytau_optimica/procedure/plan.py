@@ -135,8 +135,8 @@ class CalibrationPlan:
     def remaining(self, measurements: Measurements) -> "CalibrationPlan":
         """The plan of the poses that measurements do not hold yet, in a collision-free order again.
 
-        With the robot known (not loaded without it) the order is sought anew; else the program goes the same way as
-        before and passes what is measured already.
+        With the robot known (not loaded without it) the order is sought anew, under the limits that it is loaded with: what
+        they make unreachable is in `lost`; else the program goes the same way as before and passes what is measured already.
         """
         left = self.missing(measurements)
         if self.cell is None:
@@ -145,7 +145,7 @@ class CalibrationPlan:
             return replace(self, measured=todo)
         roadmap = Roadmap(self.cell.fleet, self.q[:-1])
         numbers = np.arange(len(self.q)) % (len(self.q) - 1)  # the last row is home again
-        roadmap.learn({(min(pair), max(pair)): True for pair in pairwise(numbers.tolist())})
+        roadmap.clear(list(pairwise(numbers.tolist())))  # again: limits may be others than those of the plan
         tour = find_tour(roadmap, left)
         rows = tour.nodes
         return replace(
@@ -155,6 +155,7 @@ class CalibrationPlan:
             R=self.R[rows],
             measured=~tour.via & np.isin(rows, left),
             numbers=self.numbers[rows],
+            lost=np.concatenate([self.lost, self.r[tour.lost]]),
         )
 
     def _as_planned(self, measurements: Measurements) -> Measurements:
