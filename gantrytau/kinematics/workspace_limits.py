@@ -126,7 +126,7 @@ class Examiner:
         self.carts = len(self.geometry.offset)
         self.strokes = _strokes(self.kinematics, self.carts, limits.strokes)
         self.around, self.reach = self.geometry.reach()
-        self._touching = _pairs(self.geometry) if limits.link_radius else []
+        self._touching = touching_links(self.geometry) if limits.link_radius else []
         self._axes = self._joint_axes() if math.isfinite(limits.ball_joint) else None
 
     def __call__(self, r: ArrayLike, R: ArrayLike | None = None) -> Examined:
@@ -264,7 +264,7 @@ def _in_blocks(r: np.ndarray, block: Callable[[slice], dict[str, np.ndarray]]) -
     return Examined(r=r, **{name: np.concatenate([each[name] for each in blocks]) for name in blocks[0]})
 
 
-def _pairs(geometry: Geometry) -> list[tuple[int, int]]:
+def touching_links(geometry: Geometry) -> list[tuple[int, int]]:
     """Links of different arms that end in different joints of the plate: those that could touch."""
     arm, joint, count = geometry.arm, geometry.on_plate, len(geometry.length)
     return [

@@ -108,6 +108,15 @@ def test_a_calibrated_robot_is_simulated(answer, measured, poses, tmp_path):
     assert found["plate_mass"] == 4.0
 
 
+def test_values_say_of_which_prototype_they_are(run, measured, poses, tmp_path):
+    run("calibrate", measured(poses), *ROBOT)
+    values = tmp_path / "measured-calibrated" / "calibrated.toml"
+    assert values.read_text().splitlines()[0] == "# Parameters of GantryTau(L1)"
+    found = run("check", "GantryTau(D1)", "--set", values)
+    assert "calibrated.toml: these are values of L1, found with D1; expected (L1)" in found.stderr
+    assert "these are values" not in run("check", "GantryTau(L1)", "--set", values).stderr
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -52,7 +52,7 @@ def test_the_example_is_planned(planned):
     assert record["files"] == [str(folder / name) for name in FILES]
     assert all((folder / name).stat().st_size > 0 for name in FILES)
     assert "verdict    good" in spoken.stdout
-    assert "with the header q1,q2,q3,x,y,z, then: gantrytau calibrate" in spoken.stdout
+    assert "with the header q1,q2,q3,x,y,z), then: gantrytau calibrate" in spoken.stdout
     assert spoken.stderr.splitlines()[0] == "workspace of the robot ..."  # progress
     assert "MoveAbsJ" in (folder / "Calibration.mod").read_text()
     assert len(read_poses(folder)[0]) == 20
@@ -279,6 +279,9 @@ def test_interrupted_it_goes_on_where_it_was(planned, run, tmp_path, monkeypatch
         (dict(carts='carts = "axes"'), 'program.carts: found "axes"; there is robax, extax.'),
         (dict(error='errors = "1 mm"'), "goal.errors: there is no such key; did you mean 'error'?"),
         (dict(home='limit = "x"'), "plan.limit: there is no such key"),
+        (dict(name='name = "1Cal"'), "program.name: found '1Cal', expected a name of RAPID"),
+        (dict(trigger='trigger = "do measure"'), "program.trigger: found 'do measure', expected a name of"),
+        (dict(tool='tool = "module"'), "program.tool: found 'module', expected a name of RAPID"),
     ],
 )
 def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
@@ -327,7 +330,12 @@ def test_a_table_that_is_missing(fails, tmp_path):
         (dict(poses="poses = 4"), "goal.poses: found 4, expected a whole number from 8"),
         (dict(home="home = [0.5, 0.5]"), "plan.home: found [0.5, 0.5], expected 3 finite numbers"),
         (dict(strokes=""), "give limits.strokes"),
-        (dict(name='name = "1Cal"'), "program.name: found '1Cal', expected a name of RAPID"),
+        (dict(strokes="strokes = [1.6, 0.0]"), "limits.strokes: found [1.6, 0.0], expected (3, 2)"),
+        (
+            dict(low="low = [0.4, 2.3, -1.6]", high="high = [1.5, 3.5, 0.0]"),
+            "mm too little clearance between",
+        ),
+        (dict(low="low = [0.4, 2.3, -1.6]", high="high = [1.5, 3.5, 0.0]"), "and limits.obstacles[0] (Box)"),
         (dict(facing="facing = [-1, 0, 0]"), "turn the target (device.facing) towards it"),
     ],
 )
@@ -338,6 +346,7 @@ def test_cells_that_cannot_be_planned(fails, tmp_path, lines, words):
     assert message.startswith(f"{file}: ")
     assert words in message
     assert "plan_calibration" not in message
+    assert all(path.is_file() or list(path.iterdir()) for path in tmp_path.iterdir())  # no empty folder
 
 
 def test_options_that_the_file_of_a_cell_replaces(fails, folder, tmp_path):
@@ -362,7 +371,46 @@ def test_a_robot_of_a_file_is_found_from_the_folder_of_the_plan(folder, answer, 
     assert found["robot"] == f"{tmp_path / 'robots.py'}:robot"
 
 
-def test_the_example_is_printed(run):
+def test_the_example_is_printed(run, fails):
     found = run("calibrate", "--example")
     assert found.exit_code == 0
-    assert found.stdout == EXAMPLE
+    assert found.stdout == EXAMPLE == run("calibrate", "--example", "l1").stdout
+    six = run("calibrate", "--example", "--robot", "SixLinkGantryTau(L1)").stdout
+    assert 'model = "SixLinkGantryTau(L1)"' in six
+    assert six.startswith("# Limits, device and home below fit SixLinkGantryTau(D1): make them")
+    assert "there is no such example" in fails(MISUSE, "calibrate", "--example", "f2")
+    assert "or a kind beside it, as --example six" in fails(
+        MISUSE, "calibrate", "--example", "--robot", "Pendulum"
+    )
+    assert "for a cell to begin with give --example six" in fails(MISUSE, "calibrate", "six")
+
+
+@pytest.mark.parametrize(("kind", "links"), [("six", "six links"), ("f1", "turntables")])
+def test_examples_of_plates_that_turn_work_at_once(run, tmp_path, kind, links):
+    text = run("calibrate", "--example", kind).stdout
+    text = text.replace("robots = 20", "robots = 2\nspacing = 0.25").replace("poses = 40", "poses = 24")
+    file = tmp_path / "cell.toml"
+    file.write_text(text)
+    record = run("calibrate", file)
+    assert record.exit_code == 0, record.output
+    assert f"({links}) with a TMac" in record.stdout
+    assert "none of 2 robots drawn" in record.stdout  # fewer than is usual
+    command = record.stdout.splitlines()[-1].rpartition("then: ")[2]
+    assert command.startswith(f"gantrytau calibrate {tmp_path / 'cell-plan' / 'measurements.csv'}")
+    assert command in (tmp_path / "cell-plan" / "plan.html").read_text()
+    header = (tmp_path / "cell-plan" / "measurements-template.csv").read_text().splitlines()[0]
+    assert header.endswith("x,y,z,qw,qx,qy,qz")
+
+
+def test_plans_of_another_version_are_told(folder, fails):
+    file, plan = measure(folder), folder / "plan.json"
+    numbers = json.loads(plan.read_text())
+    plan.write_text(json.dumps(numbers | {"format": 1}))
+    assert "of format 1, of another version of gantrytau, expected format 2; plan again" in fails(
+        MISUSE, "calibrate", file
+    )
+    del numbers["lost"]
+    plan.write_text(json.dumps(numbers))
+    message = fails(MISUSE, "calibrate", file)
+    assert "without 'lost', expected a whole plan; plan again" in message
+    assert "KeyError" not in message

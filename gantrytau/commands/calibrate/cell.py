@@ -1,5 +1,6 @@
 """`cell.toml`: a robot as the tape measure knows it, its surroundings, and the device that is to measure it."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -132,7 +133,7 @@ def read(file: Path) -> Cell:
         wanted=goal["error"],
         poses=goal.get("poses"),
         plan=read_table(f"{whole}plan", table.get("plan", {}), PLAN),
-        program=read_table(f"{whole}program", table.get("program", {}), PROGRAM),
+        program=_program(f"{whole}program", table.get("program", {})),
     )
 
 
@@ -193,6 +194,22 @@ def _bodies(place: str, entries: Any, kinds: Mapping[str, Any]) -> list[Any]:
         name, values = _of_a_kind(f"{place}[{k}]", entry, kinds)
         found.append(_made(f"{place}[{k}]", getattr(kinematics, name), values))
     return found
+
+
+def _program(place: str, table: Any) -> dict[str, Any]:
+    """Options of the robot program, all of which RAPID takes."""
+    from gantrytau_optimica.procedure.rapid import check_program
+
+    values = read_table(place, table, PROGRAM)
+    try:
+        check_program(**values)
+    except ModelError as error:
+        raise CommandError(
+            re.sub(
+                r"^program: found (\w+)=", rf"{place.removesuffix('program')}program.\1: found ", str(error)
+            )
+        ) from error
+    return values
 
 
 def _device(place: str, table: Any) -> Any:

@@ -76,13 +76,16 @@ T_MAC = (
     'kind = "T-Mac"              # finds orientations too, as this robot needs it; so do "stereo cameras"\n'
 )
 SIX = L1 | dict(
-    robot='model = "SixLinkGantryTau(L1)"',
+    robot='model = "SixLinkGantryTau(D1)"',
     value='"arms[0].links[0].length" = 2.061',
+    strokes="[0.0, 2.0]       ",
+    low="[2.5, -6.0, -3.0]",
+    high="[3.0, -5.0, 1.0]",
     clearance="5 mm",
     ball_joint="45 deg",
     plate_radius="20 mm",
     link_radius="10 mm",
-    device=T_MAC + "r = [4.5, 2.9, -0.7]",
+    device=T_MAC + "r = [4.0, -4.0, 0.0]",
     facing="# facing = [1.0, 0.0, 0.0]  # where the target looks, in the frame of the tool; left out: seen from everywhere",
     tape="2 mm",
 )

@@ -3,7 +3,7 @@
 import re
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,9 @@ _IN_THE_FILE = (
     (r"give home= in m and rad", "give plan.home in m and rad"),
     (r"\(facing=\)", "(device.facing)"),
     (r"\(tape=\)", "(robot.tape)"),
+    (r"^\w+: found strokes", "limits.strokes: found"),
+    (r"between (.*) and (obstacles)", r"between \1 and limits.\2"),
+    (r"between plate\[", "between limits.plate["),
     (r"give Limits\(strokes=\.\.\.\)( or box=, a slice for example)?", "give limits.strokes"),
 )
 
@@ -75,6 +78,8 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
         where = f" in the stage '{reached}'" if reached.stage else ""
         fail(f"Interrupted{where}; the same command goes on from there", INTERRUPTED, json)
     except ModelError as error:
+        with suppress(OSError):  # a folder that was made for nothing
+            folder.rmdir()
         raise ModelError(_in_the_file(str(error), file)) from error
     files = [str(path) for path in _files(folder, cell)]
     good, reasons = found.verdict.good, "\n".join(found.verdict.reasons)
@@ -107,10 +112,17 @@ def _protect(folder: Path, found: Any) -> None:
 
 def _next(found: Any, folder: Path, file: Path) -> str:
     """What to do with a plan."""
+    from gantrytau_optimica.procedure.page import USUAL, command, drawn
+
     measured = folder / MEASUREMENTS
+    few = int(found.settings["robots"]) < USUAL
+    safe = f"Safe: {drawn(found)}\n" if few else ""
     if found.verdict.good:
-        return f"Measure the poses, write {measured} with the header {header(found)}, then: gantrytau calibrate {measured}"
-    return (
+        return (
+            f"{safe}Measure the poses, save {folder / TEMPLATE} as {measured}, filled in (or a file with the header "
+            f"{header(found)}), then: {command(found, folder)}"
+        )
+    return safe + (
         f"Change {file}, and give the same command again: it goes on from what does not depend on the change"
     )
 

@@ -20,6 +20,7 @@ from gantrytau_optimica.calibration.arm_fit import scales
 from gantrytau_optimica.calibration.arms import Arm, read_arms
 from gantrytau_optimica.calibration.devices import Device
 from gantrytau_optimica.calibration.sight import Bars
+from gantrytau_optimica.procedure.touching import nearest_bodies
 
 WIDER = 2.0  # times the error of a tape measure, at which a robot must be safe too
 DRAWS = 50  # of parameters, until links meet
@@ -197,7 +198,8 @@ def check_home(fleet: Fleet, home: np.ndarray) -> None:
         which = f" in robot {number} of {len(fleet.judges) - 1} with the tape error or {WIDER:g} times that"
         which = which if number else ""
         if reason == "collision":
-            missing = f"{-judged.clearance[0] * 1e3:.3g} mm too little clearance of links or plate"
+            where = nearest_bodies(member.linked.geometry, member.limits, home, judged.r[0], judged.R[0])
+            missing = f"{-judged.clearance[0] * 1e3:.3g} mm too little clearance between {where}"
         else:
             missing = f"the limit '{reason}' broken"
         raise ModelError(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gantrytau_optimica.procedure.plan import CalibrationPlan
 
 USUAL = 20  # robots that are drawn
+DOUBT = 0.05  # of 95 % confidence
 STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
@@ -38,9 +39,11 @@ def command(plan: "CalibrationPlan", folder: str | Path = ".") -> str:
 def drawn(plan: "CalibrationPlan") -> str:
     """What so many simulated robots say of the safety of all others."""
     robots = int(plan.settings["robots"])
+    share = 1 - DOUBT ** (1 / robots)
     words = (
         f"none of {robots} robots drawn with the tape error, and none of as many with {WIDER:g} times these errors, breaks "
-        "a limit on the way; a robot farther from its nominal values may"
+        f"a limit on the way; {robots} alone would say with 95 % confidence that no more than {share:.0%} of all do; a "
+        "robot farther from its nominal values may"
     )
     return words if robots >= USUAL else f"{words}; {USUAL} or more robots say more"
 
