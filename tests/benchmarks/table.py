@@ -23,12 +23,12 @@ class Row:
 def at_most(figure: str, value: float, limit: float, unit: str = "") -> Row:
     """A row whose figure must not exceed a limit."""
     space = f" {unit}" if unit else ""
-    return Row(figure, f"{value:.4g}{space}", f"<= {limit:g}{space}", value <= limit)
+    return Row(figure, f"{value:.4g}{space}", f"<= {limit:g}{space}", bool(value <= limit))
 
 
 def at_least(figure: str, value: float, limit: float) -> Row:
     """A row whose figure must reach a limit."""
-    return Row(figure, f"{value:g}", f">= {limit:g}", value >= limit)
+    return Row(figure, f"{value:g}", f">= {limit:g}", bool(value >= limit))
 
 
 def shown(figure: str, value: str) -> Row:
