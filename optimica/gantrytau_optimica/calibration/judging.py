@@ -166,7 +166,7 @@ def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Ite
     words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {where} with the best parameters"
     remedy = (
         "q, r and R of the same pose in each row; look at order, units and signs of columns, or take loss='robust' where "
-        "many rows are wrong"
+        "many rows are wrong, or a device that errs by less"
     )
     if seen.typical > REFUSED:
         raise CalibrationError(
