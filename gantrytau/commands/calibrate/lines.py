@@ -11,21 +11,13 @@ import numpy as np
 from gantrytau.commands.reporting import CommandError
 
 
-def lines_of(file: Path) -> np.ndarray:
-    """The line of each row of a CSV file with a header; empty lines hold no row."""
-    with file.open(newline="", encoding="utf-8-sig") as opened:
-        reader = csv.reader(opened)
-        found = [reader.line_num for row in reader if "".join(row).strip()]
-    return np.array(found[1:], dtype=int)
-
-
-def read(file: Path, rails: Sequence[Path]) -> tuple[Any, np.ndarray]:
-    """Measurements and their lines; CommandError for files that cannot be read."""
+def read(file: Path, rails: Sequence[Path]) -> Any:
+    """Measurements; CommandError for files that cannot be read."""
     from gantrytau.errors import ModelError
     from gantrytau_optimica import Measurements
 
     try:
-        return Measurements.read(file, rails=list(rails) or None), lines_of(file)
+        return Measurements.read(file, rails=list(rails) or None)
     except UnicodeDecodeError as error:
         raise CommandError(
             f"{file}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"

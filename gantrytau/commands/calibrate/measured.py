@@ -27,8 +27,8 @@ class Measured:
     @staticmethod
     def read(file: Path, rails: Sequence[Path] = ()) -> "Measured":
         """CommandError for files that cannot be read."""
-        data, lines = read(file, rails)
-        return Measured(file, data, lines if data.lines is None else data.lines)
+        data = read(file, rails)
+        return Measured(file, data, data.lines)
 
     def words(self, message: str, said: Sequence[Any]) -> str:
         """A message with lines in place of rows, and options in place of arguments."""
