@@ -50,7 +50,7 @@ def _few(rows: np.ndarray) -> Iterator[Finding]:
 
 
 def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
-    later = repeated_rows(np.column_stack([q, r]))
+    later = repeated_rows(q, r)
     if later.size:
         repeat = agreeing(later, "repeat")
         yield Finding(
@@ -74,24 +74,41 @@ def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
             yield Finding("stuck", bad, words)
 
 
-def repeated_rows(table: np.ndarray) -> np.ndarray:
-    """Places of rows of (N, k) that repeat an earlier row to the last bit."""
-    if len(table) < 2:
+def repeated_rows(*tables: np.ndarray) -> np.ndarray:
+    """Places of rows that repeat an earlier row to the last bit; tables (N, k) side by side."""
+    if len(tables[0]) < 2:
         return np.zeros(0, dtype=int)
-    # one number for each row, alike for alike rows, and only rows that share the first bits of it are sorted
-    keys = np.zeros(len(table), dtype=np.uint64)
-    for k in range(table.shape[1]):
-        bits = np.add(table[:, k], 0.0).view(np.uint64)  # of -0 as of 0
-        keys = (keys ^ bits) * np.uint64(0x9E3779B97F4A7C15)  # multiplicative hashing (Knuth)
-    places = (keys >> np.uint64(64 - BITS)).astype(np.intp)
-    shared = np.flatnonzero(np.bincount(places, minlength=1 << BITS)[places] > 1)
-    order = shared[np.argsort(keys[shared])]
+    # one number for each row, alike for alike rows, sorted only where two are alike
+    keys = np.zeros(len(tables[0]), dtype=np.uint64)
+    for table in tables:
+        for column in table.T:
+            keys ^= np.add(column, 0.0).view(np.uint64)  # of -0 as of 0
+            keys *= np.uint64(0x9E3779B97F4A7C15)  # multiplicative hashing (Knuth)
+    if not _some_alike(keys):
+        return np.zeros(0, dtype=int)
+    order = np.argsort(keys)
     near = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
-    if not near.size:
-        return near
     candidates = np.unique(np.concatenate([order[near], order[near + 1]]))
-    _, first, inverse = np.unique(table[candidates], axis=0, return_index=True, return_inverse=True)
+    rows = np.column_stack([table[candidates] for table in tables])
+    _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return candidates[first[inverse.ravel()] != np.arange(len(candidates))]
+
+
+def _some_alike(keys: np.ndarray) -> bool:
+    """Whether any of N numbers stands twice; those that share their first bits are compared with the last of them, again
+    and again without it.
+    """
+    places = (keys >> np.uint64(64 - BITS)).astype(np.intp)
+    last = np.empty(1 << BITS, dtype=np.int32)
+    left = np.arange(len(keys), dtype=np.int32)
+    while left.size:
+        last[places[left]] = left
+        other = last[places[left]]
+        before = np.flatnonzero(other != left)
+        if np.any(keys[left[before]] == keys[other[before]]):
+            return True
+        left = left[before]
+    return False
 
 
 def _shape(r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
