@@ -6,6 +6,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
+from gantrytau_optimica.calibration.data_checks import repeated_rows
 from tests.calibration.synthetic import NOISE, grid, inverse, nominal
 
 TRUTH = prototypes.L1
@@ -158,6 +159,20 @@ def test_nan(poses):
     assert kinds(found) == {"nan": [7, 9]}
     assert not {7, 9} & {*found.rows, *found.held_out}
     assert found.error < 18e-6
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_repeated_rows_are_those_of_a_comparison_one_by_one(seed):
+    random = np.random.default_rng(seed)
+    count = 2000
+    q = random.integers(-2, 3, (count, 3)) * random.choice([1.0, -1.0], (count, 1))  # also -0, which equals 0
+    r = random.integers(0, 1 + 3 * seed, (count, 3)) * 0.5 if seed else random.standard_normal((count, 3))
+    known, again = set(), []
+    for k, row in enumerate(np.hstack([q, r]) + 0.0):
+        if row.tobytes() in known:
+            again.append(k)
+        known.add(row.tobytes())
+    np.testing.assert_array_equal(repeated_rows(q, r), again)
 
 
 def test_duplicated_rows(poses):
