@@ -140,17 +140,23 @@ def _poses(axis: Any, plan: "CalibrationPlan", across: int, up: int) -> None:
 
 
 def _numbers(axis: Any, numbers: np.ndarray, at: np.ndarray) -> None:
-    """Numbers (n,) beside points (n, 2): those of points on top of each other in one row of words."""
+    """Numbers (n,) beside points (n, 2): those of points on top of each other in one row of words; to the left below where
+    there is no room to the right above.
+    """
     apart = np.ptp(at, axis=0).max() * CLOSE
     left = list(range(len(at)))
     while left:
         first = left[0]
         here = [k for k in left if np.abs(at[k] - at[first]).max() <= apart]
         left = [k for k in left if k not in here]
+        away = (at - at[here[-1]]) / apart
+        crowded = ((away[:, 0] > 0.5) & (away[:, 0] < 3) & (away[:, 1] > -0.7) & (away[:, 1] < 2)).any()
         axis.annotate(
             ", ".join(str(numbers[k]) for k in here),
             at[here[-1]],
-            xytext=(3, 3),
+            xytext=(-3, -3) if crowded else (3, 3),
+            ha="right" if crowded else "left",
+            va="top" if crowded else "bottom",
             textcoords="offset points",
             fontsize=6.5,
             zorder=6,
