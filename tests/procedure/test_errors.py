@@ -63,7 +63,8 @@ def test_home_in_a_collision():
     robot, limits, device = cells.l1()
     inside = dataclasses.replace(limits, obstacles=Box((0.8, 2.8, -0.6), (1.0, 3.0, -0.3)))
     with pytest.raises(
-        ModelError, match=r"home: found .* mm too little clearance between arms\[\d\] and obstacles\[0\] \(Box\) .* give home= in m "
+        ModelError,
+        match=r"home: found .* too little clearance between arms\[\d\] and obstacles\[0\] \(Box\) .* give home=",
     ):
         plan_calibration(robot, inside, device, **FEW)
 

@@ -29,6 +29,7 @@ _IN_OPTIONS = (
     (r"\bfound constraints with\b", "found --constraint with"),
     (r"\bconstraint (on )?'", r"--constraint \1'"),
     (r"\bgive a prior\b", "give --prior NAME=DEVIATION"),
+    (r"left out of \.error", "left out of the error"),
     (r"^calibrate: ", ""),
 )
 

@@ -129,7 +129,9 @@ def judged(found: Calibration) -> list[Finding]:
         one = len(others) == 1
         advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
         if found.loss == "robust":
-            advice = f"{'it' if one else 'they'} had little weight"
+            advice = (
+                f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of .error"
+            )
         words = (
             f"{rows_in_words(others, len(found.measurements))} {agreeing(others, 'close')} worse than {OUTLIER:g} standard "
             f"deviations; {advice}"
