@@ -143,7 +143,7 @@ def _numbers(axis: Any, numbers: np.ndarray, at: np.ndarray) -> None:
     """Numbers (n,) beside points (n, 2): those of points on top of each other in one row of words; to the left below where
     there is no room to the right above.
     """
-    apart = np.ptp(at, axis=0).max() * CLOSE
+    apart = max(np.ptp(at, axis=0).max() * CLOSE, 1e-6)  # a single pose has no extent
     left = list(range(len(at)))
     while left:
         first = left[0]
