@@ -57,7 +57,7 @@ class Instance:
         return self.paths[id(member)]
 
 
-def _made(kind: type[Model]) -> Model:
+def _made(kind: Any) -> Model:
     """An instance of a class whose parameters all have values."""
     try:
         inspect.signature(kind).bind()

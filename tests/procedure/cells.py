@@ -1,5 +1,7 @@
 """Cells with robots, small enough for tests, and what judges them independently: dense samples, boxes by hand."""
 
+from typing import Any
+
 import numpy as np
 
 from gantrytau.kinematics import Box, Limits
@@ -10,6 +12,11 @@ from gantrytau_optimica.calibration.arms import read_arms
 
 LOW, HIGH = np.array([0.6, 2.4, -3.0]), np.array([0.8, 2.5, -0.4])  # a post within the workspace of the L1
 RADIUS, CLEARANCE = 0.02, 0.02
+
+
+def varied(policy: dict[str, Any], **others: Any) -> dict[str, Any]:
+    """Keywords of plan_calibration, some of them changed."""
+    return policy | others
 
 
 def l1():

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from gantrytau_models import FourBar
 from gantrytau_optimica import LaserTracker, LengthGauge, load_plan, plan_calibration
 from gantrytau_optimica.procedure import fleet
 from tests.procedure import cells
+from tests.procedure.cells import varied
 
-FEW = dict(poses=10, robots=2, tape=0.003, spacing=0.25)
+FEW: dict[str, Any] = dict(poses=10, robots=2, tape=0.003, spacing=0.25)
 
 
 @pytest.mark.parametrize(
@@ -44,10 +46,11 @@ def test_wrong_numbers(policy, message):
 
 def test_wrong_kinds():
     robot, limits, device = cells.l1()
+    wrong: list[Any] = [dict(strokes=(0, 2)), "tracker"]
     with pytest.raises(ModelError, match=r"limits: found dict, expected gantrytau\.kinematics\.Limits"):
-        plan_calibration(robot, dict(strokes=(0, 2)), device)
+        plan_calibration(robot, wrong[0], device)
     with pytest.raises(ModelError, match=r"device: found str, expected a device such as LaserTracker"):
-        plan_calibration(robot, limits, "tracker")
+        plan_calibration(robot, limits, wrong[1])
     with pytest.raises(ModelError, match=r"FourBar has no 'tool\.r'"):
         plan_calibration(FourBar(), limits, device)
     with pytest.raises(ModelError, match=r"device: found LengthGauge, which finds no position"):
@@ -85,7 +88,7 @@ def test_no_safe_place():
     with pytest.raises(
         ModelError, match=r"found no place in the workspace that keeps the limits|found no safe place"
     ):
-        plan_calibration(robot, narrow, device, **(FEW | dict(home=home, spacing=0.05)))
+        plan_calibration(robot, narrow, device, **varied(FEW, home=home, spacing=0.05))
 
 
 def test_robots_that_cannot_be_put_together(monkeypatch):

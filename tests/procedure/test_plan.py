@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ from gantrytau_optimica import (
 )
 from gantrytau_optimica.procedure.clear_ways import clear_ways
 from tests.procedure import cells
+from tests.procedure.cells import varied
 
-FEW = dict(poses=14, robots=6, tape=0.003, spacing=0.2)
+FEW: dict[str, Any] = dict(poses=14, robots=6, tape=0.003, spacing=0.2)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def test_the_verdict_is_the_error_of_the_tool(plan):
 
 @pytest.mark.parametrize("cell", [cells.l1, cells.symmetric], ids=["l1", "symmetric"])
 def test_simulated_errors_are_those_predicted(cell):
-    found = plan_calibration(*cell(), **(FEW | dict(robots=14)))
+    found = plan_calibration(*cell(), **varied(FEW, robots=14))
     # standard deviations are predicted, mean distances found, which are 0.92 of them for three alike; 14 robots
     assert found.trials.in_frame.mean() == pytest.approx(0.9 * found.prediction.error, rel=0.2)
     assert (found.trials.after <= found.trials.in_frame).all()  # laid over each other best
@@ -74,7 +76,7 @@ def test_all_robots_are_safe_and_seen_at_the_poses(plan):
 
 def test_what_is_missing_is_said():
     robot, limits, device = cells.l1()
-    small = FEW | dict(poses=9, robots=2)
+    small = varied(FEW, poses=9, robots=2)
     noisy = replace(device, transverse_noise=1e-3, range_noise=1e-3)
     found = plan_calibration(robot, limits, noisy, **small, wanted=7e-4)
     assert not found.verdict.good
@@ -82,12 +84,12 @@ def test_what_is_missing_is_said():
     found = plan_calibration(robot, limits, noisy, **small, wanted=1e-5)
     assert "times less noise" in str(found.verdict)
     cameras = stereo_cameras((3.5, 2.9, 1.0), (0.9, 2.9, -0.4), facing=(1.0, 0.0, 0.3))
-    found = plan_calibration(robot, limits, cameras, **(small | dict(poses=20)), wanted=1e-3)
+    found = plan_calibration(robot, limits, cameras, **varied(small, poses=20), wanted=1e-3)
     assert not found.verdict.good
     assert "of each pose are averaged the Cameras errs by" in str(found.verdict)  # too much for any robot
     assert found.trials.misread > 1e-3
     cameras = stereo_cameras((3.5, 2.9, 1.0), (0.9, 2.9, -0.4), facing=(1.0, 0.0, 0.3), lens_error=0.005)
-    found = plan_calibration(robot, limits, cameras, **(small | dict(poses=20)), wanted=5e-4)
+    found = plan_calibration(robot, limits, cameras, **varied(small, poses=20), wanted=5e-4)
     assert not found.verdict.good
     assert "systematic in the Cameras and more poses do not help" in str(found.verdict)
     assert found.trials.averaged > 5 * found.prediction.error
@@ -96,7 +98,7 @@ def test_what_is_missing_is_said():
 def test_a_place_from_which_little_is_seen_is_told():
     robot, limits, _ = cells.l1()
     near = LaserTracker((2.0, 3.0, 0.0), elevation=(-0.3, 0.3))
-    found = plan_calibration(robot, limits, near, **(FEW | dict(robots=2)))
+    found = plan_calibration(robot, limits, near, **varied(FEW, robots=2))
     assert "another place for it would show more" in str(found.verdict)
     assert len(found.unseen) > 0
     assert not near.sees(found.unseen).all()
@@ -104,7 +106,7 @@ def test_a_place_from_which_little_is_seen_is_told():
 
 def test_progress_is_told():
     told = []
-    plan_calibration(*cells.l1(), **(FEW | dict(robots=2)), progress=lambda *each: told.append(each))
+    plan_calibration(*cells.l1(), **varied(FEW, robots=2), progress=lambda *each: told.append(each))
     assert [stage for stage, done, of in told if done == of] == [
         "workspace", "candidates", "choice", "ways", "trials", "verdict",
     ]  # fmt: skip

@@ -31,11 +31,18 @@ def read(text):
     return targets, [line.strip().replace(", ", ",") for line in body.splitlines()[1:] if line.strip()]
 
 
+def moved(body):
+    """The moves of a program, all of which can be read."""
+    lines = [line for line in body if line.startswith("MoveAbsJ")]
+    moves = [move for line in lines if (move := MOVE.fullmatch(line))]
+    assert len(moves) == len(lines)
+    return moves
+
+
 @pytest.mark.parametrize("carts", ["robax", "extax"])
 def test_the_program_goes_to_the_poses_of_the_plan(plan, carts):
     targets, body = read(plan.program(carts=carts, tool="tReflector"))
-    moves = [MOVE.fullmatch(line) for line in body if line.startswith("MoveAbsJ")]
-    assert all(moves)
+    moves = moved(body)
     assert {move[3] for move in moves} == {"tReflector"}
     used, unused = (0, 1) if carts == "robax" else (1, 0)
     commanded = np.array([targets[move[1]][used][:3] for move in moves]) / 1e3
@@ -89,7 +96,7 @@ def test_the_program_of_the_rest_keeps_the_numbers_of_the_plan(plan, tmp_path):
         np.testing.assert_allclose(
             targets[f"p{number:03d}"][0][:3], plan.q[number - 1] * 1e3, atol=0.51e-4, rtol=0
         )
-    moves = [MOVE.fullmatch(line)[1] for line in body if line.startswith("MoveAbsJ")]
+    moves = [move[1] for move in moved(body)]
     assert set(moves) == set(targets)
     for name in set(moves) - {"pHome"}:
         np.testing.assert_allclose(

@@ -1,6 +1,7 @@
 """An interrupted procedure goes on where it was, and does anew what depends on a change only."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -8,8 +9,9 @@ from gantrytau.kinematics import Capsule
 from gantrytau_optimica import plan_calibration
 from gantrytau_optimica.procedure import known_ways, planning
 from tests.procedure import cells
+from tests.procedure.cells import varied
 
-FEW = dict(poses=9, robots=3, tape=0.003, spacing=0.25)
+FEW: dict[str, Any] = dict(poses=9, robots=3, tape=0.003, spacing=0.25)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +75,7 @@ def test_only_what_depends_on_a_change_is_done_anew(plan, tmp_path, monkeypatch)
     found = plan_calibration(*cells.l1(), **FEW, folder=tmp_path, wanted=1e-6)
     assert {name: n for name, n in counts.items() if n} == {"verdict": 1}
     assert not found.verdict.good
-    more = plan_calibration(*cells.l1(), **(FEW | dict(poses=10)), folder=tmp_path)
+    more = plan_calibration(*cells.l1(), **varied(FEW, poses=10), folder=tmp_path)
     assert {name: n for name, n in counts.items() if n} == {"choice": 1, "ways": 1, "trials": 4, "verdict": 2}
     assert more.measured.sum() == 10
     robot, limits, device = cells.l1()

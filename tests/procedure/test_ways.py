@@ -1,5 +1,7 @@
 """Ways between poses: dense samples with other robots, distances by hand, and the bounds against what really moves."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from gantrytau_optimica.procedure.tours import Roadmap, find_tour
 from tests.procedure import cells
 
 SAMPLES = 400  # of a way of up to 3 m: 8 mm apart, of which a link with 20 mm radius and clearance misses nothing much
-FEW = dict(poses=12, robots=4, tape=0.003, spacing=0.15)
+FEW: dict[str, Any] = dict(poses=12, robots=4, tape=0.003, spacing=0.15)
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +90,7 @@ def test_the_direct_way_through_the_post_is_refused_and_a_detour_found():
     over = fleet.nominal.joints(np.array([[*left[:2], 0.2], [*right[:2], 0.2]]), None)
     roadmap = Roadmap(fleet, np.concatenate([ends, over]))
     detour = roadmap.way(0, 1)
+    assert detour is not None
     assert len(detour) > 2
     assert (detour[0], detour[-1]) == (0, 1)
     tour = find_tour(roadmap, np.array([1]))
@@ -120,7 +123,8 @@ def test_tours_are_short():
     # thirty places on a ring: the shortest round trip is the ring itself
     angle = np.random.default_rng(1).permutation(30) * 2 * np.pi / 30
     q = 1 + 0.5 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    tour = find_tour(Roadmap(None, q, lambda _, a, b: np.ones(len(a), dtype=bool)), np.arange(1, 30))
+    nobody: Any = None  # no robot, as all ways are clear
+    tour = find_tour(Roadmap(nobody, q, lambda _, a, b: np.ones(len(a), dtype=bool)), np.arange(1, 30))
     length = np.linalg.norm(np.diff(q[tour.nodes], axis=0), axis=1).sum()
     assert length == pytest.approx(30 * np.sin(np.pi / 30), rel=1e-9)
 
