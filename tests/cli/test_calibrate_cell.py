@@ -181,6 +181,13 @@ def test_swapped_axes_are_not_taken_for_another_frame(folder, fails):
     assert not (folder / "measurements-calibrated").exists()
 
 
+def test_a_template_that_is_not_filled_in(folder, fails):
+    message = fails(MISUSE, "calibrate", folder / "measurements-template.csv")
+    assert (
+        "found no line with numbers in all columns, expected the poses that were measured; fill in" in message
+    )
+
+
 def test_less_than_wanted_is_told(folder, run):
     file = measure(folder)
     text = (folder / "plan.toml").read_text()

@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau.commands.calibrate.lines import in_lines, read
 from gantrytau.commands.calibrate.policy import in_options
-from gantrytau.commands.reporting import FAULT, busy, fail
+from gantrytau.commands.reporting import FAULT, CommandError, busy, fail
 from gantrytau.errors import ModelError
 from gantrytau.model import Model
 
@@ -28,6 +28,11 @@ class Measured:
     def read(file: Path, rails: Sequence[Path] = ()) -> "Measured":
         """CommandError for files that cannot be read."""
         data = read(file, rails)
+        if len(data) and not data.finite.any():
+            raise CommandError(
+                f"{file}: found no line with numbers in all columns, expected the poses that were measured; fill in x, y "
+                "and z"
+            )
         return Measured(file, data, data.lines)
 
     def words(self, message: str, said: Sequence[Any]) -> str:
