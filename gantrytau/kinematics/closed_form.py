@@ -81,7 +81,7 @@ def forward_of_three_links(
             centres = offset[:, :, None] + direction[:, :, None] * np.ascontiguousarray(q[part].T)[:, None]
             foot, height, margin = _spheres(centres, length)
             wanted = side[part].T - foot if isinstance(side, np.ndarray) else side * upwards[:, None]
-            height *= np.where(_dot(height, wanted) < 0, -1.0, 1.0)
+            height *= np.where(dot_of_columns(height, wanted) < 0, -1.0, 1.0)
             height[:, ~(margin >= 0.0)] = np.nan
             np.add(foot, height, out=r[part].T)
     return r
@@ -98,7 +98,7 @@ def slopes_of_three_links(
             place, along = np.ascontiguousarray(r[part].T), np.ascontiguousarray(q[part].T)
             for i in range(3):
                 link = place - offset[i, :, None] - direction[i, :, None] * along[i]
-                link /= _dot(link, direction[i])
+                link /= dot_of_columns(link, direction[i])
                 found[part, i] = link.T
     return found
 
@@ -106,19 +106,21 @@ def slopes_of_three_links(
 def _spheres(c: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `meeting` answers, the pose last: foot and height (3, N), margin (N,) of centres (3, 3, N)."""
     d, e = c[1] - c[0], c[2] - c[0]
-    normal = _cross(d, e)
-    area = _dot(normal, normal)
+    normal = cross_of_columns(d, e)
+    area = dot_of_columns(normal, normal)
     # the foot lies on the planes in which two spheres meet
-    along_d = (_dot(d, d) + (length[0] ** 2 - length[1] ** 2)) / 2
-    along_e = (_dot(e, e) + (length[0] ** 2 - length[2] ** 2)) / 2
-    across = (along_d * _cross(e, normal) + along_e * _cross(normal, d)) / area
-    square = length[0] ** 2 - _dot(across, across)
+    along_d = (dot_of_columns(d, d) + (length[0] ** 2 - length[1] ** 2)) / 2
+    along_e = (dot_of_columns(e, e) + (length[0] ** 2 - length[2] ** 2)) / 2
+    across = (along_d * cross_of_columns(e, normal) + along_e * cross_of_columns(normal, d)) / area
+    square = length[0] ** 2 - dot_of_columns(across, across)
     return c[0] + across, np.sqrt(np.maximum(square, 0.0) / area) * normal, square
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def dot_of_columns(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A . b of vectors (3, N)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross_of_columns(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A x b of vectors (3, N)."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

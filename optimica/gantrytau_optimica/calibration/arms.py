@@ -17,7 +17,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, flatten
 from gantrytau.instantiation import instantiate
-from gantrytau.kinematics.rotations import about
+from gantrytau.kinematics.rotations import about, cross, skewed
 from gantrytau.parameters import parameter_table
 
 Orientation = Literal["local", "unit", "free"]
@@ -182,7 +182,7 @@ class _Frames:
             h = _back(self.before[k], g)
             yield f"{turntable.name}.offset", -h
             yield f"{turntable.name}.orientation", -_by_orientation(arm, turntable, places[k + 1], h)
-            about = _cross(places[k + 1], h @ self.seats[k])
+            about = cross(places[k + 1], h @ self.seats[k])
             yield f"{turntable.name}.gain", -(self.q[:, turntable.column] * (about @ turntable.axis))[:, None]
         yield f"{link}.offset", -_back(self.before[-1], g)
 
@@ -195,22 +195,15 @@ def _back(rotation: np.ndarray, g: np.ndarray) -> np.ndarray:
     return g @ rotation if rotation.ndim == 2 else np.einsum("nij,ni->nj", rotation, g)
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The cross product along the last axis; numpy's own is several times slower."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
-
-
 def _by_orientation(arm: Arm, turntable: Turntable, y: np.ndarray, h: np.ndarray) -> np.ndarray:
     """The row h . d(R(u) y) by the unknowns of the orientation, (N, 4) or (N, 3)."""
     u = arm.values[f"{turntable.name}.orientation"]
     if arm.orientation == "local":
-        return _cross(y, h @ rotation(u))
+        return cross(y, h @ rotation(u))
     norm = np.linalg.norm(u) if arm.orientation == "unit" else 1.0
     w, r = u[0] / norm, u[1:] / norm
-    c = _cross(y, h)
-    by_r = 2 * w * c + 2 * (_cross(_cross(r, y), h) + _cross(y, _cross(h, r)))
+    c = cross(y, h)
+    by_r = 2 * w * c + 2 * (cross(cross(r, y), h) + cross(y, cross(h, r)))
     rows = np.concatenate([2 * (c @ r)[:, None], by_r], axis=1)
     if arm.orientation == "free":
         return rows
@@ -220,9 +213,8 @@ def _by_orientation(arm: Arm, turntable: Turntable, y: np.ndarray, h: np.ndarray
 
 def rotation(u: np.ndarray) -> np.ndarray:
     """R = I + 2 w [r]x + 2 [r]x^2 of a scalar-first quaternion, which is a rotation where |u| = 1; (3, 3)."""
-    w, (x, y, z) = u[0], u[1:]
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    r = skewed(u[1:])
+    return np.eye(3) + 2 * u[0] * r + 2 * r @ r
 
 
 def _seat(arm: Arm, turntable: Turntable) -> np.ndarray:

@@ -41,13 +41,8 @@ def solve(fit: Fit) -> Fit:
     unknown = ca.MX.sym("x", len(free))
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
-    cost = ca.MX(0)
-    for chain, places in zip(group.chains, group.places, strict=True):
-        e = _errors(chain, x[places.tolist()])
-        cost += ca.sumsqr(e if fit.weights is None else ca.DM(fit.weights) * e)
     noise = float(np.sqrt(fit.minimum.cost / max(1, fit.count - fit.minimum.rank)))
-    for i, (value, deviation) in group.prior.items():
-        cost += (noise / deviation * (x[i] - value)) ** 2
+    cost = _cost(fit, x, noise)
     held = unknown[fit.minimum.rank :]
     scaled = cost / max(noise, LEAST) ** 2
     solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": scaled, "g": held}, OPTIONS)
@@ -65,6 +60,17 @@ def solve(fit: Fit) -> Fit:
     return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
 
 
+def _cost(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
+    """Squares of the weighted closure errors, and of deviations from the prior in units of the noise."""
+    cost = ca.MX(0)
+    for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
+        e = _errors(chain, x[places.tolist()])
+        cost += ca.sumsqr(e if fit.weights is None else ca.DM(fit.weights) * e)
+    for i, (value, deviation) in fit.group.prior.items():
+        cost += (noise / deviation * (x[i] - value)) ** 2
+    return cost
+
+
 def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     """All fits as one, by Ipopt, whose numbers keep constraints; from the minimum without them.
 
@@ -80,12 +86,7 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     numbers_of = ca.DM(minimum.x[free]) + ca.DM(steps) @ unknown
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = numbers_of
-    cost = max(noise, LEAST) ** 2 * ca.sumsqr(unknown[minimum.rank :])
-    for chain, places in zip(group.chains, group.places, strict=True):
-        e = _errors(chain, x[places.tolist()])
-        cost += ca.sumsqr(e if whole.weights is None else ca.DM(whole.weights) * e)
-    for i, (value, deviation) in group.prior.items():
-        cost += (noise / deviation * (x[i] - value)) ** 2
+    cost = max(noise, LEAST) ** 2 * ca.sumsqr(unknown[minimum.rank :]) + _cost(whole, x, noise)
     kept = ca.vertcat(*[each.expression(numbers_of) for each in constraints])
     low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
     options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said

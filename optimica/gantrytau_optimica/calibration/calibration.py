@@ -16,10 +16,9 @@ from gantrytau_optimica.calibration.fitting import Fit
 from gantrytau_optimica.calibration.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.measurements import Measurements
-from gantrytau_optimica.calibration.models import mean_rotation
 from gantrytau_optimica.calibration.parameters import Named, arm_of, named_parameters, rod_links
 from gantrytau_optimica.calibration.plausibility import Misses
-from gantrytau_optimica.calibration.rotations import rotation_vector
+from gantrytau_optimica.calibration.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.suspicion import Suspicion, suspicion
 
 

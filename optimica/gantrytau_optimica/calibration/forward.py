@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.kinematics.closed_form import cross_of_columns, dot_of_columns
 from gantrytau_optimica.calibration.guideway_points import between, slope
 from gantrytau_optimica.calibration.rotations import rotations
 
@@ -166,25 +167,16 @@ class CalibratedKinematics:
         a, b, c = (link.guideway.across(np.ascontiguousarray(q[:, link.arm])) for link in self.links)
         la, lb, lc = (link.length**2 for link in self.links)
         b, c = b - a, c - a
-        normal = _cross(b, c)
+        normal = cross_of_columns(b, c)
         with np.errstate(invalid="ignore", divide="ignore"):
-            square = _dot(normal, normal)
-            beta = (_dot(b, b) + la - lb) / 2
-            gamma = (_dot(c, c) + la - lc) / 2
+            square = dot_of_columns(normal, normal)
+            beta = (dot_of_columns(b, b) + la - lb) / 2
+            gamma = (dot_of_columns(c, c) + la - lc) / 2
             # the foot has b.p = beta, c.p = gamma, and lies in their plane
-            foot = _cross(beta * c - gamma * b, normal) / square
-            height = np.sqrt((la - _dot(foot, foot)) / square)
-        side = np.where(_dot(np.ascontiguousarray(near.T) - a, normal) < 0, -1.0, 1.0)
+            foot = cross_of_columns(beta * c - gamma * b, normal) / square
+            height = np.sqrt((la - dot_of_columns(foot, foot)) / square)
+        side = np.where(dot_of_columns(np.ascontiguousarray(near.T) - a, normal) < 0, -1.0, 1.0)
         return np.ascontiguousarray((a + foot + side * height * normal).T)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """A x b of vectors (3, N)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _cart_position(link: RodLink, joint: np.ndarray) -> np.ndarray:

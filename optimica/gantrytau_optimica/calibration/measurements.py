@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.kinematics.rotations import rotations
 from gantrytau_optimica.calibration.data_checks import check_data
 from gantrytau_optimica.calibration.findings import Finding
 
@@ -131,25 +132,14 @@ def _numbers(name: str, values: Any) -> np.ndarray:
 def _orientations(R: Any, count: int) -> np.ndarray:
     found = _numbers("R", R)
     if found.shape == (count, 4):
-        return _of_quaternions(found)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return rotations(found / np.linalg.norm(found, axis=1, keepdims=True))
     if found.shape == (count, 3, 3):
         return found
     raise ModelError(
         f"Measurements: found R of shape {found.shape} for {count} poses, expected ({count}, 3, 3) rotation matrices or "
         f"({count}, 4) quaternions, scalar first"
     )
-
-
-def _of_quaternions(u: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N, 3, 3) of quaternions (N, 4), scalar first, made of unit length."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        w, x, y, z = (u / np.linalg.norm(u, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _rail(k: int, rail: Any) -> np.ndarray:

@@ -25,7 +25,7 @@ from gantrytau_optimica.calibration.groups import Group
 from gantrytau_optimica.calibration.guideway_points import between, straight
 from gantrytau_optimica.calibration.linear_start import linear_start
 from gantrytau_optimica.calibration.measurements import Measurements
-from gantrytau_optimica.calibration.rotations import rotation, turning
+from gantrytau_optimica.calibration.rotations import mean_rotation, rotation, turning
 
 MODELS = (None, "parallel", 1, 2, 3, 4, 5)
 ROLLS = 12  # trials for how a measured guideway lies about its own axis
@@ -111,12 +111,6 @@ def _straight(i: int, name: str, direction: str, start: np.ndarray, data: Measur
 def elements(name: str) -> list[str]:
     """Names of the elements of a vector of three."""
     return [f"{name}[{k}]" for k in range(3)]
-
-
-def mean_rotation(R: np.ndarray) -> np.ndarray:
-    """The rotation nearest to the mean of many, (N, 3, 3) -> (3, 3)."""
-    left, _, right = np.linalg.svd(R.mean(axis=0))
-    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
 def started_linear(links: Sequence[Link]) -> list[Link]:

@@ -29,7 +29,7 @@ from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.geometry import Geometry
 from gantrytau.kinematics.poses import poses, vectors
 from gantrytau_optimica.calibration.findings import CalibrationError
-from gantrytau_optimica.calibration.rotations import rotation_vector
+from gantrytau_optimica.calibration.rotations import mean_rotation, rotation_vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -173,8 +173,7 @@ def orientation_errors(
     if not one or not size > 0:
         raise ModelError(f"orientation_errors: found along={along!r}, expected a direction (3,)")
     if reference is None:
-        left, _, right = np.linalg.svd(found.R.mean(axis=0))  # the nearest rotation to the mean, in squares
-        reference = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        reference = mean_rotation(found.R)
     reference = poses(np.zeros(3), reference, "orientation_errors: reference").R
     assert reference is not None
     turns = rotation_vector(found.R @ reference[0].T)

@@ -15,7 +15,8 @@ from gantrytau_optimica.calibration.findings import CalibrationError, rows_in_wo
 from gantrytau_optimica.calibration.geometry import Geometry
 from gantrytau_optimica.calibration.linear_start import linear_start
 from gantrytau_optimica.calibration.mistakes import Mistake, mistakes
-from gantrytau_optimica.calibration.models import Link, mean_rotation, moved
+from gantrytau_optimica.calibration.models import Link, moved
+from gantrytau_optimica.calibration.rotations import mean_rotation, motion
 
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
 BETTER = 10.0  # times smaller errors that undoing a mistake must leave
@@ -168,16 +169,8 @@ def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray |
     return Fitting(miss(misses_of(links), q, r, R), float(max(left)), turn, shift, float(off))
 
 
-def motion(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rotation (3, 3) and shift (3,) that bring points a (N, 3) nearest to b (Kabsch, 1976)."""
-    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
-    U, _, V = np.linalg.svd((b - centre_b).T @ (a - centre_a))
-    turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    return turn, centre_b - turn @ centre_a
-
-
 def trimmed_motion(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same of the better two thirds of the points, as of poses among which there are outliers."""
+    """What `motion` says of the better two thirds of the points, as of poses among which there are outliers."""
     good = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
     a, b = a[good], b[good]
     kept = np.arange(len(a))

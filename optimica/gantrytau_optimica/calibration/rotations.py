@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gantrytau.kinematics.rotations import skewed, turned
+from gantrytau.kinematics.rotations import best_rotation, skewed, turned
 
 NEAR_HALF_A_TURN = 0.05  # rad
 
@@ -63,3 +63,15 @@ def turning(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return rotation(np.pi * across / np.linalg.norm(across))
     K = skewed(axis)
     return np.eye(3) + K + K @ K / (1 + cosine)
+
+
+def mean_rotation(R: np.ndarray) -> np.ndarray:
+    """The rotation nearest to the mean of many, in squares, (N, 3, 3) -> (3, 3)."""
+    return best_rotation(R.mean(axis=0).T[None], np.eye(3)[None])[0]
+
+
+def motion(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rotation (3, 3) and shift (3,) that bring points a (N, 3) nearest to b, in squares."""
+    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
+    turn = best_rotation((b - centre_b)[None], (a - centre_a)[None])[0]
+    return turn, centre_b - turn @ centre_a

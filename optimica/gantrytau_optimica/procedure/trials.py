@@ -13,6 +13,7 @@ from gantrytau import GantryTauError, ModelError
 from gantrytau_optimica.calibration.calibrating import calibrate
 from gantrytau_optimica.calibration.devices import Device
 from gantrytau_optimica.calibration.measurements import Measurements
+from gantrytau_optimica.calibration.rotations import motion
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet, Member
 
@@ -172,14 +173,11 @@ def _in_device(device: Device, r: np.ndarray, R: np.ndarray) -> tuple[np.ndarray
 
 
 def _placing(points: np.ndarray, onto: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rigid motion (R, p) that lays points (n, 3) over others best: R x + p; rows of NaN do not count (Kabsch, 1976)."""
+    """The rigid motion (R, p) that lays points (n, 3) over others best: R x + p; rows of NaN do not count."""
     good = np.isfinite(points).all(axis=1) & np.isfinite(onto).all(axis=1)
     if good.sum() < 3:
         return np.eye(3), np.zeros(3)
-    a, b = points[good].mean(axis=0), onto[good].mean(axis=0)
-    U, _, V = np.linalg.svd((onto[good] - b).T @ (points[good] - a))
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    return R, b - R @ a
+    return motion(points[good], onto[good])
 
 
 def _moved(placing: tuple[np.ndarray, np.ndarray], r: np.ndarray, R: Any) -> tuple[np.ndarray, Any]:
