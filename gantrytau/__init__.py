@@ -1,8 +1,21 @@
 """gantrytau: acausal modelling on CasADi, for robots with closed kinematic loops and everything else."""
 
-from gantrytau.c_code import c_source
+from gantrytau.answers.c_code import c_source
+from gantrytau.answers.diagnosis import Diagnosis, check
+from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
+from gantrytau.answers.linearization import Linearization, linearize
+from gantrytau.compiler.translation import translate
 from gantrytau.dae import Dae
-from gantrytau.declarations import (
+from gantrytau.errors import (
+    GantryTauError,
+    InitializationError,
+    ModelError,
+    SolveError,
+    StructureError,
+)
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.flatten import flatten
+from gantrytau.language.declarations import (
     Array,
     Bounds,
     Fixed,
@@ -15,19 +28,8 @@ from gantrytau.declarations import (
     Start,
     StateSelect,
 )
-from gantrytau.diagnosis import Diagnosis, check
-from gantrytau.errors import (
-    GantryTauError,
-    InitializationError,
-    ModelError,
-    SolveError,
-    StructureError,
-)
-from gantrytau.events import sampled, stick_slip
-from gantrytau.extraction import Mechanism, extract_mechanism
-from gantrytau.flat_model import FlatModel
-from gantrytau.flattening import flatten
-from gantrytau.functions import (
+from gantrytau.language.events import sampled, stick_slip
+from gantrytau.language.functions import (
     acos,
     asin,
     atan,
@@ -46,13 +48,11 @@ from gantrytau.functions import (
     tan,
     tanh,
 )
-from gantrytau.linearization import Linearization, linearize
-from gantrytau.model import Connector, Model, outer
-from gantrytau.result import Result
-from gantrytau.simulation import simulate
-from gantrytau.statements import branch, connect, constraint, require, root
-from gantrytau.symbols import der, time
-from gantrytau.translation import translate
+from gantrytau.language.model import Connector, Model, outer
+from gantrytau.language.statements import branch, connect, constraint, require, root
+from gantrytau.language.symbols import der, time
+from gantrytau.results.result import Result
+from gantrytau.simulation.simulate import simulate
 
 __all__ = [
     "Array",

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import casadi as ca
 import numpy as np
 
-from gantrytau.aliases import Reduced, alias_expression
+from gantrytau.compiler.aliases import Reduced, alias_expression
+from gantrytau.compiler.blocks.solution import Block
+from gantrytau.compiler.index_reduction import Indexed, Key
+from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.compiler.states import StateChoice
+from gantrytau.compiler.system import System, assemble
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.events import event_names
-from gantrytau.flat_model import FlatModel, FlatVariable
-from gantrytau.index_reduction import Indexed, Key
-from gantrytau.parameters import ParameterTable
-from gantrytau.solution import Block
-from gantrytau.statements import Equation
-from gantrytau.states import StateChoice
-from gantrytau.symbols import derivative_name, split_derivative
-from gantrytau.system import System, assemble
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable
+from gantrytau.language.events import event_names
+from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import derivative_name, split_derivative
 
 if TYPE_CHECKING:
-    from gantrytau.diagnosis import Diagnosis
+    from gantrytau.answers.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class Dae:
     @cached_property
     def diagnosis(self) -> "Diagnosis":
         """Sizes, mobility, loops, states, blocks and the start; prints itself."""
-        from gantrytau.diagnosis import diagnose
+        from gantrytau.answers.diagnosis import diagnose
 
         return diagnose(self)
 
@@ -177,7 +177,7 @@ class Dae:
         Parameters that are not given have their values. Raises StructureError if `given` does not determine
         `find` or contradicts itself, ModelError for unknown names.
         """
-        from gantrytau.causality import function
+        from gantrytau.answers.causality import function
 
         return function(self, given, find)
 
@@ -187,7 +187,7 @@ class Dae:
         The rest is completed from the start values. Keys: scalars as float, vectors as arrays, derivatives
         as `der(x)`; parameters may be given too. Raises InitializationError if there is no such point.
         """
-        from gantrytau.initialization import evaluate
+        from gantrytau.compiler.start.consistent_start import evaluate
 
         return evaluate(self, dict(values or {}))
 

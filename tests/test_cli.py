@@ -7,8 +7,8 @@ import casadi
 import pytest
 from typer.testing import CliRunner
 
-from gantrytau import installation
-from gantrytau.cli import app
+from gantrytau.commands import installation
+from gantrytau.commands.app import app
 
 
 def run(*arguments):

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import gantrytau_optimica
-from gantrytau.cli import app
+from gantrytau.commands.app import app
 
 matplotlib.use("Agg")
 TIMES = [0.913510, 0.92103, 0.97598, 0.97406]  # s, independently computed on the same mesh

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gantrytau.errors import GantryTauError, ModelError
-from gantrytau.result import Result, split_element
+from gantrytau.results.result import Result, split_element
 
 matplotlib.use("Agg")
 

@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-import gantrytau.integration
+import gantrytau.simulation.integration
 from gantrytau import (
     Input,
     Model,
@@ -303,12 +303,12 @@ def test_a_tool_led_out_of_reach_stops_and_names_the_link():
 
 
 def test_ctrl_c_keeps_what_was_computed(monkeypatch):
-    class Interrupting(gantrytau.integration.Progress):
+    class Interrupting(gantrytau.simulation.integration.Progress):
         def at(self, t: float) -> None:
             if t > 5.0:
                 signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(gantrytau.integration, "Progress", Interrupting)
+    monkeypatch.setattr(gantrytau.simulation.integration, "Progress", Interrupting)
     with pytest.raises(SolveError, match="Pendulum: simulation interrupted at t = ") as caught:
         simulate(Pendulum(), stop=100.0)
     assert 5.0 < caught.value.time < 8.0

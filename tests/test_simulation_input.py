@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-import gantrytau.integration
+import gantrytau.simulation.integration
 from gantrytau import Input, Model, ModelError, Real, SolveError, der, simulate, sin
 from gantrytau_models import GantryTau, prototypes
 from tests.test_simulation import Circuit, Oscillator
@@ -83,12 +83,12 @@ def test_wrong_policy(keywords, words):
 
 
 def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed(monkeypatch):
-    class Begun(gantrytau.integration.Progress):
+    class Begun(gantrytau.simulation.integration.Progress):
         def __enter__(self):
             threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
             return super().__enter__()
 
-    monkeypatch.setattr(gantrytau.integration, "Progress", Begun)
+    monkeypatch.setattr(gantrytau.simulation.integration, "Progress", Begun)
     with pytest.raises(SolveError, match=r"simulation interrupted at t = ") as raised:
         simulate(
             GantryTau(prototypes.L1),

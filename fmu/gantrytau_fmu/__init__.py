@@ -1,10 +1,10 @@
 """FMUs of gantrytau models, written and read, and systems of FMUs simulated together."""
 
+from gantrytau_fmu.description import Experiment
 from gantrytau_fmu.export import export_fmu
-from gantrytau_fmu.interface import Experiment
-from gantrytau_fmu.reading.checking import check_fmu
-from gantrytau_fmu.reading.reading import read_fmu
-from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.reading.check_fmu import check_fmu
+from gantrytau_fmu.reading.read_fmu import read_fmu
+from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_fmu.systems.ssp_writing import write_ssp
 
 __all__ = ["Experiment", "check_fmu", "cosimulate", "export_fmu", "read_fmu", "write_ssp"]

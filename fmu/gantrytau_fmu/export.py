@@ -16,10 +16,10 @@ from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
 from gantrytau_fmu.code.model_code import ModelCode, model_code
-from gantrytau_fmu.describing.description import build_description, model_description
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.interface import Experiment, Interface, Interfaces
+from gantrytau_fmu.describing.xml_description import build_description, model_description
+from gantrytau_fmu.description import Experiment, Interface, Interfaces
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")

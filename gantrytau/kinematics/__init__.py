@@ -1,12 +1,12 @@
 """Kinematics of robots: poses from joints and joints from poses, one or many at a time."""
 
-from gantrytau.kinematics.accuracy import Accuracy, accuracy
-from gantrytau.kinematics.assembly_modes import AssemblyModes, assembly_modes
-from gantrytau.kinematics.configurations import Configuration
+from gantrytau.kinematics.accuracy.accuracy import Accuracy, accuracy
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.obstacles import Box, Capsule, Cylinder
-from gantrytau.kinematics.workspace import Workspace, workspace
-from gantrytau.kinematics.workspace_limits import Limits, examine
+from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
+from gantrytau.kinematics.rods.configurations import Configuration
+from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
+from gantrytau.kinematics.workspace.pose_limits import Limits, examine
+from gantrytau.kinematics.workspace.workspace import Workspace, workspace
 
 __all__ = [
     "Accuracy",

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.compiler.parameters import parameter_table, with_values
+from gantrytau.compiler.translation import translate
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.kinematics.configurations import Configuration, of_joints, of_pose
-from gantrytau.kinematics.geometry import geometry_of
-from gantrytau.kinematics.linked import Home, LinkedRobot, SixLinks, ThreeLinks, TurningLinks
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
+from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose
+from gantrytau.kinematics.rods.linked import Home, LinkedRobot, SixLinks, ThreeLinks, TurningLinks
+from gantrytau.kinematics.rods.rod_geometry import geometry_of
 from gantrytau.kinematics.rotations import angle_between
-from gantrytau.model import Model
-from gantrytau.parameters import parameter_table, with_values
-from gantrytau.translation import translate
+from gantrytau.language.model import Model
 
 FITS = 1e-6  # m by which links may miss their lengths at the start of a model
 

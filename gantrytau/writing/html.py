@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from gantrytau.flat_model import FlatParameter, FlatVariable
-from gantrytau.statements import Equation
-from gantrytau.symbols import split_derivative
+from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
+from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import split_derivative
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from gantrytau.declarations import StateSelect
 from gantrytau.errors import ModelError
-from gantrytau.flat_model import FlatParameter, FlatVariable
-from gantrytau.statements import Equation
-from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
+from gantrytau.language.declarations import StateSelect
+from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
 from gantrytau.writing.sharing import Text, located, written, written_at

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gantrytau.symbols import split_derivative
+from gantrytau.language.symbols import split_derivative
 
 # the written table of letters: phi angle, w angular velocity, tau torque; the rest are letters themselves
 GREEK = {

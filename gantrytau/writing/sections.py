@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from gantrytau.index_reduction import Key
+from gantrytau.compiler.index_reduction import Key
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae

@@ -1,21 +1,21 @@
 """Complete models: a pendulum, linkages, the Gantry-Tau robots with their parameters, and what drives them."""
 
 from gantrytau_models import prototypes
-from gantrytau_models.control import CascadedController, ComputedTorqueController, PidController
-from gantrytau_models.delta import DeltaRobot
-from gantrytau_models.f1 import F1GantryTau
-from gantrytau_models.feedforward import Feedforward
-from gantrytau_models.four_bar import FourBar
-from gantrytau_models.gantry_tau import GantryTau
-from gantrytau_models.inverse_dynamics import InverseDynamics
-from gantrytau_models.kinematics import ForwardKinematics, InverseKinematics
-from gantrytau_models.pendulum import Pendulum
-from gantrytau_models.plant import MeasuredGantryTau, MotorDrivenGantryTau
-from gantrytau_models.references import CircularReference
-from gantrytau_models.six_link import SixLinkGantryTau
-from gantrytau_models.stewart import StewartPlatform
-from gantrytau_models.tracking import ControlledRobot, TrackingController
-from gantrytau_models.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist
+from gantrytau_models.control.closed_form_kinematics import ForwardKinematics, InverseKinematics
+from gantrytau_models.control.controllers import CascadedController, ComputedTorqueController, PidController
+from gantrytau_models.control.feedforward import Feedforward
+from gantrytau_models.control.inverse_dynamics import InverseDynamics
+from gantrytau_models.control.plant import MeasuredGantryTau, MotorDrivenGantryTau
+from gantrytau_models.control.references import CircularReference
+from gantrytau_models.control.tracking import ControlledRobot, TrackingController
+from gantrytau_models.mechanisms.delta import DeltaRobot
+from gantrytau_models.mechanisms.f1 import F1GantryTau
+from gantrytau_models.mechanisms.four_bar import FourBar
+from gantrytau_models.mechanisms.gantry_tau import GantryTau
+from gantrytau_models.mechanisms.pendulum import Pendulum
+from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
+from gantrytau_models.mechanisms.stewart import StewartPlatform
+from gantrytau_models.mechanisms.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist
 
 __all__ = [
     "CascadedController",

@@ -1,29 +1,31 @@
 """Optimisation of models written with gantrytau, in the style of Optimica, and calibration of robots."""
 
-from gantrytau_optimica.archive.run_record import compare_records, run_record, write_record
-from gantrytau_optimica.archive.saved import MissingGuess, SavedOptimum
-from gantrytau_optimica.archive.saving import load_optimum, save_optimum
-from gantrytau_optimica.calibration.arm_fit import fit_arm
-from gantrytau_optimica.calibration.arms import read_arms
-from gantrytau_optimica.calibration.calibrating import calibrate
+from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_optimum
+from gantrytau_optimica.answers.archive.run_record import compare_records, run_record, write_record
+from gantrytau_optimica.answers.archive.saved import MissingGuess, SavedOptimum
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.cameras import Camera, Cameras, single_camera, stereo_cameras
-from gantrytau_optimica.calibration.devices import LaserTracker, TMac
-from gantrytau_optimica.calibration.error_maps import error_map
-from gantrytau_optimica.calibration.findings import CalibrationError
-from gantrytau_optimica.calibration.gauges import LengthGauge, Wires
-from gantrytau_optimica.calibration.guideways import linearity
-from gantrytau_optimica.calibration.identifiability import identifiability
-from gantrytau_optimica.calibration.measurements import Measurements
-from gantrytau_optimica.calibration.orientation_errors import orientation_causes, orientation_errors
-from gantrytau_optimica.calibration.pose_selection import enough_poses, predict, select_poses
-from gantrytau_optimica.calibration.sensitivity_table import SensitivityTable, sensitivity_table
-from gantrytau_optimica.calibration.sight import Bars
-from gantrytau_optimica.estimation.estimate import Estimate
-from gantrytau_optimica.estimation.estimating import estimate
+from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.design.identifiability import identifiability
+from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
+from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityTable, sensitivity_table
+from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
+from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
+from gantrytau_optimica.calibration.devices.sight import Bars
+from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
+from gantrytau_optimica.calibration.rods.arms import read_arms
+from gantrytau_optimica.calibration.surveys.error_maps import error_map
+from gantrytau_optimica.calibration.surveys.guideways import linearity
+from gantrytau_optimica.calibration.surveys.orientation_errors import orientation_causes, orientation_errors
+from gantrytau_optimica.estimation.estimate import estimate
+from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
-from gantrytau_optimica.measurements import Samples
-from gantrytau_optimica.optimization import (
+from gantrytau_optimica.optimize import Prepared, optimize, prepare
+from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.problem.optimization import (
     Free,
     Optimization,
     at,
@@ -33,12 +35,10 @@ from gantrytau_optimica.optimization import (
     link,
     sum_of_squares,
 )
-from gantrytau_optimica.optimize import Prepared, optimize, prepare
-from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
-from gantrytau_optimica.procedure.files import load_plan
-from gantrytau_optimica.procedure.plan import CalibrationPlan
-from gantrytau_optimica.procedure.planning import plan_calibration
+from gantrytau_optimica.problem.samples import Samples
+from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
+from gantrytau_optimica.procedure.documents.files import load_plan
+from gantrytau_optimica.procedure.plan_calibration import plan_calibration
 from gantrytau_optimica.studies.pareto import TradeOff, pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 

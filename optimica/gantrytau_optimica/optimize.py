@@ -9,18 +9,18 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError, SolveError
-from gantrytau.translation import names
-from gantrytau_optimica.archive.run_record import require_place, write_record
-from gantrytau_optimica.building import build
-from gantrytau_optimica.checking import one_point
-from gantrytau_optimica.controls import read_controls
-from gantrytau_optimica.ipopt import Policy, Progress, Solver
-from gantrytau_optimica.optimization import Optimization
-from gantrytau_optimica.optimum import Optimum
+from gantrytau.compiler.translation import names
+from gantrytau_optimica.answers.archive.run_record import require_place, write_record
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.build import build
+from gantrytau_optimica.control.control_problem import Phase
+from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses, solution_given
-from gantrytau_optimica.reading import ReadProblem, read_problem
-from gantrytau_optimica.records import Phase
-from gantrytau_optimica.refining.refinement import with_ramps
+from gantrytau_optimica.problem.checking import one_point
+from gantrytau_optimica.problem.optimization import Optimization
+from gantrytau_optimica.problem.reading import ReadProblem, read_problem
+from gantrytau_optimica.refinement.refinement import with_ramps
+from gantrytau_optimica.solving.ipopt import Policy, Progress, Solver
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.transcription.program import check_freedom, transcribe
 from gantrytau_optimica.transcription.scheme import collocation

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
-from gantrytau_optimica.archive.saved import SavedOptimum
-from gantrytau_optimica.building import Built, with_guesses
+from gantrytau_optimica.answers.archive.saved import SavedOptimum
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.build import Built, with_guesses
+from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit, Phase, Signal
+from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
-from gantrytau_optimica.guesses import guess_of, number_guess
-from gantrytau_optimica.ipopt import Solver
-from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.reading import ReadProblem
-from gantrytau_optimica.records import ControlProblem, FreeNumber, Limit, Phase, Signal
-from gantrytau_optimica.refining.carrying import carried
-from gantrytau_optimica.refining.refinement import refined, with_ramps, without_ramps
-from gantrytau_optimica.refining.starts import searched
-from gantrytau_optimica.transcription.blocks import places_of_points, share_of
+from gantrytau_optimica.problem.reading import ReadProblem
+from gantrytau_optimica.refinement.multistart import searched
+from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
+from gantrytau_optimica.solving.carried import carried
+from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.point_functions import places_of_points, share_of
 from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import Optimum, optimize
 from tests.benchmarks.table import Row, at_most, shown
 

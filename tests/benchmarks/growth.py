@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from gantrytau import SolveError
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import prepare
 from tests.benchmarks import opti_reference, reference_collocation
 from tests.benchmarks.gta import Task

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Array, GantryTauError, Model, Start, connect, simulate, translate
-from gantrytau.coordinates import Coordinates
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, World
-from gantrytau.motion import all_coordinates
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.motion import all_coordinates
 from gantrytau_models import F1GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
 from tests.benchmarks.engine import compiled
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown

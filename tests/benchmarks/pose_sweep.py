@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Parameter, SolveError
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_models import prototypes
 from gantrytau_optimica import final, initial, prepare
 

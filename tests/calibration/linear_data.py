@@ -3,9 +3,9 @@
 import numpy as np
 
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.arm_poses import poses_of
-from gantrytau_optimica.calibration.arms import Arm, read_arms
-from gantrytau_optimica.calibration.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.rods.arm_poses import poses_of
+from gantrytau_optimica.calibration.rods.arms import Arm, read_arms
 
 
 def carts(arms: tuple[Arm, ...], r: np.ndarray, R: np.ndarray) -> np.ndarray:

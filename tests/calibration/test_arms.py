@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import Array, Model, ModelError, Parameter, SolveError
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.arm_fit import TAPE, fit_arm, scales
-from gantrytau_optimica.calibration.arm_ipopt import fit_arm_with_ipopt
-from gantrytau_optimica.calibration.arm_poses import pose_rows, poses_of
-from gantrytau_optimica.calibration.arms import read_arms, rotation
-from gantrytau_optimica.calibration.rotations import rotation_vector, rotations
+from gantrytau_optimica.calibration.data.rotation_vectors import rotation_vector, rotations
+from gantrytau_optimica.calibration.fitting.arm_fit import TAPE, fit_arm, scales
+from gantrytau_optimica.calibration.fitting.arm_ipopt import fit_arm_with_ipopt
+from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, poses_of
+from gantrytau_optimica.calibration.rods.arms import read_arms, rotation
 from tests.calibration.f1_data import DEVICE, f1_arms, f1_poses, measured
 from tests.references import f1
 

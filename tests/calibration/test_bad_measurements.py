@@ -6,7 +6,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
-from gantrytau_optimica.calibration.data_checks import repeated_rows
+from gantrytau_optimica.calibration.data.data_checks import repeated_rows
 from tests.calibration.synthetic import NOISE, grid, inverse, nominal
 
 TRUTH = prototypes.L1

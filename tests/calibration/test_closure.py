@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from gantrytau_optimica.calibration.closure import Chain, condense
-from gantrytau_optimica.calibration.gauss_newton import gauss_newton
-from gantrytau_optimica.calibration.guideway_points import between, slope, straight
-from gantrytau_optimica.calibration.linear_start import linear_start
-from gantrytau_optimica.calibration.rotations import (
+from gantrytau_optimica.calibration.data.rotation_vectors import (
     rotation,
     rotation_vector,
     rotations,
     told_vector,
     turning,
 )
+from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
+from gantrytau_optimica.calibration.rods.closure import Chain, condense
+from gantrytau_optimica.calibration.rods.guideway_points import between, slope, straight
+from gantrytau_optimica.calibration.rods.linear_start import linear_start
 
 RNG = np.random.default_rng(0)
 N = 5000  # three blocks of rows

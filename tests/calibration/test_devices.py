@@ -8,12 +8,12 @@ import pytest
 from scipy.optimize import least_squares
 
 from gantrytau import ModelError
-from gantrytau.kinematics.obstacles import Capsule
 from gantrytau.kinematics.rotations import turned
-from gantrytau_optimica.calibration.cameras import Camera, Cameras, single_camera, stereo_cameras
-from gantrytau_optimica.calibration.devices import LaserTracker, TMac
-from gantrytau_optimica.calibration.gauges import LengthGauge, Wires
-from gantrytau_optimica.calibration.sight import Bars
+from gantrytau.kinematics.workspace.obstacles import Capsule
+from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
+from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
+from gantrytau_optimica.calibration.devices.sight import Bars
 
 MANY = 4000  # standard deviations from so many readings are right within 1.1 %
 UPRIGHT = np.eye(3)

@@ -6,8 +6,8 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import turned
-from gantrytau_optimica.calibration.error_maps import error_map
-from gantrytau_optimica.calibration.findings import CalibrationError
+from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.calibration.surveys.error_maps import error_map
 
 matplotlib.use("Agg")
 

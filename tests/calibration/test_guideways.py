@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.findings import CalibrationError
-from gantrytau_optimica.calibration.guideways import Cyclic, Linearity, linearity
+from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.calibration.surveys.guideways import Cyclic, Linearity, linearity
 
 matplotlib.use("Agg")
 

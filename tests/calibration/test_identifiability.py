@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, StructureError
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.arm_fit import fit_arm
-from gantrytau_optimica.calibration.arms import read_arms
-from gantrytau_optimica.calibration.identifiability import Poses, identifiability
+from gantrytau_optimica.calibration.design.identifiability import Poses, identifiability
+from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
+from gantrytau_optimica.calibration.rods.arms import read_arms
 from tests.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
 from tests.calibration.linear_data import carts
 

@@ -6,8 +6,8 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
-from gantrytau_optimica.calibration.covariance import as_told
-from gantrytau_optimica.calibration.rotations import rotation, told_vector
+from gantrytau_optimica.calibration.data.rotation_vectors import rotation, told_vector
+from gantrytau_optimica.calibration.fitting.covariance import as_told
 from tests.calibration import synthetic_d1
 
 MODELS = (1, 2, 3, 4, 5)

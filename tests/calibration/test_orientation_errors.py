@@ -10,8 +10,12 @@ from gantrytau import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.rotations import turned
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.findings import CalibrationError
-from gantrytau_optimica.calibration.orientation_errors import Causes, orientation_causes, orientation_errors
+from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.calibration.surveys.orientation_errors import (
+    Causes,
+    orientation_causes,
+    orientation_errors,
+)
 
 matplotlib.use("Agg")
 

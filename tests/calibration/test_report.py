@@ -8,7 +8,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
-from gantrytau_optimica.calibration import report
+from gantrytau_optimica.calibration.report import report
 from tests.calibration import f1_data, synthetic_d1
 from tests.calibration.synthetic import NOISE, grid, nominal
 

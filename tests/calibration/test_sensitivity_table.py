@@ -5,9 +5,9 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.arm_poses import poses_of, tool_gain
-from gantrytau_optimica.calibration.arms import read_arms
-from gantrytau_optimica.calibration.sensitivity_table import sensitivity_table
+from gantrytau_optimica.calibration.design.sensitivity_table import sensitivity_table
+from gantrytau_optimica.calibration.rods.arm_poses import poses_of, tool_gain
+from gantrytau_optimica.calibration.rods.arms import read_arms
 from tests.calibration.linear_data import carts, six_link_poses, three_link_poses
 
 LINKS = [

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
-from gantrytau_optimica.calibration.arm_fit import fit_arm
+from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
 from tests.calibration import f1_data
 
 TRUTH = prototypes.F1

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.commands.calibrate.example import EXAMPLE
+from gantrytau.commands.calibrate.cell_example import EXAMPLE
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import LaserTracker

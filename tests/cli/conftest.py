@@ -9,7 +9,7 @@ import matplotlib
 import pytest
 from typer.testing import CliRunner
 
-from gantrytau.cli import app
+from gantrytau.commands.app import app
 
 matplotlib.use("Agg")
 

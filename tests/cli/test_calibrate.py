@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gantrytau.commands.calibrate import policy
+from gantrytau.commands.calibrate import calibration_options as policy
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Measurements
 from gantrytau_optimica import calibrate as calibrate_in_python
@@ -330,7 +330,7 @@ def test_a_report_that_fails_leaves_earlier_results(run, answer, measured, poses
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("gantrytau_optimica.calibration.report.html_report", full)
+    monkeypatch.setattr("gantrytau_optimica.calibration.report.report.html_report", full)
     found = run("calibrate", file, *ROBOT, "--holdout", "none")
     assert found.exit_code == MISUSE
     assert "No space left on device; name another place" in found.stderr

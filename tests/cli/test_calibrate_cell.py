@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from gantrytau.cli import app
+from gantrytau.commands.app import app
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica.procedure import planning as procedure
+from gantrytau_optimica.procedure import plan_calibration as procedure
 from tests.cli.cells import measure, read_poses, true_robot, with_lines
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gantrytau.commands.calibrate.example import EXAMPLE
+from gantrytau.commands.calibrate.cell_example import EXAMPLE
 from tests.cli.cells import with_lines
 
 FAULT, MISUSE = 1, 2

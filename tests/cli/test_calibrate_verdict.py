@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from gantrytau.cli import app
-from gantrytau.commands.calibrate.verdict import with_what_moves_the_tool
+from gantrytau.commands.app import app
+from gantrytau.commands.calibrate.calibration_verdict import with_what_moves_the_tool
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
-from gantrytau_optimica.calibration.identifiability import Poses
-from gantrytau_optimica.calibration.tool_error import tool_error
+from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.judging.tool_error import tool_error
 from tests.cli import cells
 
 FAULT = 1

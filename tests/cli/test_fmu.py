@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gantrytau.commands.fmu.export import PLATFORMS
+from gantrytau.commands.fmu.fmu_export import PLATFORMS
 from gantrytau.errors import ModelError
 from gantrytau_fmu import Experiment
 from gantrytau_fmu.building.platforms import PLATFORMS as KNOWN

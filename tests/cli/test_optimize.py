@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import gantrytau_optimica
-from gantrytau.commands.answers import in_options
-from gantrytau.commands.optimize import optimize
+from gantrytau.commands.optimize_command import optimize
+from gantrytau.commands.printing.optimum_summary import in_options
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 
@@ -219,8 +219,8 @@ def test_a_full_disk_does_not_cost_the_answer(fails, run, move, tmp_path, monkey
     def full(result, path):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("gantrytau.commands.saving.rehearse", lambda file: None)
-    monkeypatch.setattr("gantrytau.result.Result.save", full)
+    monkeypatch.setattr("gantrytau.commands.printing.result_output.rehearse", lambda file: None)
+    monkeypatch.setattr("gantrytau.results.result.Result.save", full)
     arguments = ("optimize", move, "--save", tmp_path / "move.csv")
     assert "Cannot write" in fails(MISUSE, *arguments)
     assert json.loads(run(*arguments, "--json").stdout)["final_time"] == pytest.approx(fastest(), abs=1e-5)
@@ -329,7 +329,7 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_line_of_the_terminal_follows_the_solver(answer, move, monkeypatch, quiet):
-    from gantrytau.commands.optimize import _live
+    from gantrytau.commands.optimize_command import _live
 
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     monkeypatch.setenv("TERM", "xterm")

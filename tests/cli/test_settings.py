@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gantrytau import Array, Bounds, Model, Parameter, Real, Start, der, flatten
-from gantrytau.commands.reporting import CommandError
-from gantrytau.commands.settings import with_setting
-from gantrytau.commands.values import number, split
+from gantrytau.commands.arguments.settings import with_setting
+from gantrytau.commands.arguments.values import number, split
+from gantrytau.commands.printing.reporting import CommandError
 from gantrytau_models import GantryTau, Pendulum, prototypes
 
 

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from gantrytau.integration import Run
+from gantrytau.simulation.integration import Run
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 

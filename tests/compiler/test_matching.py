@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gantrytau.blocks import block_pattern
-from gantrytau.guide import Guide
-from gantrytau.matching import best_matching, largest_matching, strong_components
-from gantrytau.solution import solve_blocks
+from gantrytau.compiler.blocks.pattern import block_pattern
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import solve_blocks
+from gantrytau.compiler.matching import best_matching, largest_matching, strong_components
 
 FIXED = settings(derandomize=True, deadline=None, max_examples=60)
 

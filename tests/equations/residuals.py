@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, Model, translate
-from gantrytau.symbols import derivative_name, split_derivative
+from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau.writing.modelica import independent_equations
 from tests.equations.modelica_reader import Evaluator, ModelicaClass, plain, read_by_lines
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, der, if_else, time, translate
-from gantrytau.writing.collecting import collected, moving_part
+from gantrytau.writing.collect import collected, moving_part
 from gantrytau.writing.graph import Graph
 from gantrytau.writing.modelica_syntax import ModelicaSyntax
 from gantrytau.writing.sharing import written

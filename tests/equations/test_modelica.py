@@ -6,7 +6,7 @@ import casadi as ca
 import pytest
 
 from gantrytau import Input, Model, Output, Parameter, Real, connect, der, translate
-from gantrytau.declarations import Array, StateSelect
+from gantrytau.language.declarations import Array, StateSelect
 from gantrytau.mechanics import multibody, rotational, translational
 from gantrytau.mechanics.translational import LinearFriction
 from gantrytau_models import GantryTau, Pendulum, prototypes

@@ -9,7 +9,7 @@ import pytest
 from pymoca import ast
 
 from gantrytau import Model, Parameter, connect, translate
-from gantrytau.declarations import Array
+from gantrytau.language.declarations import Array
 from gantrytau.mechanics import multibody, rotational, translational
 from gantrytau.mechanics.filters import LowPass
 from gantrytau.mechanics.gears import BallScrew, ElasticGear, IdealGear, RackAndPinion

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Real, der, extract_mechanism, sin, translate
-from gantrytau.c_code import c_source
+from gantrytau.answers.c_code import c_source
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_models.six_link import SixLinkGantryTau
+from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
 
 FORCES = [f"carts[{i}].f" for i in range(3)]
 COMPILER = shutil.which("cc") or shutil.which("gcc")

@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 from gantrytau import translate
-from gantrytau.extraction import extract_mechanism
+from gantrytau.answers.extraction.extraction import extract_mechanism
+from gantrytau.language.symbols import derivative_name
 from gantrytau.mechanics.translational import TanhFriction
-from gantrytau.symbols import derivative_name
 from gantrytau_models import GantryTau, prototypes
 from tests.benchmarks import closed_form
 

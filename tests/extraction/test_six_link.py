@@ -7,7 +7,7 @@ import pytest
 
 from gantrytau import extract_mechanism, linearize, translate
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_models.six_link import SixLinkGantryTau
+from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
 
 CARTS = [f"carts[{i}].s" for i in range(3)]
 SPEEDS = [f"carts[{i}].v" for i in range(3)]

@@ -7,8 +7,8 @@ from typing import Any
 
 from fmpy.model_description import read_model_description
 
-from gantrytau_fmu.describing.description import build_description, model_description
-from gantrytau_fmu.interface import Experiment, Interface, Unknown, Variable
+from gantrytau_fmu.describing.xml_description import build_description, model_description
+from gantrytau_fmu.description import Experiment, Interface, Unknown, Variable
 
 VERSIONS = ("2.0", "3.0")
 TIME = Variable("time", 0, "independent", "continuous", unit="s", description="time")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gantrytau import GantryTauError, InitializationError, ModelError, SolveError
-from gantrytau_fmu.systems.cosimulation import _read, _structure, cosimulate
-from gantrytau_fmu.systems.ordering import sequence_of
-from gantrytau_fmu.systems.system import build_system
+from gantrytau_fmu.systems.connected_system import build_system
+from gantrytau_fmu.systems.cosimulate import _read, _structure, cosimulate
+from gantrytau_fmu.systems.step_order import sequence_of
 
 from .small_fmus import Builder, variable
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.describing.checks import initial_of
-from gantrytau_fmu.describing.description import LOG_CATEGORIES, build_description, model_description
+from gantrytau_fmu.describing.interface_checks import initial_of
+from gantrytau_fmu.describing.xml_description import LOG_CATEGORIES, build_description, model_description
 from gantrytau_fmu.describing.xml_text import plain
-from gantrytau_fmu.interface import Experiment, Interface, Unknown, Variable
+from gantrytau_fmu.description import Experiment, Interface, Unknown, Variable
 from tests.fmu.interfaces import INTERFACES, VERSIONS, fmu, gain, interface, oscillator, read, relay
 
 ROOT = Path(__file__).parents[2]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gantrytau_fmu.describing.units import DISPLAYS
-from gantrytau_fmu.interface import Variable
+from gantrytau_fmu.describing.unit_definitions import DISPLAYS
+from gantrytau_fmu.description import Variable
 from tests.fmu.interfaces import VERSIONS, interface, read
 
 # exponents of kg, m, s, rad, taken by hand from the definitions of the units

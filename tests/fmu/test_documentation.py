@@ -14,7 +14,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau_fmu.describing.documentation import MANY, documentation, licenses
 from gantrytau_fmu.describing.terminals import SIZE, STROKES, icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.interface import Variable
+from gantrytau_fmu.description import Variable
 from tests.fmu.interfaces import INTERFACES, VERSIONS, interface, oscillator
 
 ROOT = Path(__file__).parents[2]

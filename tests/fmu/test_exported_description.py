@@ -12,7 +12,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
 from gantrytau.errors import ModelError
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.interface import Experiment
+from gantrytau_fmu.description import Experiment
 from gantrytau_models import Pendulum
 from tests.fmu.exported import Exported, Numbers
 from tests.fmu.test_derivatives import at_random, columns, knowns_of, some_outputs, unknowns_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import InitializationError, SolveError
-from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.systems.cosimulate import cosimulate
 
 from .small_fmus import Builder, variable
 

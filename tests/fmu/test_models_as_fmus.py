@@ -15,7 +15,7 @@ from gantrytau_models import (
     TrackingController,
     prototypes,
 )
-from gantrytau_models.gantry_tau import tool_ahead_of_carts
+from gantrytau_models.mechanisms.gantry_tau import tool_ahead_of_carts
 
 START = tool_ahead_of_carts(prototypes.D1)
 AT_START = dict(r=dict(start=START))

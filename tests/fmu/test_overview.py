@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gantrytau import ModelError
-from gantrytau.cli import app
+from gantrytau.commands.app import app
 from gantrytau_fmu.systems.overview import check_system, read_system
 from gantrytau_fmu.systems.ssp import STRUCTURE
 from gantrytau_fmu.systems.ssp_writing import write_ssp

@@ -9,7 +9,7 @@ import pytest
 
 from gantrytau import GantryTauError, ModelError
 from gantrytau_fmu.building.archive import universal
-from gantrytau_fmu.reading.reading import read_fmu
+from gantrytau_fmu.reading.read_fmu import read_fmu
 from tests.fmu.tiny_fmus import BUILD, FMI2, FMI3, TERMINALS, lag2, lag3, pack
 
 

@@ -5,11 +5,11 @@ import pytest
 
 from gantrytau import simulate
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_models import prototypes
-from gantrytau_models.gantry_tau import tool_ahead_of_carts
-from gantrytau_models.plant import MeasuredGantryTau
-from gantrytau_models.tracking import ControlledRobot, TrackingController
+from gantrytau_models.control.plant import MeasuredGantryTau
+from gantrytau_models.control.tracking import ControlledRobot, TrackingController
+from gantrytau_models.mechanisms.gantry_tau import tool_ahead_of_carts
 
 WIRES = [
     *((f"controller.f[{k}]", f"robot.carts[{k}].f") for k in range(3)),

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gantrytau import Model, ModelError, Output, Parameter, Real, SolveError, der
-from gantrytau.cli import app
+from gantrytau.commands.app import app
 from gantrytau.progress import Progress
 from gantrytau_fmu import export_fmu
 from gantrytau_fmu.systems.single import run_fmu

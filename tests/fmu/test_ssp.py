@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu.systems.cosimulation import cosimulate
+from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_fmu.systems.ssp import STRUCTURE
 from gantrytau_fmu.systems.ssp_writing import write_ssp
 

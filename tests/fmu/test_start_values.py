@@ -7,8 +7,8 @@ import zipfile
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu.systems.cosimulation import cosimulate
-from gantrytau_fmu.systems.system import UnconnectedInputs
+from gantrytau_fmu.systems.connected_system import UnconnectedInputs
+from gantrytau_fmu.systems.cosimulate import cosimulate
 
 from .small_fmus import Builder, variable
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, Start, translate
-from gantrytau.kinematics.accuracy import SIGNS, accuracy
+from gantrytau.kinematics.accuracy.accuracy import SIGNS, accuracy
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
 

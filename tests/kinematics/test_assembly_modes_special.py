@@ -6,10 +6,11 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, StructureError
-from gantrytau.kinematics import assembly_modes, study_roots
-from gantrytau.kinematics.study_roots import all_roots, placed
-from gantrytau.kinematics.study_start import distinct
-from gantrytau.kinematics.study_tracking import Paths, track
+from gantrytau.kinematics import assembly_modes
+from gantrytau.kinematics.modes import study_roots
+from gantrytau.kinematics.modes.study_roots import all_roots, placed
+from gantrytau.kinematics.modes.study_start import distinct
+from gantrytau.kinematics.modes.study_tracking import Paths, track
 from tests.kinematics.test_assembly_modes import MET, SAME, assert_same_poses, flat, random_hexapod
 
 POSE = np.array([0.05, 0.03, 1.0]), Rotation.from_rotvec([0.1, 0.2, 0.15]).as_matrix()

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau.kinematics import Box, Kinematics, Limits
-from gantrytau.kinematics.workspace_limits import REASONS, Examiner
+from gantrytau.kinematics.workspace.pose_limits import REASONS, Examiner
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 
 OUT = REASONS.index("out of reach")

@@ -147,8 +147,8 @@ def test_what_only_links_answer_is_told(delta):
 
 def test_a_model_that_nothing_drives():
     from gantrytau import Real, connect
+    from gantrytau.language.model import Model
     from gantrytau.mechanics.multibody import PointMass, Prismatic, World
-    from gantrytau.model import Model
 
     class Thing(Model):
         r = Real(3, unit="m")

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau.kinematics import obstacles
-from gantrytau.kinematics.obstacles import Box, Capsule, Cylinder, between_segments, segment_distance
+from gantrytau.kinematics.workspace import obstacles
+from gantrytau.kinematics.workspace.obstacles import (
+    Box,
+    Capsule,
+    Cylinder,
+    between_segments,
+    segment_distance,
+)
 
 WORD: Any = "thick"  # where a number is asked for
 TURN = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]

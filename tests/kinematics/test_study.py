@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import SolveError
-from gantrytau.kinematics import study_start
-from gantrytau.kinematics.study import STUDY, orthonormal, pose, quadrics
-from gantrytau.kinematics.study_start import distinct, solve_by_monodromy, start_system
-from gantrytau.kinematics.study_tracking import Homotopy, inverted, regularity, solved, track
+from gantrytau.kinematics.modes import study_start
+from gantrytau.kinematics.modes.study_coordinates import STUDY, orthonormal, pose, quadrics
+from gantrytau.kinematics.modes.study_start import distinct, solve_by_monodromy, start_system
+from gantrytau.kinematics.modes.study_tracking import Homotopy, inverted, regularity, solved, track
 
 RNG = np.random.default_rng(0)
 ROUNDING = 1e-13  # of sums of some fifty products of size 1 to 10

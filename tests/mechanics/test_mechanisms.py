@@ -20,7 +20,7 @@ from gantrytau import (
 )
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody import PointMass, Prismatic, SphericalSpherical, World
-from gantrytau_models.pendulum import Pendulum
+from gantrytau_models.mechanisms.pendulum import Pendulum
 
 
 def test_pendulum_has_index_three_and_two_states():

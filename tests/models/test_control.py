@@ -13,7 +13,7 @@ from gantrytau_models import (
     TrackingController,
     prototypes,
 )
-from gantrytau_models.control import IntegralController
+from gantrytau_models.control.controllers import IntegralController
 from tests.models.test_gantry_tau import CARTS, FORCES, RATES, mapped, random_motions, relative
 
 PERIOD = 0.004  # s

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, InitializationError, Start, simulate, translate
-from gantrytau_models.delta import DeltaRobot
+from gantrytau_models.mechanisms.delta import DeltaRobot
 from tests.references import delta
 
 ANGLES = [f"arms[{i}].phi" for i in range(3)]

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gantrytau import InitializationError, ModelError, SolveError, Start, simulate, translate
-from gantrytau_models.four_bar import FourBar
+from gantrytau_models.mechanisms.four_bar import FourBar
 from tests.references import four_bar
 from tests.references.rotations import random_rotation
 

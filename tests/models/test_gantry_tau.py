@@ -12,7 +12,7 @@ from gantrytau import ModelError, translate
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.mechanics.translational import LinearFriction, TanhFriction
 from gantrytau_models import prototypes
-from gantrytau_models.gantry_tau import GantryTau
+from gantrytau_models.mechanisms.gantry_tau import GantryTau
 from tests.benchmarks import closed_form
 from tests.benchmarks.closed_form import ThreeLink
 

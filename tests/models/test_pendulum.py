@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import translate
 from gantrytau.errors import InitializationError
-from gantrytau_models.pendulum import Pendulum
+from gantrytau_models.mechanisms.pendulum import Pendulum
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import simulate, translate
 from gantrytau_models import GantryTau, MeasuredGantryTau, MotorDrivenGantryTau, SixLinkGantryTau, prototypes
-from gantrytau_models.plant import MotorDriven
+from gantrytau_models.control.plant import MotorDriven
 from tests.models.test_gantry_tau import FORCES, RATES, mapped, random_motions, relative
 
 TORQUES = [f"motors[{i}].tau" for i in range(3)]

@@ -8,7 +8,7 @@ import pytest
 
 from gantrytau import SolveError, Start, check, simulate, translate
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_models.six_link import quaternion
+from gantrytau_models.mechanisms.six_link import quaternion
 from tests.references import six_link as reference
 
 POSE = np.array([0.9, 2.75, -0.55])

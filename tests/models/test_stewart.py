@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Start, StructureError, simulate, translate
-from gantrytau_models.stewart import StewartPlatform, pairs_of_joints
+from gantrytau_models.mechanisms.stewart import StewartPlatform, pairs_of_joints
 from tests.references import stewart
 from tests.references.rotations import turn
 

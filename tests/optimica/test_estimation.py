@@ -9,7 +9,7 @@ from scipy import stats
 from gantrytau import Fixed, simulate, translate
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Samples
-from gantrytau_optimica.estimation.estimating import estimate
+from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
 from tests.optimica.estimation_data import (
     HOLES,

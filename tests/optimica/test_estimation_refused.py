@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Model, ModelError, Parameter, Real, SolveError, der, exp
 from gantrytau_optimica import Free, Samples
-from gantrytau_optimica.estimation.estimating import estimate
+from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
 from tests.optimica.estimation_data import Decay, Enzyme, QuadrupleTank, Trend, toggling
 

@@ -21,7 +21,7 @@ from gantrytau import (
     sqrt,
 )
 from gantrytau_optimica import Free, Optimization, at, final, initial, optimize
-from gantrytau_optimica.ipopt import WORDS
+from gantrytau_optimica.solving.ipopt import WORDS
 from tests.optimica.problems import FastestMass, Mass
 
 

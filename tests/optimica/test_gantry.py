@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, SolveError, simulate
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import final, initial, optimize
 from tests.benchmarks.pose_sweep import pairs, reach, sweep

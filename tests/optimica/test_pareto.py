@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, Real, SolveError
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import Free, Optimization, final, optimize
 from gantrytau_optimica.studies import continuation
 from gantrytau_optimica.studies.pareto import pareto

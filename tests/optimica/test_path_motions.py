@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Bounds, Real, StateSelect, between, der, translate
-from gantrytau.functions import dot
+from gantrytau.language.functions import dot
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
 from gantrytau_optimica.paths.path import Path, Way

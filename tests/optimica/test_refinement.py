@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import root
 
 from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, der, sin
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import Free, Optimization, final, optimize, prepare
 from tests.optimica.known_problems import motion
 from tests.optimica.problems import FastestMass, FastestOscillator, LinearQuadratic, Mass

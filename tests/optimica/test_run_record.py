@@ -11,7 +11,7 @@ import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, SolveError
 from gantrytau_optimica import optimize, prepare
-from gantrytau_optimica.archive.run_record import compare_records, hashes, run_record, write_record
+from gantrytau_optimica.answers.archive.run_record import compare_records, hashes, run_record, write_record
 from tests.optimica.problems import FastestMass, LaunchedMass, LinearQuadratic, Mass
 
 NOON = datetime(2012, 5, 4, 14, 30, tzinfo=timezone(timedelta(hours=2)))

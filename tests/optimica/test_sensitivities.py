@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, SolveError
-from gantrytau.cli import motion_problems
+from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize, prepare
 from gantrytau_optimica.studies.sensitivities import sensitivities
 from tests.optimica.problems import LinearQuadratic, Mass

@@ -7,7 +7,7 @@ import pytest
 
 from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, SolveError, der, exp, sqrt, time
 from gantrytau_optimica import Optimization, at, optimize, prepare
-from gantrytau_optimica.archive.saving import load_optimum, save_optimum
+from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_optimum
 from tests.optimica.problems import BoundedOscillator, FastestMass, LinearQuadratic, Mass
 from tests.optimica.test_saving import ThereAndOn
 

@@ -7,8 +7,8 @@ from gantrytau import ModelError
 from gantrytau.kinematics import Box, Limits
 from gantrytau_models import F1GantryTau, GantryTau, prototypes
 from gantrytau_optimica import LaserTracker, plan_calibration
-from gantrytau_optimica.procedure import clear_ways
 from gantrytau_optimica.procedure.fleet import WIDER, build_fleet, check_home
+from gantrytau_optimica.procedure.ways import clear_ways
 from tests.procedure import cells
 
 TAPE, RADIUS, FRESH = 0.005, 0.03, 40

@@ -18,7 +18,7 @@ from gantrytau_optimica import (
     plan_calibration,
     stereo_cameras,
 )
-from gantrytau_optimica.procedure.clear_ways import clear_ways
+from gantrytau_optimica.procedure.ways.clear_ways import clear_ways
 from tests.procedure import cells
 from tests.procedure.cells import varied
 

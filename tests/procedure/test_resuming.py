@@ -7,7 +7,8 @@ import pytest
 
 from gantrytau.kinematics import Capsule
 from gantrytau_optimica import plan_calibration
-from gantrytau_optimica.procedure import known_ways, planning
+from gantrytau_optimica.procedure import plan_calibration as planning
+from gantrytau_optimica.procedure.ways import known_ways
 from tests.procedure import cells
 from tests.procedure.cells import varied
 

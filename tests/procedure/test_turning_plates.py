@@ -7,7 +7,7 @@ from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau_models import F1GantryTau, prototypes
 from gantrytau_optimica import TMac, plan_calibration
-from gantrytau_optimica.procedure.page import html_page
+from gantrytau_optimica.procedure.documents.plan_page import html_page
 from tests.procedure import cells
 
 SAMPLES = 150

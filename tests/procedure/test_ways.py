@@ -8,9 +8,9 @@ import pytest
 from gantrytau.kinematics import Limits
 from gantrytau_models import F1GantryTau, GantryTau, prototypes
 from gantrytau_optimica import plan_calibration
-from gantrytau_optimica.procedure import clear_ways as ways
 from gantrytau_optimica.procedure.fleet import build_fleet
-from gantrytau_optimica.procedure.tours import Roadmap, find_tour
+from gantrytau_optimica.procedure.ways import clear_ways as ways
+from gantrytau_optimica.procedure.ways.tours import Roadmap, find_tour
 from tests.procedure import cells
 
 SAMPLES = 400  # of a way of up to 3 m: 8 mm apart, of which a link with 20 mm radius and clearance misses nothing much

@@ -8,13 +8,13 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae
-from gantrytau.flat_model import FlatVariable
-from gantrytau.symbols import split_derivative
+from gantrytau.flattening.flat_model import FlatVariable
+from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column, numbers_of
 from gantrytau_fmu.code.expressions import Graph
 from gantrytau_fmu.code.formulas import Formulas, formulas_of
 from gantrytau_fmu.code.model_code import Entry, output_places
-from gantrytau_fmu.interface import Unknown, Variable
+from gantrytau_fmu.description import Unknown, Variable
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau import Dae
-from gantrytau.symbols import split_derivative
-from gantrytau.system import System
+from gantrytau.compiler.system import System
+from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
-from gantrytau_fmu.code.starts import Starts, starts_of
+from gantrytau_fmu.code.fmu_starts import Starts, starts_of
 
 HOLD = 0.01  # s, time in which the speed left at the instant of locking dies away
 

@@ -9,10 +9,10 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from itertools import groupby
 
-from gantrytau_fmu.describing.checks import initial_of, limit
+from gantrytau_fmu.describing.interface_checks import initial_of, limit
 from gantrytau_fmu.describing.license import BSD_3_CLAUSE
 from gantrytau_fmu.describing.xml_text import plain
-from gantrytau_fmu.interface import Interface, Variable
+from gantrytau_fmu.description import Interface, Variable
 
 MANY = 300  # outputs; more of them are grouped by component and folded
 STYLE = """:root{color-scheme:light dark}

@@ -8,8 +8,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.describing.checks import initial_of
-from gantrytau_fmu.interface import Interface, Unknown
+from gantrytau_fmu.describing.interface_checks import initial_of
+from gantrytau_fmu.description import Interface, Unknown
 
 
 @dataclass(frozen=True)

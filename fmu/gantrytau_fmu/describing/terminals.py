@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from gantrytau_fmu.describing.xml_text import HEAD, element, parent
-from gantrytau_fmu.interface import Interface
+from gantrytau_fmu.description import Interface
 
 SIZE = 64  # pixels of the icon, each way
 RAIL, LINK, CART, PLATE = (110, 118, 129), (31, 78, 121), (60, 60, 60), (217, 119, 6)

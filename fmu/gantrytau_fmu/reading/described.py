@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau_fmu.interface import Causality, Initial, Variability
+from gantrytau_fmu.description import Causality, Initial, Variability
 
 Value = float | int | bool | str | tuple[float | int | bool | str, ...]
 SHOWN = 12  # variables of a kind that the printed table lists

@@ -16,8 +16,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError
-from gantrytau_fmu.systems.ordering import is_sampled, takes_samples
-from gantrytau_fmu.systems.system import Drive, System
+from gantrytau_fmu.systems.connected_system import Drive, System
+from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
 SMALL = 1e-6  # magnitude below which agreement is absolute: noise around zero never agrees relatively

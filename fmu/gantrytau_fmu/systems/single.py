@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import GantryTauError, ModelError, SolveError
-from gantrytau.result import Result
+from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.components import read_component
-from gantrytau_fmu.systems.cosimulation import check_times, cosimulate
+from gantrytau_fmu.systems.connected_system import build_system, unconnected, warn_of
+from gantrytau_fmu.systems.cosimulate import check_times, cosimulate
 from gantrytau_fmu.systems.exchange import integrate
 from gantrytau_fmu.systems.masters import make_grid
-from gantrytau_fmu.systems.system import build_system, unconnected, warn_of
 
 STEPS = 500  # where neither the caller nor the file says a step
 

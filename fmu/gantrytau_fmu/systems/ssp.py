@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.systems.components import Component
-from gantrytau_fmu.systems.system import Connection, locate
+from gantrytau_fmu.systems.connected_system import Connection, locate
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"

@@ -2,10 +2,10 @@
 
 import typer
 
-from gantrytau.commands.fmu.check import check
-from gantrytau.commands.fmu.export import export
-from gantrytau.commands.fmu.info import info
-from gantrytau.commands.fmu.run import run
+from gantrytau.commands.fmu.fmu_check import check
+from gantrytau.commands.fmu.fmu_export import export
+from gantrytau.commands.fmu.fmu_info import info
+from gantrytau.commands.fmu.fmu_run import run
 
 app = typer.Typer(
     help="FMUs (FMI 2.0 and 3.0): write models as FMUs, check, describe and run those of any tool.",

@@ -5,7 +5,7 @@ import numpy as np
 
 from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
 from gantrytau.mechanics.multibody.frames import Frame, World
-from gantrytau.mechanics.multibody.rotations import of_quaternion, spin_of_quaternion
+from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
 
 
 class PointMass(Model):

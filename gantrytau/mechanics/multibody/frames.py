@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, der, root
-from gantrytau.mechanics.multibody.rotations import about, turning, unit
+from gantrytau.mechanics.multibody.orientation import about, turning, unit
 
 
 class Frame(Connector):

@@ -1,10 +1,10 @@
 """Joints: one, two or three coordinates between frame_a and frame_b, and the rod with two ball joints."""
 
 from gantrytau import Parameter, Real, branch, connect, constraint, cross, der, dot, norm_2, outer, require
-from gantrytau.declarations import StateSelect
+from gantrytau.language.declarations import StateSelect
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody.frames import TwoFrames, World
-from gantrytau.mechanics.multibody.rotations import about, of_quaternion, spin_of_quaternion, unit
+from gantrytau.mechanics.multibody.orientation import about, of_quaternion, spin_of_quaternion, unit
 
 
 class Prismatic(TwoFrames):

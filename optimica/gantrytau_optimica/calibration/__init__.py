@@ -1,8 +1,8 @@
 """Calibration of robots from measured poses."""
 
-from gantrytau_optimica.calibration.calibrating import calibrate
+from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.findings import CalibrationError, Finding
-from gantrytau_optimica.calibration.measurements import Measurements
+from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding
+from gantrytau_optimica.calibration.data.measurements import Measurements
 
 __all__ = ["Calibration", "CalibrationError", "Finding", "Measurements", "calibrate"]

@@ -10,16 +10,16 @@ import numpy as np
 
 from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.covariance import joint_covariance, link_noise, undetermined
-from gantrytau_optimica.calibration.findings import Finding
-from gantrytau_optimica.calibration.fitting import Fit
-from gantrytau_optimica.calibration.forward import CalibratedKinematics
-from gantrytau_optimica.calibration.geometry import Geometry
-from gantrytau_optimica.calibration.measurements import Measurements
-from gantrytau_optimica.calibration.parameters import Named, arm_of, named_parameters, rod_links
-from gantrytau_optimica.calibration.plausibility import Misses
-from gantrytau_optimica.calibration.rotations import mean_rotation, rotation_vector
-from gantrytau_optimica.calibration.suspicion import Suspicion, suspicion
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, rotation_vector
+from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
+from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
+from gantrytau_optimica.calibration.judging.plausibility import Misses
+from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
+from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
+from gantrytau_optimica.calibration.rods.named_parameters import Named, arm_of, named_parameters, rod_links
+from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +254,7 @@ class Calibration:
         A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
         Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
         """
-        from gantrytau_optimica.calibration.report import write_report
+        from gantrytau_optimica.calibration.report.report import write_report
 
         return write_report(self, Path(path))
 

@@ -1,195 +1,270 @@
-"""The answer of an estimation: parameters, how sure they are, and what is left of the data."""
+"""`estimate`: parameters of models from measured data of one or several experiments.
 
+    minimise   sum over all samples of ((model(t_k, p) - value_k) / deviation_k)^2
+    over       parameters and initial values p, within their limits, and the motion of every experiment
+
+All experiments form one nonlinear program, so that the motion is found together with the parameters: it need not be
+computed for bad guesses of them (Bock, 1983, Recent advances in parameter identification techniques for ODE).
+"""
+
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
-from gantrytau.errors import did_you_mean
-from gantrytau_optimica.estimation.experiments import Experiment
-from gantrytau_optimica.estimation.report import draw_fit, report_fit
-from gantrytau_optimica.optimum import Optimum
+from gantrytau import Model, ModelError, SolveError
+from gantrytau.language.symbols import split_derivative
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.build import Built, build
+from gantrytau_optimica.control.control_problem import ControlProblem, Phase
+from gantrytau_optimica.estimation.estimation import Estimate
+from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_times
+from gantrytau_optimica.estimation.experiments import Experiment, named
+from gantrytau_optimica.estimation.mesh_shift import mesh_shift
+from gantrytau_optimica.estimation.sensitivity import Residuals, check_determined, residuals
+from gantrytau_optimica.estimation.told_apart import Point, told_apart, without_influence
+from gantrytau_optimica.optimize import Prepared
+from gantrytau_optimica.solving.ipopt import Policy, Progress, Solver
+from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
+from gantrytau_optimica.transcription.program import transcribe
+from gantrytau_optimica.transcription.scheme import Collocation, collocation
 
-STRONG = 0.99  # correlation from which on two parameters are hardly told apart
-COARSE = 0.2  # deviations by which a halved mesh may move a parameter
+EXPECTED_NOISE = (
+    0.01  # of the spread of the data, where no deviations were given: for the solver's scaling only
+)
+AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
+TUNING = 1.345  # deviations beyond which a robust fit counts linearly: 95 % efficient for normal noise (Huber, 1981)
+ROUNDS, SETTLED = 30, 1e-6  # of reweighing, and the relative change of the weights at which it ends
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """What `estimate` found. `fit.parameters["k"]` is a float in the model's unit.
+def estimate(
+    model: Model | type[Model],
+    parameters: Mapping[str, Any],
+    experiments: Experiment | Sequence[Experiment],
+    *,
+    elements: int | Sequence[float] = 50,
+    points: int = 3,
+    scheme: str = "radau",
+    loss: Literal["squares", "robust"] = "squares",
+    tolerance: float = 1e-8,
+    max_iterations: int = 1000,
+    max_time: float = 300.0,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Estimate parameters of a model, and initial values, from experiments.
 
-    parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;
-    jacobian: slopes of the residuals in deviations, (N, k), for the parameters `names` that are at no limit; errors:
-    these residuals, model less measured, (N,); scales: the deviations, (N,), 1 where none was given; known: whether
-    the deviations were given; weights: (N,) of a robust fit, else ones; mesh_shift: by how much the parameters
-    would move on half as long elements, about, by name (NaN: not found); optimum: the solved problem, whose objective
-    is a multiple of the sum of squares.
+    parameters: name in the model -> Free(guess, min=..., max=...) or a guess, the same in all experiments; limits
+    default to those that the model declares. elements, points, scheme: of the mesh of every experiment; loss: "robust"
+    bounds the influence of stray values (Huber's). tolerance, max_iterations, max_time (s), progress: as for `optimize`.
+    Raises ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError with
+    `.optimum` where no solution is found, or where the data cannot tell parameters apart; its message names them.
     """
+    begin = time.perf_counter()
+    _check(parameters, loss)
+    trials = named(experiments)
+    known = next(iter(trials[0].measured.values())).weighted
+    read = plan(model, parameters, trials, 1.0 if known else _factor(trials))
+    _check_amount(read, known)
+    built = _built(read)
+    grid = collocation("radau", 1) if read.static else collocation(scheme, points)
+    meshes = [_mesh(read, k, phase, elements) for k, phase in enumerate(built.problem.phases)]
+    program = transcribe(built.problem, meshes, grid)
+    found = residuals(program)
+    check_determined(found, _without_start(read))
+    policy = Policy(tolerance, max_iterations, max_time, progress)
+    optimum = Prepared(built, program, Solver(program, policy), {}, time.perf_counter() - begin).solve()
+    weights = np.ones(sum(found.sizes))
+    if loss == "robust":
+        optimum, weights = _robust(optimum, found, policy, grid, meshes, known)
+    return _answer(read, found, optimum, weights, known, loss)
 
-    name: str
-    experiments: tuple[Experiment, ...]
-    parameters: dict[str, float]
-    at_bounds: dict[str, float]
-    names: tuple[str, ...]
-    jacobian: np.ndarray
-    errors: np.ndarray
-    scales: np.ndarray
-    weights: np.ndarray
-    mesh_shift: dict[str, float]
-    known: bool
-    loss: str
-    optimum: Optimum
 
-    @property
-    def freedom(self) -> int:
-        """Measured values less determined parameters."""
-        return self.errors.size - len(self.names)
+def _check(parameters: Any, loss: Any) -> None:
+    if not isinstance(parameters, Mapping):
+        raise ModelError(f"estimate: found parameters={parameters!r}, expected {{name: Free(guess)}}")
+    if loss not in ("squares", "robust"):
+        raise ModelError(f"estimate: found loss={loss!r}, expected 'squares' or 'robust'")
 
-    @property
-    def chi_square(self) -> float:
-        """Sum of the squares of all residuals, divided by their deviations where these were given."""
-        return float(self.errors @ self.errors)
 
-    @property
-    def variance(self) -> float:
-        """chi_square by degrees of freedom: that of the noise, or about 1 where true deviations were given; else NaN."""
-        return self.chi_square / self.freedom if self.freedom > 0 else np.nan
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the residuals, of a robust fit 1.4826 times the median of their amounts."""
-        if self.loss == "robust":
-            return 1.4826 * float(np.median(np.abs(self.errors)))
-        return float(np.sqrt(self.variance))
-
-    @property
-    def probability(self) -> float:
-        """That noise of the given deviations leaves as large a chi_square; NaN where none were given."""
-        from scipy import stats
-
-        return (
-            float(stats.chi2.sf(self.chi_square, self.freedom)) if self.known and self.freedom > 0 else np.nan
+def _check_amount(read: Plan, known: bool) -> None:
+    """ModelError for nothing to estimate, or for less data than it takes."""
+    count, size = len(read.numbers), sum(e.size for e in read.experiments)
+    if not count:
+        raise ModelError(
+            f"{read.read.name}: nothing to estimate, expected {{name: Free(guess)}} in parameters or in start"
+        )
+    if size < count or (size == count and not known):
+        names = ", ".join(n.name for n in read.numbers)
+        remedy = "measure more" if size < count else "measure more, or give Samples(..., deviation=...)"
+        raise ModelError(
+            f"{read.read.name}: {size} measured values for {count} numbers ({names}), expected "
+            f"{'at least as many' if size < count else 'more, to tell the noise'}; {remedy}, or estimate less"
         )
 
-    @cached_property
-    def _covariance(self) -> np.ndarray:
-        """(k, k) of `names`, by the singular values of the normed slopes."""
-        norms = np.linalg.norm(self.jacobian, axis=0)
-        _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
-        root = right.T / singular / norms[:, None]
-        return root @ root.T * self._factor
 
-    @property
-    def _factor(self) -> float:
-        """Of the inverse of J'J: variance of the noise, for a robust fit that of Huber (1981), section 7.6."""
-        if self.loss == "squares":
-            return 1.0 if self.known else self.variance
-        inside = self.weights == 1.0
-        share = float(np.mean(inside))
-        correction = 1 + len(self.names) / self.errors.size * (1 - share) / share
-        clipped = float(np.sum((self.weights * self.errors) ** 2)) / self.freedom
-        return correction**2 * clipped / share**2
+def _factor(experiments: Sequence[Experiment]) -> float:
+    """Of the sum of squares, so that it is of the order of the number of samples at the answer."""
+    values = [s.values - s.values.mean(axis=0) for e in experiments for s in e.measured.values()]
+    spread = np.sqrt(np.mean(np.concatenate([v.ravel() for v in values]) ** 2))
+    return float((EXPECTED_NOISE * (spread or 1.0)) ** -2)
 
-    def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
-        """Covariance of parameters (k, k) in their order, default that of `names`. Raises ModelError."""
-        if isinstance(names, str):
-            raise ModelError(f"covariance: found '{names}', expected a list of names; write ['{names}']")
-        rows = [self._place(n) for n in (self.names if names is None else names)]
-        return self._covariance[np.ix_(rows, rows)]
 
-    def _place(self, name: str) -> int:
-        if name in self.names:
-            return self.names.index(name)
-        if name in self.at_bounds:
-            raise ModelError(
-                f"{self.name}: {name} stands at its limit {self.at_bounds[name]:g} and has no deviation; widen the "
-                "limit or leave the parameter out"
-            )
-        raise ModelError(f"{self.name}: {name} was not estimated{did_you_mean(name, self.names)}")
+def _built(read: Plan) -> Built:
+    """The control problem, with sizes of the numbers and the measured courses as first guesses."""
+    built = build(read.read, _guesses(read))
+    sizes = {n.name: n.size for n in read.numbers}
+    free = tuple(replace(n, nominal=sizes.get(n.name)) for n in built.problem.free)
+    return replace(built, problem=replace(built.problem, free=free))
 
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations by name."""
-        return dict(zip(self.names, np.sqrt(np.diag(self._covariance)).tolist(), strict=True))
 
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlations of `names`, (k, k)."""
-        size = np.sqrt(np.diag(self._covariance))
-        return self._covariance / np.outer(size, size)
+def _guesses(read: Plan) -> dict[str, Any]:
+    """Measured variables along their samples, and their derivatives; what the caller says goes first."""
+    found: dict[str, Any] = {}
+    for experiment in read.experiments:
+        path = f"{experiment.name}.model."
+        for name, samples in experiment.measured.items():
+            base, order = split_derivative(name)
+            whole = f"{'der(' * order}{path}{base}{')' * order}"
+            found[whole] = _course(samples.times, samples.values)
+            if not read.static and samples.times.size > 2:
+                found[f"der({whole})"] = _course(
+                    samples.times, np.gradient(samples.values, samples.times, axis=0)
+                )
+        found |= {f"{path}{n}": value for n, value in experiment.guess.items()}
+    return found
 
-    def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Confidence intervals by name, of Student's t, or the normal distribution where deviations were given.
 
-        They are those of the model linearised at the answer. Raises ModelError.
-        """
-        from scipy import stats
+def _course(times: np.ndarray, values: np.ndarray):
+    """Straight lines between samples, as a function of one time."""
+    return lambda t: np.array([np.interp(t, times, column) for column in values.T])
 
-        if not isinstance(confidence, float) or not 0 < confidence < 1:
-            raise ModelError(f"intervals: found confidence={confidence!r}, expected a number between 0 and 1")
-        wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)
-        half = float(wide.ppf((1 + confidence) / 2))
-        return {
-            n: (self.parameters[n] - half * d, self.parameters[n] + half * d)
-            for n, d in self.deviations.items()
-        }
 
-    @cached_property
-    def residuals(self) -> dict[tuple[str, str], np.ndarray]:
-        """Measured less model by experiment and name, (n,) or (n, k), in the unit of the measured."""
-        found, begin = {}, 0
-        for experiment in self.experiments:
-            for name, samples in experiment.measured.items():
-                n, k = samples.values.shape
-                mine = -(self.errors * self.scales)[begin : begin + n * k].reshape(k, n).T
-                found[experiment.name, name] = mine[:, 0] if k == 1 else mine
-                begin += n * k
-        return found
+def _mesh(read: Plan, number: int, phase: Phase, elements: Any) -> Mesh:
+    """Elements of one experiment: borders where inputs jump, and for static models one at every sample."""
+    if read.static:
+        steps = np.diff(sample_times(read.experiments[number]))
+        return mesh_of([steps[0] if steps.size else 1.0, *steps])
+    mesh = mesh_of(elements)
+    jumps = [course.jumps for course in phase.courses if course.jumps.size]
+    start, final = read.experiments[number].horizon
+    return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start)) if jumps else mesh
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to hold in mind before the numbers are used."""
-        found = [
-            f"{name} stands at its limit {bound:.6g}: it has no deviation, and those of the others hold it there"
-            for name, bound in self.at_bounds.items()
-        ]
-        correlation = self.correlation
-        found += [
-            f"{a} and {b} are strongly correlated ({correlation[i, j]:+.4f}): their deviations are large, although a "
-            "combination of them is well determined"
-            for i, a in enumerate(self.names)
-            for j, b in enumerate(self.names[:i])
-            if abs(correlation[i, j]) > STRONG
-        ]
-        deviations = self.deviations
-        worst = max(self.names, key=lambda n: abs(self.mesh_shift[n]) / deviations[n], default="")
-        if worst and not abs(self.mesh_shift[worst]) <= COARSE * deviations[worst]:
-            found.append(
-                f"the mesh is coarse: on twice the elements {worst} moves by "
-                f"{self.mesh_shift[worst] / deviations[worst]:.2g} of its deviations; raise elements="
-            )
-        if self.known and self.loss == "squares" and self.probability < 1e-3:
-            found.append(
-                f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
-                "small, or the model is wrong"
-            )
-        return tuple(found)
 
-    def report(self) -> str:
-        """Parameters with deviations and intervals, correlations, fit and warnings."""
-        return report_fit(self)
+def _without_start(read: Plan) -> dict[str, list[str]]:
+    """States whose initial value the model does not fix, by experiment."""
+    dae = read.read.dae
+    fixed = {e for v in dae.flat.variables if v.fixed for e in v.elements}
+    found: dict[str, list[str]] = {e.name: [] for e in read.experiments}
+    for state in dae.states:
+        experiment, name = split_derivative(state)[0].split(".model.", 1)
+        if split_derivative(state)[0] not in fixed:
+            found[experiment].append(name)
+    return found
 
-    def plot(self, file: Any = None):
-        """Measured values and the model over time; returns the figure, and saves it to `file`."""
-        return draw_fit(self, file)
 
-    def __repr__(self) -> str:
-        deviations: Mapping[str, float] = self.deviations
-        words = ", ".join(
-            f"{n} = {v:.5g}" + (f" ± {deviations[n]:.2g}" if n in deviations else " (limit)")
-            for n, v in self.parameters.items()
+def _robust(
+    optimum: Optimum,
+    found: Residuals,
+    policy: Policy,
+    grid: Collocation,
+    meshes: Sequence[Mesh],
+    known: bool,
+) -> tuple[Optimum, np.ndarray]:
+    """Least squares again with stray values weighted down, until the weights settle."""
+    weights = np.ones(sum(found.sizes))
+    for _ in range(ROUNDS):
+        errors = np.abs(found.values(optimum.solution.w))
+        size = 1.0 if known else float(np.median(errors)) * 1.4826 or 1.0  # 1.4826: of normal noise
+        before, weights = weights, np.minimum(1.0, TUNING * size / np.maximum(errors, 1e-300))
+        if np.max(np.abs(weights - before)) < SETTLED:
+            break
+        problem = _weighted(found.program.problem, weights)
+        program = transcribe(problem, meshes, grid)
+        solution = Solver(program, policy).solve(program, optimum.solution.w)
+        optimum = replace(optimum, program=program, solution=solution)
+        if not solution.success:
+            raise SolveError(f"{optimum.report()}\nThe robust fit did not settle.", optimum=optimum)
+    return optimum, weights
+
+
+def _weighted(problem: ControlProblem, weights: np.ndarray) -> ControlProblem:
+    """The problem with the deviations of its samples widened by 1 / sqrt(weight)."""
+    phases, begin = [], 0
+    for phase in problem.phases:
+        sums = []
+        for one in phase.sums:
+            mine = weights[begin : begin + one.times.size]
+            sums.append(replace(one, deviations=one.deviations / np.sqrt(mine)))
+            begin += one.times.size
+        phases.append(replace(phase, sums=tuple(sums)))
+    return replace(problem, phases=tuple(phases))
+
+
+def _answer(
+    read: Plan, found: Residuals, optimum: Optimum, weights: np.ndarray, known: bool, loss: str
+) -> Estimate:
+    """The record, once it is clear that the data determine the parameters."""
+    w = optimum.solution.w
+    order = [n.name for n in found.program.problem.free]
+    values = w[found.program.places.free]
+    parameters = dict(zip(order, values.tolist(), strict=True))
+    at_bounds = {}
+    for number in read.numbers:
+        for bound in (number.min, number.max):
+            if abs(parameters[number.name] - bound) <= AT_BOUND * number.size:
+                at_bounds[number.name] = bound
+    inner = [k for k, name in enumerate(order) if name not in at_bounds]
+    slopes = found.jacobian(w)[:, inner]
+    scales = np.concatenate([s.deviations for s in found.program.problem.sums])
+    measured = np.concatenate([s.values for s in found.program.problem.sums])
+    _refuse_lost(read, found, optimum, inner, slopes, float(np.linalg.norm(measured / scales)))
+    shown = {n.name: parameters[n.name] for n in read.numbers}
+    chosen = [k for n in read.numbers for k in inner if order[k] == n.name]
+    names, slopes = tuple(order[k] for k in chosen), slopes[:, [inner.index(k) for k in chosen]]
+    errors = found.values(w)
+    shift = np.zeros(len(names))
+    if inner and not read.static:
+        shift = mesh_shift(optimum, found.program.problem, slopes, errors)
+    return Estimate(
+        read.read.name, read.experiments, shown, at_bounds, names, slopes, errors, scales, weights,
+        dict(zip(names, shift.tolist(), strict=True)), known, loss, optimum,
+    )  # fmt: skip
+
+
+def _refuse_lost(
+    read: Plan, found: Residuals, optimum: Optimum, inner: list[int], slopes: np.ndarray, measured: float
+) -> None:
+    """SolveError that names the parameters which the data cannot determine or tell apart."""
+    w, free = optimum.solution.w, found.program.places.free
+    size = {n.name: n.size for n in read.numbers}
+    names = [found.program.problem.free[k].name for k in inner]
+    values = w[free][inner]
+    sizes = np.array([max(abs(v), 1e-3 * size[n]) for n, v in zip(names, values, strict=True)])
+    point = Point(slopes, values)
+    if not inner:
+        return
+    silent = without_influence(point, sizes, measured)
+    kept = [k for k in range(len(inner)) if k not in silent]
+
+    def elsewhere() -> Point | None:
+        numbers = w[free].copy()
+        numbers[inner] += sizes * 0.1 * (1 + np.arange(len(inner)) / len(inner))
+        moved = found.on_manifold(w, numbers)
+        if moved is None:
+            return None
+        return Point(found.jacobian(moved)[:, inner][:, kept], moved[free][inner][kept])
+
+    words = [f"{names[k]} has no influence on what was measured" for k in silent]
+    if kept:
+        words += told_apart(
+            [names[k] for k in kept], Point(slopes[:, kept], values[kept]), sizes[kept], elsewhere
         )
-        return f"<Estimate {self.name}: {words}>"
+    if words:
+        remedy = "Leave it out" if len(words) == len(silent) == 1 else "Take one of each as known"
+        raise SolveError(
+            f"{read.read.name}: {'; '.join(words)}. {remedy}, or add measured variables or experiments in which they "
+            "show.",
+            optimum=optimum,
+        )

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.measurements import Samples
-from gantrytau_optimica.optimization import Free, Optimization
+from gantrytau_optimica.problem.optimization import Free, Optimization
+from gantrytau_optimica.problem.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

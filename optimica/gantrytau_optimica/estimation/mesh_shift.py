@@ -7,9 +7,9 @@ A step of Gauss and Newton: collocation loses at least a factor of four with hal
 
 import numpy as np
 
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.estimation.sensitivity import residuals
-from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.records import ControlProblem
 from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import transcribe

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from gantrytau_optimica.estimation.estimate import Estimate
+    from gantrytau_optimica.estimation.estimation import Estimate
 
 
 def report_fit(fit: "Estimate") -> str:
@@ -67,8 +67,8 @@ def draw_fit(fit: "Estimate", file: Any):
     """One axis for every measured name (rows) and experiment (columns): dots measured, lines the model."""
     import matplotlib.pyplot as plt
 
-    from gantrytau.result_figures import has_windows
-    from gantrytau.result_files import replacing
+    from gantrytau.results.figures import has_windows
+    from gantrytau.results.files import replacing
 
     names = list(dict.fromkeys(name for e in fit.experiments for name in e.measured))
     size = (4.5 * len(fit.experiments) + 1.5, 2.2 * len(names) + 0.8)

@@ -18,10 +18,10 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from gantrytau import ModelError
-from gantrytau_optimica.transcription.assembly import Assembled, Block, assemble
-from gantrytau_optimica.transcription.blocks import running
 from gantrytau_optimica.transcription.layout import Places
+from gantrytau_optimica.transcription.point_functions import running
 from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.sparse_assembly import Assembled, Block, assemble
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold

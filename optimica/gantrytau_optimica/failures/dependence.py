@@ -7,7 +7,7 @@ span of the rows before it says nothing new, or cannot be: it follows from them 
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.failures.meaning import MEANING
+from gantrytau_optimica.failures.row_meanings import MEANING
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
 

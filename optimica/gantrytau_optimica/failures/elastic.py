@@ -21,9 +21,9 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau.interruption import on_interrupt
-from gantrytau_optimica.failures.meaning import row_sizes
-from gantrytau_optimica.ipopt import Watch
-from gantrytau_optimica.sorting import bare_limit
+from gantrytau_optimica.control.limits import bare_limit
+from gantrytau_optimica.failures.row_meanings import row_sizes
+from gantrytau_optimica.solving.ipopt import Watch
 from gantrytau_optimica.transcription.program import Program
 
 START = 2.0  # price of a start against other conditions: it is a fact more often than a wish

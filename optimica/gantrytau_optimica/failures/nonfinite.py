@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.building import Built, known
-from gantrytau_optimica.failures.meaning import signal_words
-from gantrytau_optimica.trajectory import Trajectory
-from gantrytau_optimica.wording import definition_words, motion_words
+from gantrytau_optimica.control.build import Built, known
+from gantrytau_optimica.failures.row_meanings import signal_words
+from gantrytau_optimica.problem.model_words import definition_words, motion_words
+from gantrytau_optimica.transcription.trajectory import Trajectory
 
 KINDS = ("value", "derivative", "curvature")
 TINY = 1e-100  # whose negative powers, as in derivatives of roots, are beyond all numbers

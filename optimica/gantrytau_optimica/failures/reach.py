@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.building import Built
-from gantrytau_optimica.records import Limit
-from gantrytau_optimica.sorting import known_states
+from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.control_problem import Limit
+from gantrytau_optimica.control.limits import known_states
 
 WORDS = {"initial": "start", "final": "end"}
 

@@ -25,7 +25,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
-from gantrytau.declarations import Formula
+from gantrytau.language.declarations import Formula
 from gantrytau_optimica.paths.fitting import (
     Array,
     Curve,

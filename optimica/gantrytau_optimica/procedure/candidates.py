@@ -6,10 +6,10 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import turned
-from gantrytau.kinematics.workspace_limits import REASONS
-from gantrytau_optimica.calibration.devices import Device
+from gantrytau.kinematics.workspace.pose_limits import REASONS
+from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.fleet import WIDER, Fleet
-from gantrytau_optimica.procedure.settling import SettledWorkspace
+from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 TRIED = {"three links": 1500, "six links": 1000, "turntables": 1000}  # poses; more hardly change the choice
 ENOUGH = 300  # safe and visible poses, from which a choice can be made

@@ -14,13 +14,13 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics import Kinematics, Limits
-from gantrytau.kinematics.linked import SixLinks, ThreeLinks, TurningLinks
-from gantrytau.kinematics.workspace_limits import REASONS, Examined, Examiner
-from gantrytau_optimica.calibration.arm_fit import scales
-from gantrytau_optimica.calibration.arms import Arm, read_arms
-from gantrytau_optimica.calibration.devices import Device
-from gantrytau_optimica.calibration.sight import Bars
-from gantrytau_optimica.procedure.touching import nearest_bodies
+from gantrytau.kinematics.rods.linked import SixLinks, ThreeLinks, TurningLinks
+from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Examiner
+from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.calibration.devices.sight import Bars
+from gantrytau_optimica.calibration.fitting.arm_fit import scales
+from gantrytau_optimica.calibration.rods.arms import Arm, read_arms
+from gantrytau_optimica.procedure.nearest_bodies import nearest_bodies
 
 WIDER = 2.0  # times the error of a tape measure, at which a robot must be safe too
 DRAWS = 50  # of parameters, until links meet

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gantrytau.result_files import replacing
+from gantrytau.results.files import replacing
 
 Record = TypeVar("Record")
 VERSION = "3"  # of what the stages compute; another one makes all anew

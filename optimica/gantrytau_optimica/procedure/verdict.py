@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import GantryTauError
-from gantrytau_optimica.calibration.devices import Device
-from gantrytau_optimica.calibration.pose_selection import enough_poses, predict
+from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict
+from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.candidates import Candidates
-from gantrytau_optimica.procedure.choice import Choice, device_noise, expected_error, poses_of
 from gantrytau_optimica.procedure.fleet import Fleet
-from gantrytau_optimica.procedure.settling import SettledWorkspace
+from gantrytau_optimica.procedure.pose_choice import Choice, device_noise, expected_error, poses_of
 from gantrytau_optimica.procedure.trials import Trials
+from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 SYSTEMATIC = 0.7  # of the error that averaged readings leave: then it is not noise
 HIDDEN = 0.7  # of the safe places, below which the place of the device is worth a word

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, onenormest, splu
 
-from gantrytau_optimica.ipopt import Solution
+from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program
 
 CLEAR = (

@@ -10,11 +10,11 @@ import numpy as np
 
 from gantrytau import ModelError, SolveError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.ipopt import Progress
+from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Guesses, Prepared, Problem, prepare
-from gantrytau_optimica.optimum import Optimum
+from gantrytau_optimica.solving.ipopt import Progress
 from gantrytau_optimica.studies.continuation import Course, follow
-from gantrytau_optimica.studies.picture import draw, write
+from gantrytau_optimica.studies.figures import draw, write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -191,7 +191,7 @@ def _check_weight(prepared: Prepared, weight: str) -> None:
 
 def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, Quantity], dict[str, str]]:
     """The quantities by label, and the units of those that are free numbers, or values at the end."""
-    from gantrytau.trajectories import labels
+    from gantrytau.simulation.to_result import labels
 
     if along is None:
         return {"unweighed": lambda o: _parts(o, weight)[0], "weighed": lambda o: _parts(o, weight)[1]}, {}

@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.translation import names
-from gantrytau_optimica.optimum import Optimum
-from gantrytau_optimica.studies.holding import holding
+from gantrytau.compiler.translation import names
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.studies.held_parameters import holding
 from gantrytau_optimica.studies.kkt import Limits, Slopes, slopes
-from gantrytau_optimica.studies.movement import Movement
+from gantrytau_optimica.studies.signal_slopes import Movement
 
 PREDICTED = "predicted to first order, not solved"
 

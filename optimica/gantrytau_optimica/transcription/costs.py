@@ -5,10 +5,10 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import ControlProblem
-from gantrytau_optimica.transcription.assembly import Block
-from gantrytau_optimica.transcription.blocks import running
+from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
+from gantrytau_optimica.transcription.point_functions import running
+from gantrytau_optimica.transcription.sparse_assembly import Block
 
 
 def running_costs(places: Places, layout: Layout) -> list[Block]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import ControlProblem, Phase, Signal
+from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Signal
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
 

@@ -24,10 +24,12 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import ControlProblem, Limit, Phase
-from gantrytau_optimica.sorting import bare_limit, signal_limits
-from gantrytau_optimica.transcription.assembly import Assembled, Block, assemble
-from gantrytau_optimica.transcription.blocks import (
+from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
+from gantrytau_optimica.control.limits import bare_limit, signal_limits
+from gantrytau_optimica.transcription.costs import differences, running_costs, sample_sums, without_sums
+from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.point_functions import (
     Place,
     fixed_share,
     places_of_points,
@@ -35,10 +37,8 @@ from gantrytau_optimica.transcription.blocks import (
     share_of,
     single_block,
 )
-from gantrytau_optimica.transcription.costs import differences, running_costs, sample_sums, without_sums
-from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
-from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
+from gantrytau_optimica.transcription.sparse_assembly import Assembled, Block, assemble
 
 FEW = 1e-5  # of an element, by which a moving point may stand outside of it
 

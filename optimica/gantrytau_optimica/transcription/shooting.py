@@ -25,13 +25,12 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.records import ControlProblem, Limit, Phase
-from gantrytau_optimica.sorting import bare_limit
-from gantrytau_optimica.transcription.assembly import Block, assemble
-from gantrytau_optimica.transcription.blocks import places_of_points, running, single_block
+from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
+from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.transcription.costs import running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
 from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_block
 from gantrytau_optimica.transcription.program import (
     Program,
     Rows,
@@ -39,6 +38,7 @@ from gantrytau_optimica.transcription.program import (
     _rows,
 )
 from gantrytau_optimica.transcription.scheme import Collocation
+from gantrytau_optimica.transcription.sparse_assembly import Block, assemble
 
 PLACES = np.array([0.0, 0.5, 0.5, 1.0])
 WEIGHTS = np.array([1.0, 2.0, 2.0, 1.0]) / 6

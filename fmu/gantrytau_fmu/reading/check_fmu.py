@@ -1,0 +1,165 @@
+"""What is wrong with an FMU: its archive, its model description, and on request how it runs."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from gantrytau.errors import ModelError
+from gantrytau_fmu.building.platforms import native
+
+Severity = Literal["error", "warning", "note"]
+TIMEOUT = 60.0  # s for a trial run of all interfaces
+_REPORT = 1_000_000  # bytes of the report of a trial run that are read
+_PART = r"[A-Za-z_][A-Za-z_0-9]*(\[[0-9]+(,[0-9]+)*\])?"
+_NAME = rf"{_PART}(\.{_PART})*"
+_PLAIN = re.compile(
+    rf"{_NAME}|der\({_NAME}(,[0-9]+)?\)"
+)  # structured names without quotes, good in both conventions
+_OURS = (  # of FMPy: said by us with names, and without its mistakes
+    'The unit "',
+    "ModelStructure/Outputs must have exactly",
+    "ModelStructure/InitialUnknowns does not",
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a check found: an "error", a "warning" (it may work elsewhere) or a "note"; path: of what file."""
+
+    severity: Severity
+    message: str
+    path: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return (
+            f"{self.path}: {self.severity}: {self.message}"
+            if self.path
+            else f"{self.severity}: {self.message}"
+        )
+
+
+def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float = TIMEOUT) -> list[Finding]:
+    """All that is wrong with an FMU, errors first; [] if nothing is.
+
+    Looks at the archive (`safety`), the official schemas, what FMPy validates, and what neither of them does: limits
+    and start values, units, the model structure by name, terminals, sources, and which binaries are in it.
+    run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
+    no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
+    """
+    path = Path(path)
+    found = _found(path, run, timeout)
+    order = ("error", "warning", "note")
+    found.sort(key=lambda finding: order.index(finding.severity))
+    return [replace(finding, path=str(path)) for finding in found]
+
+
+def _found(path: Path, run: bool, timeout: float) -> list[Finding]:
+    from gantrytau_fmu.reading.inconsistencies import inconsistencies
+    from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
+
+    try:
+        files = read_files(path)
+        if problems := schema_problems(files):
+            return [Finding("error", problem) for problem in problems]
+        model = model_of(files)
+        fmu = describe(files, model)
+    except ModelError as error:
+        return [Finding("error", str(error).removeprefix(f"{path}: "))]
+    findings = list(inconsistencies(fmu, files, model))
+    for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
+        tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
+        if not tripped and not problem.startswith(_OURS):
+            findings.append(Finding("error", problem))
+    if run:
+        findings += _tried(path, native().name in fmu.platforms, timeout)
+    return findings
+
+
+def _validated(packed: Any, names: Iterable[str]) -> list[str]:
+    """What `fmpy.validate_fmu` says, without its 3 ms for each name where the names are plain."""
+    from fmpy.model_description import ValidationError, read_model_description
+
+    plain = all(_PLAIN.fullmatch(name) for name in names)
+    try:
+        read_model_description(
+            packed, validate=True, validate_variable_names=not plain, validate_model_structure=True
+        )
+    except ValidationError as error:
+        return [problem.strip() for problem in error.problems]
+    except Exception as error:  # as FMPy itself, which trips over undefined display units
+        return [f"{type(error).__name__}: {error}"]
+    return []
+
+
+def _tried(path: Path, here: bool, timeout: float) -> Iterator[Finding]:
+    """What happens when the FMU is run in a process of its own."""
+    from gantrytau_fmu.reading.safety import unpack
+
+    if not here:
+        yield Finding("warning", f"not run: it has no binary for this machine ({native().name})")
+        return
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        report = Path(folder) / "report"
+        report.touch()
+        unpacked = unpack(path, Path(folder) / "unpacked")
+        code = _run_apart([str(unpacked), str(report)], folder, timeout)
+        stage, findings, finished = _reported(report)
+    yield from findings
+    if finished:
+        return
+    if code is None:
+        yield Finding("error", f"{stage}: no answer after {timeout:g} s")
+    else:
+        yield Finding("error", f"{stage}: the process ended ({_ending(code)})")
+
+
+def _run_apart(arguments: list[str], folder: str, timeout: float) -> int | None:
+    """Run `trial` in a process of its own; its exit code, None if it had to be stopped. No process is left."""
+    command = [sys.executable, "-P", "-m", "gantrytau_fmu.reading.trial", *arguments]
+    silent = subprocess.DEVNULL
+    process = subprocess.Popen(
+        command, cwd=folder, stdin=silent, stdout=silent, stderr=silent, start_new_session=True
+    )
+    try:
+        return process.wait(timeout)
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        with suppress(OSError):  # it has ended
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)  # with all processes that it started
+            else:
+                process.kill()
+        process.wait()
+
+
+def _reported(report: Path) -> tuple[str, list[Finding], bool]:
+    """The last stage that a trial run began, what it found, and whether it came to its end."""
+    stage, findings, finished = "start", [], False
+    with report.open("rb") as file:
+        lines = file.read(_REPORT).splitlines()
+    for line in lines:
+        with suppress(ValueError, TypeError, AttributeError):  # a line that was cut off
+            said = json.loads(line)
+            stage = str(said.get("stage", stage))
+            finished = finished or said.get("finished") is True
+            if said.get("severity") in ("error", "warning", "note"):
+                findings.append(Finding(said["severity"], str(said["message"])))
+    return stage, findings, finished
+
+
+def _ending(code: int) -> str:
+    """How a process ended, in words."""
+    if code < 0:
+        with suppress(ValueError):
+            return signal.Signals(-code).name
+    return f"exit code {code}"

@@ -1,0 +1,1 @@
+"""What a translated model answers: functions, diagnosis, linear systems, mechanisms, C."""

@@ -1,0 +1,253 @@
+"""Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
+from gantrytau.compiler.blocks.pattern import block_pattern
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.translation import all_symbols, names, translate_flat
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.language.events import event_names
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+
+DROPPED = "constraints that were left out"
+OPEN = 1e-6  # m or rad by which they may be violated
+
+
+def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Function:
+    """See Dae.function."""
+    given, find = names(given), names(find)
+    dae = _with_parameters(dae, given)
+    columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
+    inputs: list[str] | None = None
+    known, targets = {}, []
+    for translated in _translations(dae, given, find):
+        dae = translated
+        known = _known(dae, given, columns)
+        targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
+        dropped = _dropped(dae, given)
+        blocks = _blocks(dae, known, [*targets, dropped], find) if dropped.numel() else None
+        if blocks is not None:
+            whole = _compose(dae, blocks, known, [*targets, dropped], given, [*find, DROPPED], columns)
+            return _closed(whole)
+        blocks = _blocks(dae, known, targets, find)
+        if blocks is not None:
+            return _compose(dae, blocks, known, targets, given, find, columns)
+        inputs = _sufficient_inputs(dae, known, targets) if inputs is None else inputs
+    raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
+
+
+def _dropped(dae: "Dae", given: Sequence[str]) -> ca.SX:
+    """What must be zero where given parameters could open a loop: the constraints left out as redundant."""
+    parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
+    if not parameters or not dae.redundant:
+        return ca.SX(0, 1)
+    return dae.reduced.written(dae.table.reduce(ca.vertcat(*(e.residual for e in dae.redundant))))
+
+
+def _closed(function: ca.Function) -> ca.Function:
+    """A function whose last result must be zero: without it, and NaN where it is not."""
+    names = function.name_in()
+    x = [ca.MX.sym(n, *function.size_in(n)) for n in names]
+    *results, gap = function.call(x)
+    holds = ca.sumsqr(gap) <= OPEN**2
+    found = [ca.if_else(holds, r, ca.MX.nan(*r.shape)) for r in results]
+    return ca.Function("f", x, found, names, function.name_out()[:-1])
+
+
+def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iterator["Dae"]:
+    """The model as it is translated, then with the wanted derivatives, then with other inputs."""
+    yield dae
+    orders = dae.indexed.orders
+    leaves = [leaf.name() for name in find for n in dae.expand(name) for leaf in ca.symvar(dae.expression(n))]
+    if any(split_derivative(n)[1] > orders.get(split_derivative(n)[0], 99) for n in leaves):
+        parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
+        known, states = (*dae.inputs, *parameters), dae.settings["states"]
+        yield translate_flat(dae.flat, given=known, find=find, states=states, start=dae.start, events=True)
+    yield _flipped(dae, given, find)
+
+
+def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":
+    """Parameters that are given stay symbols, even those that shape the equations."""
+    scalars = [n for name in given for n in dae.expand(name)]
+    symbols = [n for n in scalars if n in dae.table.symbols and n not in dae.table.independent]
+    if not symbols:
+        return dae
+    parameters = [n for n in scalars if n in dae.table.symbols]
+    chosen = {k: dae.settings[k] for k in ("find", "states")}
+    return translate_flat(dae.flat, given=(*dae.inputs, *parameters), **chosen, events=True)
+
+
+def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
+    """Expression of each known symbol in the arguments of the function."""
+    known: dict[str, ca.SX] = {}
+    for name, symbols in zip(given, columns, strict=True):
+        for scalar, argument in zip(dae.expand(name), symbols, strict=True):
+            base, order = split_derivative(scalar)
+            if base in dae.table.symbols or base == dae.flat.time.name():
+                symbol, value = base, argument
+            elif base in dae.flat.definitions:
+                raise ModelError(f"{scalar} follows from other variables and cannot be given; name those")
+            else:
+                alias = dae.reduced.aliases[base]
+                if alias.root is None:
+                    raise ModelError(f"{scalar} is constant in {dae.name} and cannot be given")
+                symbol = derivative_name(alias.root, alias.order + order)
+                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+                value = (argument - offset) / alias.factor
+            if symbol in known:
+                raise StructureError(f"{scalar} is given twice, directly or by an alias; leave one out")
+            known[symbol] = value
+    return known
+
+
+def _blocks(
+    dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
+) -> list[Block] | None:
+    """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
+    wanted = [n for n in wanted if n not in dae.table.symbols and n != dae.flat.time.name()]
+    missing = [n for n in wanted if n not in set(unknowns)]
+    pattern = block_pattern(dae.indexed.residuals, unknowns, wanted)
+    if pattern.surplus:
+        names = "; ".join(dae.equation_name(k) for k in pattern.surplus[:3])
+        raise StructureError(
+            f"{dae.name}: the given names determine more than there is to choose; contradicted: {names}. "
+            "Leave out one of the given names"
+        )
+    if missing or pattern.undetermined:
+        return None
+    symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
+    guide = Guide(dae.start, dae.table.values, dae.choice.states)
+    return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)
+
+
+def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
+    """The model translated anew with the given variables as known functions of time."""
+    scalars = [n for name in given for n in dae.expand(name) if not n.startswith("der(") and n != "time"]
+    variables = [n for n in scalars if n not in dae.table.symbols]
+    parameters = [n for n in scalars if n in dae.table.symbols]
+    roots: dict[str, str] = {}
+    for name in variables:
+        alias = dae.reduced.aliases[name]
+        if alias.root is not None and alias.order == 0:
+            roots.setdefault(alias.root, name)
+    for name in event_names(dae.flat):  # known anyway
+        roots.pop(name, None)
+    return translate_flat(
+        dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start, events=True
+    )
+
+
+def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
+    """What to give as well: the lowest derivatives that suffice, or the inputs of the model."""
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    driving = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
+    text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."
+    ways: list[str] = []
+    for highest in sorted({split_derivative(n)[1] for n in driving}):
+        more = [n for n in driving if split_derivative(n)[1] <= highest]
+        if _suffices(dae, known, targets, more):
+            ways.append(", ".join(_whole(dae, more)))
+            break
+    ways += [", ".join(_whole(dae, inputs))] if inputs else []
+    return f"{text} Give also {', or '.join(dict.fromkeys(ways)) or 'states, inputs or derivatives'}."
+
+
+def _sufficient_inputs(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX]) -> list[str]:
+    """The inputs that are missing if these alone are, else nothing."""
+    missing = [n for n in dae.known if n not in known]
+    return missing if missing and _suffices(dae, known, targets, missing) else []
+
+
+def _suffices(dae: "Dae", known: Collection[str], targets: list[ca.SX], more: list[str]) -> bool:
+    """Whether the targets follow from the known symbols and some more."""
+    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known and n not in more]
+    wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() in unknowns]
+    return not block_pattern(dae.indexed.residuals, unknowns, wanted).undetermined
+
+
+def _whole(dae: "Dae", scalars: Sequence[str]) -> list[str]:
+    """The names with complete vectors under one name."""
+    left = dict.fromkeys(scalars)
+    for vector in dae.vectors.values():
+        for order in {split_derivative(n)[1] for n in scalars}:
+            elements = [derivative_name(n, order) for n in vector.elements]
+            if len(elements) > 1 and all(n in left for n in elements):
+                left = dict.fromkeys(
+                    derivative_name(vector.name, order) if n in elements else n for n in left
+                )
+    return list(left)
+
+
+def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> ca.Function:
+    numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
+    definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
+    definitions += [
+        (
+            dae.table.symbols[n]
+            if n in dae.table.symbols
+            else dae.flat.time
+            if n == "time"
+            else dae.reduced.chains.named(n),
+            e,
+        )
+        for n, e in known.items()
+    ]
+    implicit = [block for block in blocks if block.solution is None]
+    for block in blocks:
+        definitions += block.definitions
+    expressions = [*(ca.vertcat(*b.residuals) for b in implicit), *targets]
+    symbols, values = [v for v, _ in definitions], [e for _, e in definitions]
+    _, expressions = ca.substitute_inplace(symbols, values, expressions, False)
+    arguments = [ca.vertcat(*column) for column in columns]
+    names_in = _legal(given, "i")
+    names_out = _legal(find, "o", names_in)
+    _refuse_time(expressions, dae)
+    if not implicit:
+        return ca.Function("f", arguments, expressions, names_in, names_out, {"cse": True})
+    parts = [
+        Implicit(block, residual, ca.DM([dae.start[y.name()] for y in block.tears]))
+        for block, residual in zip(implicit, expressions, strict=False)
+    ]
+    start = ca.DM(_start_of(dae, [n for name in given for n in dae.expand(name)]))
+    return solved_one_by_one("f", parts, expressions[len(parts) :], arguments, start, (names_in, names_out))
+
+
+def _start_of(dae: "Dae", scalars: Sequence[str]) -> list[float]:
+    """Numbers of arguments where the model starts; derivatives that do not occur there are zero."""
+    found = []
+    for name in scalars:
+        try:
+            found.append(float(dae.numbers([name], dae.start)[0]))
+        except KeyError:
+            found.append(dae.table.values.get(name, 0.0))
+    return found
+
+
+def _refuse_time(expressions, dae) -> None:
+    if any(ca.is_equal(leaf, dae.flat.time) for leaf in ca.symvar(ca.vertcat(*expressions))):
+        raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")
+
+
+def _legal(names: Sequence[str], prefix: str, taken: Sequence[str] = ()) -> list[str]:
+    """Names as CasADi accepts them: letters, digits and single underscores, all different."""
+    found: list[str] = []
+    for name in names:
+        text = "".join(c if c.isalnum() else "_" for c in name).strip("_")
+        while "__" in text:
+            text = text.replace("__", "_")
+        if not text or not text[0].isalpha():
+            text = f"{prefix}_{text}".rstrip("_")
+        while text in found or text in taken:
+            text += "x"
+        found.append(text)
+    return found

@@ -1,0 +1,147 @@
+"""What translation finds out about a model, in words: `check(model)` and `dae.diagnosis`."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from gantrytau.errors import InitializationError, StructureError
+from gantrytau.flattening.flat_model import FlatModel, Loop
+from gantrytau.flattening.flatten import flatten
+from gantrytau.flattening.unit_checking import check_units
+from gantrytau.language.events import event_names
+from gantrytau.language.model import Model
+
+if TYPE_CHECKING:
+    from gantrytau.answers.other_assemblies import Assembly
+    from gantrytau.dae import Dae
+
+POOR = 1e4  # condition of the choice of states from which it deserves a remark
+FAR = 1e-6  # how far a start value moves, relative to its size, before that is worth a line
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A start value that could not be kept: what was asked for, and what is consistent with the others."""
+
+    name: str
+    asked: float
+    found: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What translation found out: sizes, loops, states and their conditioning, blocks, the start.
+
+    mobility: number of ways in which the positions can change; redundant: equations that repeat others;
+    moved: start values that were moved, the farthest first; assemblies: where the positions have several
+    solutions, the one taken and others; missing: what keeps the model from being translated, else "".
+    Prints itself.
+    """
+
+    model: str
+    unknowns: int
+    equations: int
+    aliases: int = 0
+    differentiated: int = 0
+    mobility: int | None = None
+    redundant: tuple[str, ...] = ()
+    loops: tuple[Loop, ...] = ()
+    states: tuple[str, ...] = ()
+    condition: float = 1.0
+    blocks: tuple[tuple[str, int, int], ...] = ()  # kind, unknowns, torn unknowns
+    moved: tuple[Moved, ...] = ()
+    assemblies: "tuple[Assembly, ...]" = ()
+    missing: str = ""
+
+    def __str__(self) -> str:
+        lines = [f"{self.model}: {self.equations} equations, {self.unknowns} unknowns"]
+        lines += [f"  loop from {x.a} to {x.b} through {', '.join(x.members)}" for x in self.loops]
+        if self.missing:
+            return "\n".join([*lines, f"  cannot be translated: {self.missing}"])
+        several = [
+            f"{kind} {size}" + (f" -> {torn}" if torn < size else "")
+            for kind, size, torn in self.blocks
+            if size > 1
+        ]
+        poor = "; they are nearly dependent here, name others in states=" if self.condition > POOR else ""
+        lines += [
+            f"  {self.aliases} aliases removed, {self.differentiated} equations differentiated",
+            f"  mobility {self.mobility}",
+            *_listed("redundant constraints", self.redundant),
+            f"  states (condition {self.condition:.3g}{poor}): {', '.join(self.states) or 'none'}",
+            f"  {len(self.blocks)} blocks, of them with several unknowns: {', '.join(several) or 'none'}",
+            *_listed("start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved]),
+            *(f"  {assembly}" for assembly in self.assemblies),
+        ]
+        return "\n".join(lines)
+
+
+def _listed(title: str, items: Iterable[str], most: int = 8) -> list[str]:
+    items = list(items)
+    if not items:
+        return [f"  {title}: none"]
+    more = [f"    and {len(items) - most} others"] if len(items) > most else []
+    return [f"  {title}:", *(f"    {item}" for item in items[:most]), *more]
+
+
+def check(model: Model) -> Diagnosis:
+    """Examine a model: do its equations determine its unknowns, how can it move, where does it start?
+
+    A model that cannot be translated gets a diagnosis that says in `missing` why not. Raises ModelError for
+    what is written wrongly.
+    """
+    from gantrytau.compiler.translation import translate_flat
+
+    flat: FlatModel | None = None
+    try:
+        flat = flatten(model)
+        check_units(flat)
+        return diagnose(translate_flat(flat, events=True))
+    except (StructureError, InitializationError) as error:
+        if flat is None:
+            cls = model if isinstance(model, type) else type(model)
+            return Diagnosis(cls.__name__, 0, 0, missing=str(error))
+        unknowns, equations = _sizes(flat, len(flat.inputs) + len(event_names(flat)))
+        return Diagnosis(flat.name, unknowns, equations, loops=flat.loops, missing=str(error))
+
+
+def diagnose(dae: "Dae") -> Diagnosis:
+    """The diagnosis of a translated model."""
+    from gantrytau.answers.other_assemblies import assemblies
+
+    unknowns, equations = _sizes(dae.flat, len(dae.known))
+    return Diagnosis(
+        model=dae.name,
+        unknowns=unknowns,
+        equations=equations,
+        aliases=equations - len(dae.reduced.residuals),
+        differentiated=sum(1 for c in dae.indexed.counts if c),
+        mobility=sum(1 for n in dae.choice.states if dae.indexed.orders.get(n, 0) > 1),
+        redundant=tuple(e.name for e in (*dae.redundant, *dae.reduced.redundant)),
+        loops=dae.flat.loops,
+        states=dae.states,
+        condition=dae.choice.condition,
+        blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in dae.blocks),
+        moved=_moved(dae),
+        assemblies=assemblies(dae),
+    )
+
+
+def _sizes(flat: FlatModel, known: int) -> tuple[int, int]:
+    return sum(len(v.elements) for v in flat.variables) - known, len(flat.equations)
+
+
+def _moved(dae: "Dae") -> tuple[Moved, ...]:
+    """Start values that the start does not have, of aliases too."""
+    started = [v for v in dae.flat.variables if v.start is not None]
+    names = [n for v in started for n in v.elements]
+    asked = [x for v in started for x in dae.table.number(ca.vertcat(*(v.start or ()))).tolist()]
+    found = dae.numbers(names, dae.start).tolist() if names else []
+    moved = [
+        Moved(n, a, f)
+        for n, a, f in zip(names, asked, found, strict=True)
+        if abs(f - a) > FAR * max(1.0, abs(a)) and dae.reduced.aliases[n].root not in dae.known
+    ]
+    return tuple(sorted(moved, key=lambda m: -abs(m.found - m.asked)))

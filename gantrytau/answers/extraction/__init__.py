@@ -1,0 +1,1 @@
+"""The equations of a mechanism between its tool, its joints and their forces."""

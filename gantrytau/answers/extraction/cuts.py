@@ -1,0 +1,259 @@
+"""Cuts through the equations of a mechanism: some quantities are known, the blocks that follow are solved.
+
+A mechanism has tool coordinates T, joint coordinates q and forces f, and dT, dq, ddT, ddq are their rates. The
+equations that a cut leaves over are relations between what is known: constraints, and the balance of forces.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
+from gantrytau.compiler.blocks.pattern import block_pattern
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.translation import all_symbols
+from gantrytau.dae import Dae
+from gantrytau.errors import StructureError
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+ORDERS = {
+    "T": ("T", 0),
+    "dT": ("T", 1),
+    "ddT": ("T", 2),
+    "q": ("q", 0),
+    "dq": ("q", 1),
+    "ddq": ("q", 2),
+    "f": ("f", 0),
+}
+EVERYTHING = tuple(ORDERS)
+FOLLOWS = ("T", "q", "dT", "ddT")  # what passive coordinates and their rates follow from
+GOOD_PIVOT = 0.05  # of an equation, what others leave of it: with less it waits for better ones
+LEAST_PIVOT = 1e-9  # below, it says nothing new
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Blocks solved from what is known; left: equations that are relations of known quantities.
+
+    twins: relations of the same kind between coordinates that are aliases of each other.
+    """
+
+    strata: "Strata"
+    kinds: tuple[str, ...]
+    known: Mapping[str, ca.SX]
+    blocks: tuple[Block, ...]
+    left: tuple[Key, ...]
+    twins: tuple[ca.SX, ...]
+
+    @property
+    def implicit(self) -> tuple[Block, ...]:
+        """The blocks without closed form."""
+        return tuple(b for b in self.blocks if b.solution is None)
+
+    def resolved(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """The residuals of blocks without closed form, then the expressions, in what is known and what these blocks find."""
+        dae = self.strata.dae
+        definitions = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
+        definitions += [d for block in self.blocks for d in block.definitions]
+        found = [*(r for b in self.implicit for r in b.residuals), *expressions]
+        if definitions:
+            symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
+            _, found = ca.substitute_inplace(symbols, values, [_column(found)], False)
+            found = ca.densify(found[0]).elements()
+        if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
+            raise StructureError(
+                f"{dae.name}: its equations depend on time explicitly, expected a mechanism whose equations do not; make "
+                "what varies an Input, which keeps its start value here"
+            )
+        return list(found)
+
+    def function(self, name: str, expressions: Sequence[ca.SX]) -> ca.Function:
+        """Expressions as a function of the known quantities, one vector each, and of the parameters p.
+
+        Where there is no solution its results are NaN.
+        """
+        strata, found = self.strata, self.resolved(expressions)
+        arguments = [*(strata.columns[k] for k in self.kinds), strata.p]
+        inside = [*self.kinds, "p"]
+        value = _column(found[len(found) - len(expressions) :])
+        if not self.implicit:
+            return ca.Function(name, arguments, [value], inside, ["value"], {"cse": True})
+        implicit: list[Implicit] = []
+        for block in self.implicit:
+            count, place = len(block.tears), sum(len(i.block.tears) for i in implicit)
+            begin = ca.DM([strata.dae.start[s.name()] for s in block.tears])
+            implicit.append(Implicit(block, ca.vertcat(*found[place : place + count]), begin))
+        start = ca.DM(
+            np.concatenate([*(strata.start(k) for k in self.kinds), np.array(strata.numbers).ravel()])
+        )
+        return solved_one_by_one(name, implicit, [value], arguments, start, (inside, ["value"]))
+
+
+class Strata:
+    """The equations of a mechanism whose tool moves as a known function of time, ready to be cut.
+
+    roles: scalar names of "T", "q" and "f". columns: symbols of these and their rates, named like the model's, and "s", the
+    rates of passive coordinates that the balance needs; p: symbols of the parameters; numbers: their values;
+    constraints: which equations relate T and q alone.
+    """
+
+    def __init__(self, dae: Dae, roles: Mapping[str, Sequence[str]]):
+        self.dae, self.roles = dae, roles
+        self.columns = {k: _column([ca.SX.sym(n) for n in self.names(k)]) for k in EVERYTHING}
+        self.p = _column([dae.table.symbols[n] for n in dae.table.independent])
+        self.numbers = ca.DM([dae.table.values[n] for n in dae.table.independent])
+        self.constraints: frozenset[int] = frozenset()
+        self.distance = self._distances()
+        self.constraints = frozenset(i for i, _ in self.cut(("T", "q")).left)
+        self.passive = self._passive()
+        self.columns["s"] = _column([ca.SX.sym(n) for n in self.passive])
+
+    def names(self, kind: str) -> list[str]:
+        """Scalar names of a kind: `der(x)` for rates."""
+        if kind == "s":
+            return list(self.passive)
+        role, order = ORDERS[kind]
+        return [derivative_name(n, order) for n in self.roles[role]]
+
+    def start(self, kind: str) -> np.ndarray:
+        """Values of a kind at the consistent start, (n,)."""
+        return self.dae.numbers(self.names(kind), self.dae.start)
+
+    def structural_zeros(self) -> tuple[ca.SX, ca.SX]:
+        """Parameters that are zero by the way their vector follows from others, as gravity in x; and zeros for them."""
+        table = self.dae.table
+        found = [
+            table.symbols[name]
+            for vector in self.dae.flat.parameters
+            if not all(value.is_constant() for value in vector.value)
+            for name, value in zip(vector.elements, vector.value, strict=True)
+            if name in table.independent and value.is_zero()
+        ]
+        return _column(found), ca.SX.zeros(len(found))
+
+    def cut(self, kinds: Sequence[str], find: str = "", why: str = "") -> Cut:
+        """The blocks from `kinds` to `find`, or to the equations left over; `why`: opens the error if there is no way."""
+        known, twins = self._known(kinds)
+        residuals = self.dae.indexed.residuals
+        unknowns = [n for n in all_symbols(self.dae.indexed, self.dae.reduced.known) if n not in known]
+        left = self._left(unknowns)
+        wanted = [self.dae.expression(n) for n in self.names(find)] if find else []
+        wanted += [residuals[k] for k in left] if not find else []
+        symbols = {s.name() for e in wanted for s in ca.symvar(e)} & set(unknowns)
+        rest = {k: residuals[k] for k in sorted(residuals) if k not in left}
+        pattern = block_pattern(rest, unknowns, sorted(symbols))
+        if pattern.undetermined:
+            raise StructureError(
+                f"{self.dae.name}: {why or 'the equations left over have unknowns'}. Undetermined: "
+                f"{', '.join(pattern.undetermined[:5])}. Expected tool, joints and forces that together describe the whole "
+                "mechanism: name others"
+            )
+        by_name = {n: self.dae.reduced.chains.named(n) for _, found in pattern.blocks for n in found}
+        guide = Guide(self.dae.start, self.dae.table.values, self.dae.choice.states)
+        return Cut(
+            self, tuple(kinds), known, tuple(solve_blocks(pattern.blocks, rest, by_name, guide)), left, twins
+        )
+
+    def _passive(self) -> tuple[str, ...]:
+        """Rates that the motion of the tool determines without any force, and that occur in the balance of forces."""
+        dae = self.dae
+        known, _ = self._known(FOLLOWS)
+        unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+        left = self._left(unknowns)
+        motion = {
+            k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left
+        }
+        found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
+        forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
+        needed = {s.name() for s in ca.symvar(_column(forces))} - set(self._known(EVERYTHING)[0])
+        return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
+
+    def _left(self, unknowns: Sequence[str]) -> tuple[Key, ...]:
+        """Equations that are not needed to find the unknowns: constraints first, then those far from the forces."""
+        residuals, dae = self.dae.indexed.residuals, self.dae
+        keys = sorted(residuals)
+        leaves = list(dict.fromkeys(s.name() for r in residuals.values() for s in ca.symvar(r)))
+        symbols = ca.vertcat(*{s.name(): s for r in residuals.values() for s in ca.symvar(r)}.values())
+        slopes = ca.jacobian(_column([residuals[k] for k in keys]), symbols)
+        numbers = ca.Function("slopes", [symbols], [ca.densify(slopes)])(
+            ca.DM([dae.start[n] for n in leaves])
+        )
+        matrix = np.array(numbers).reshape(len(keys), len(leaves))
+        last = max(self.distance.values()) + 1
+        first, counts = -1 - max(dae.indexed.counts), dae.indexed.counts
+        # positions, speeds and accelerations are found from what was differentiated; forces must not help out
+        ranks = [
+            last if i in self.constraints else first + times if counts[i] else self.distance[i, times]
+            for i, times in keys
+        ]
+        places = [leaves.index(n) for n in unknowns if n in leaves]
+        chosen = _independent(matrix[:, places], np.linalg.norm(matrix, axis=1), ranks)
+        return tuple(k for i, k in enumerate(keys) if i not in chosen)
+
+    def _known(self, kinds: Iterable[str]) -> tuple[dict[str, ca.SX], tuple[ca.SX, ...]]:
+        """Expression of each known symbol; relations where two coordinates are the same one."""
+        dae = self.dae
+        known: dict[str, ca.SX] = {}
+        twins: list[ca.SX] = []
+        for kind in kinds:
+            for name, argument in zip(self.names(kind), self.columns[kind].elements(), strict=True):
+                base, order = split_derivative(name)
+                alias = dae.reduced.aliases[base]
+                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
+                symbol = derivative_name(alias.root or "", alias.order + order)
+                value = (argument - offset) / alias.factor
+                if symbol in known:
+                    twins.append(value - known[symbol])
+                else:
+                    known[symbol] = value
+        inputs = [n for n in dae.known if n not in known]
+        for symbol in all_symbols(dae.indexed, dae.reduced.known):
+            base, order = split_derivative(symbol)
+            if base in inputs and base not in {dae.reduced.aliases[n].root for n in self.roles["T"]}:
+                known[symbol] = ca.SX(dae.start[symbol] if order == 0 else 0.0)
+        return known, tuple(twins)
+
+    def _distances(self) -> dict[Key, int]:
+        """How many equations away from a force f each equation is, when all motion is known."""
+        known, _ = self._known(EVERYTHING)
+        forces = {s for s in self._known(["f"])[0] if split_derivative(s)[0] not in self.dae.known}
+        found: dict[Key, int] = {}
+        rows = {
+            k: {s.name() for s in ca.symvar(r)} - (known.keys() - forces)
+            for k, r in self.dae.indexed.residuals.items()
+        }
+        reached, level = set(forces), 0
+        while front := [k for k, row in rows.items() if k not in found and row & reached]:
+            found.update(dict.fromkeys(front, level))
+            reached |= {n for k in front for n in rows[k]}
+            level += 1
+        return {k: found.get(k, level) for k in rows}
+
+
+def _independent(matrix: np.ndarray, sizes: np.ndarray, ranks: Sequence[int]) -> set[int]:
+    """A largest set of independent rows, those of low rank first unless they lean on others; sizes: of whole rows."""
+    norms = np.linalg.norm(matrix, axis=1)
+    norms[norms <= LEAST_PIVOT * sizes] = 0.0  # nothing but rounding
+    rest = matrix / np.where(norms > 0, norms, np.inf)[:, None]
+    chosen: set[int] = set()
+    for least in (GOOD_PIVOT, LEAST_PIVOT):
+        for rank in sorted(set(ranks)):
+            candidates = [i for i in range(len(ranks)) if ranks[i] == rank and i not in chosen]
+            while candidates:
+                left = np.linalg.norm(rest[candidates], axis=1)
+                best = int(np.argmax(left))
+                if not left[best] > least:
+                    break
+                row = candidates.pop(best)
+                chosen.add(row)
+                direction = rest[row] / left[best]
+                rest -= np.outer(rest @ direction, direction)
+    return chosen
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)

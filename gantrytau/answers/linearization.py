@@ -1,0 +1,306 @@
+"""The linear system that a model is close to an operating point: A, B, C, D with exact derivatives.
+
+All equations of index one, R(x, y, u) = 0, are differentiated at the point: x the states, y every other unknown
+with its derivatives, u the inputs. Implicit function theorem: dy = -R_y^-1 (R_x dx + R_u du). The rates x' are
+among y (or are states), so their rows of dy are A and B; the rows of the outputs are C and D. No closed
+form of a block is differentiated, hence no branch and no square root at zero either.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.parameters import with_values
+from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.consistent_start import given_scalars, named_values
+from gantrytau.compiler.translation import all_symbols, names, retranslate, translate, translate_flat
+from gantrytau.dae import Dae
+from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
+from gantrytau.language.events import refuse_events
+from gantrytau.language.model import Model
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+POOR = 1e6  # condition of the equations, scaled, above which other states are looked for at the point
+LEAST_COLUMN = 1e-4  # a column that is smaller is meant to be small
+SINGULAR = 1e13  # above this no digit of a solution would be left
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """dx' = A dx + B du, dy = C dx + D du about `point`; prints itself.
+
+    A (n, n), B (n, m), C (k, n), D (k, m), in SI units of the named quantities; states, inputs, outputs: scalar names,
+    in the order of rows and columns; point: values of all variables there, by name.
+    """
+
+    model: str
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    point: Mapping[str, Any] = field(repr=False)
+
+    def eigenvalues(self) -> np.ndarray:
+        """Poles of the system, (n,) complex, in 1/s, the slowest first."""
+        found = np.asarray(np.linalg.eigvals(self.A), dtype=complex)
+        return found[np.lexsort((np.imag(found), np.real(found), np.abs(found).round(9)))]
+
+    def __str__(self) -> str:
+        states, outputs = [f"der({n})" for n in self.states], list(self.outputs)
+        columns = [*self.states, *self.inputs]
+        rows = np.vstack([np.hstack([self.A, self.B]), np.hstack([self.C, self.D])])
+        width = max([len(n) for n in (*states, *outputs)], default=0)
+        widths = [max(len(n), 11) for n in columns]
+        lines = [
+            f"{self.model}, linear about its operating point",
+            " " * width + "".join(f"  {n:>{w}}" for n, w in zip(columns, widths, strict=True)),
+        ]
+        for name, row in zip([*states, *outputs], rows, strict=True):
+            cells = "".join(f"  {v:>{w}.5g}" for v, w in zip(row, widths, strict=True))
+            lines.append(f"{name:<{width}}{cells}")
+        poles = ", ".join(_complex_text(p) for p in self.eigenvalues())
+        return "\n".join([*lines, f"eigenvalues, 1/s: {poles or 'none'}"])
+
+
+def _complex_text(value: complex) -> str:
+    return f"{value.real:.4g}" if value.imag == 0 else f"{value.real:.4g}{value.imag:+.4g}j"
+
+
+def linearize(
+    model: Model | Dae,
+    *,
+    at: Mapping[str, Any] | None = None,
+    steady: bool = False,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Linearization:
+    """The linear system about an operating point.
+
+    at: name -> value, held exactly, the rest is completed from the start values as in `Dae.evaluate`;
+    steady: look for a point at rest instead, where every derivative is zero and the values of `at` hold: inputs
+    keep their start values if there is one, else those not in `at` are found as well; inputs: names (all);
+    outputs: names of any variables and derivatives (the declared ones, else the states); parameters: name -> value.
+    States that cannot be states at the point are replaced by others. Raises InitializationError if there is
+    no such point, StructureError if the equations are singular there, ModelError for unknown names.
+    """
+    dae = model if isinstance(model, Dae) else translate(model)
+    refuse_events(dae.flat)
+    if parameters:
+        dae = _with_parameters(dae, parameters)
+    columns = dae.known if inputs is None else tuple(n for name in names(inputs) for n in dae.expand(name))
+    for name in columns:
+        if name not in dae.known:
+            raise ModelError(f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.known)}")
+    dae = _with_outputs(dae, names(outputs or ()))
+    values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
+    slopes = _Slopes(dae, values)
+    if slopes.condition > POOR:
+        # states are a matter of the point: the height of a pendulum is none at its lowest
+        dae = translate_flat(
+            dae.flat, **{k: dae.settings[k] for k in ("given", "find", "states")}, start=values
+        )
+        slopes = _Slopes(dae, values)
+    slopes.require_regular()
+    wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
+    rows = tuple(n for name in wanted for n in dae.expand(name))
+    chosen = [dae.known.index(n) for n in columns]
+    A, B = slopes.of([_rate(dae, n) for n in dae.choice.states], [f"der({n})" for n in dae.states])
+    C, D = slopes.of([dae.expression(n) for n in rows], rows)
+    point = named_values(dae, values)
+    return Linearization(dae.name, A, B[:, chosen], C, D[:, chosen], dae.states, columns, rows, point)
+
+
+def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> Dae:
+    scalars = given_scalars(dae, parameters)
+    for name in scalars:
+        if name not in dae.table.symbols:
+            raise ModelError(f"parameters: {name} is a variable of {dae.name}; give it in at=")
+    return retranslate(dae, with_values(dae.flat, scalars))
+
+
+def _with_outputs(dae: Dae, outputs: Sequence[str]) -> Dae:
+    """The same system with the derivatives that are asked for among its unknowns."""
+    known = {*all_symbols(dae.indexed, dae.reduced.known), *dae.table.symbols, dae.flat.time.name()}
+    rows = [n for name in outputs for n in dae.expand(name)]
+    if all(leaf.name() in known for n in rows for leaf in ca.symvar(dae.expression(n))):
+        return dae
+    found = (*dae.settings["find"], *(n for n in outputs if split_derivative(n)[1]))
+    return retranslate(replace(dae, settings={**dae.settings, "find": found}), dae.flat)
+
+
+def _rate(dae: Dae, state: str) -> ca.SX:
+    base, order = split_derivative(state)
+    return dae.reduced.chains.sx(base, order + 1)
+
+
+def _checked(dae: Dae, at: Mapping[str, Any]) -> dict[str, float]:
+    scalars = given_scalars(dae, at)
+    for name in scalars:
+        if name in dae.table.symbols:
+            raise ModelError(f"at: {name} is a parameter of {dae.name}; give it in parameters=")
+    return scalars
+
+
+def _completed(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
+    """Numbers of all symbols at the point that `Dae.evaluate` completes."""
+    _checked(dae, at)
+    found = dae.evaluate(at)
+    values = dict(dae.start) | {dae.flat.time.name(): float(at.get(dae.flat.time.name(), 0.0))}
+    return values | {n: float(found[n]) for n in all_symbols(dae.indexed, dae.reduced.known) if n in found}
+
+
+def _steady(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
+    """Numbers of all symbols at a point where every derivative is zero.
+
+    The equations as they were before differentiation are enough: at rest their derivatives hold too.
+    """
+    symbols = all_symbols(dae.indexed, dae.reduced.known)
+    values = dict(dae.start)
+    values.update((n, 0.0) for n in symbols if split_derivative(n)[1])
+    held = _hold(dae, _checked(dae, at), values)
+    still = {dae.reduced.chains.named(n): 0.0 for n in symbols if split_derivative(n)[1]}
+    residuals = [dae.indexed.residuals[i, 0] for i in range(len(dae.indexed.counts))]
+    if still and residuals:
+        rest = ca.vertcat(*residuals)
+        residuals = ca.substitute(rest, ca.vertcat(*still), ca.DM(list(still.values()))).elements()
+    equations = tuple(e.name for e in dae.reduced.equations)
+    started = frozenset(dae.settings.get("started", ()))
+    free = tuple(n for n in dae.known if n not in held)
+    title = f"steady state of {dae.name}"
+    failures: list[InitializationError] = []
+    for unknowns in (tuple(dae.indexed.orders), (*dae.indexed.orders, *free)):
+        level = Level(tuple(residuals), equations, unknowns)
+        try:
+            return solve_levels([level], values, held=held, started=started, title=title)
+        except InitializationError as error:
+            failures.append(error)
+    raise InitializationError(
+        f"{failures[-1]}. Every derivative is zero there, and {', '.join(at) or 'nothing'} held: hold less in at=, start "
+        "nearer to a point of rest, or linearize about a motion with steady=False"
+    )
+
+
+def _hold(dae: Dae, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
+    """Enter given values; names of the symbols that they fix."""
+    held: set[str] = set()
+    for name, number in scalars.items():
+        base, order = split_derivative(name)
+        if name == dae.flat.time.name():
+            values[name] = number
+            continue
+        if base not in dae.reduced.aliases:
+            raise ModelError(f"at: {name} follows from other variables of {dae.name}; give those")
+        alias = dae.reduced.aliases[base]
+        offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
+        symbol = None if alias.root is None else derivative_name(alias.root, alias.order + order)
+        moving = symbol is not None and split_derivative(symbol)[1] > 0
+        value = (number - offset) / alias.factor if symbol else number - offset
+        if (moving or symbol is None) and abs(value) > 1e-9 * max(1.0, abs(number)):
+            raise InitializationError(
+                f"at: {name} is {number:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
+            )
+        if symbol is not None and not moving:
+            values[symbol] = value
+            held.add(symbol)
+    return frozenset(held)
+
+
+class _Slopes:
+    """All equations of a model, linear at a point, solved for what is no state."""
+
+    def __init__(self, dae: Dae, values: Mapping[str, float]):
+        self.dae, self.values = dae, values
+        states = set(dae.choice.states)
+        chains = dae.reduced.chains
+        symbols = all_symbols(dae.indexed, dae.reduced.known)
+        self.inner = [n for n in dae.indexed.unknown_symbols() if n not in states]
+        self.driving = [
+            n for n in symbols if split_derivative(n)[0] in dae.reduced.known and n not in dae.known
+        ]
+        self.x = _column([chains.named(n) for n in dae.choice.states])
+        self.y = _column([chains.named(n) for n in self.inner])
+        self.u = _column([*(chains.sx(n) for n in dae.known), *(chains.named(n) for n in self.driving)])
+        self.keys = list(dae.indexed.residuals)
+        residuals = _column([dae.indexed.residuals[k] for k in self.keys])
+        R_x, R_y, R_u = (self._numbers(ca.jacobian(residuals, v)) for v in (self.x, self.y, self.u))
+        self.matrix, rows, columns = _scaled(R_y, np.hstack([R_x, R_y, R_u]))
+        self.condition = _condition(self.matrix)
+        right = np.hstack([R_x, R_u]) / rows[:, None]
+        self.rates = -_solve(self.matrix, right) / columns[:, None] if self.condition < SINGULAR else None
+
+    def _numbers(self, matrix: ca.SX) -> np.ndarray:
+        leaves = ca.symvar(matrix)
+        function = ca.Function("slopes", [ca.vertcat(*leaves)], [ca.densify(matrix)])
+        found = np.array(function(ca.DM([self.values[leaf.name()] for leaf in leaves]))).reshape(matrix.shape)
+        if not np.all(np.isfinite(found)):
+            raise StructureError(
+                f"{self.dae.name}: the derivatives of its equations are not finite at the operating point; choose a point "
+                "beside it"
+            )
+        return found
+
+    def require_regular(self) -> None:
+        """StructureError where the algebraic equations determine nothing."""
+        if self.rates is not None:
+            return
+        left, _, right = np.linalg.svd(self.matrix)
+        weak = [self.dae.equation_name(self.keys[i]) for i in _largest(left[:, -1])]
+        free = [self.inner[j] for j in _largest(right[-1])]
+        raise StructureError(
+            f"{self.dae.name}: its equations are singular at the operating point: {'; '.join(weak)} do not determine "
+            f"{', '.join(free)}. Expected regular algebraic equations: choose a point beside it"
+        )
+
+    def of(self, expressions: Sequence[ca.SX], rows: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of expressions by the states and by the inputs; StructureError where inputs' rates enter."""
+        n, m = self.x.numel(), len(self.dae.known)
+        vector = _column(list(expressions))
+        direct, through = ca.jacobian(vector, ca.vertcat(self.x, self.u)), ca.jacobian(vector, self.y)
+        assert self.rates is not None
+        total = self._numbers(direct) + self._numbers(through) @ self.rates
+        extra = np.abs(total[:, n + m :])
+        if extra.size and np.max(extra) > 1e-9 * max(1.0, float(np.max(np.abs(total)))):
+            i, j = divmod(int(np.argmax(extra)), extra.shape[1])
+            raise StructureError(
+                f"{self.dae.name}: {rows[i]} depends on {self.driving[j]}, the derivative of an input, which A, B, C, D "
+                "cannot say; pass the input through a filter, or translate with another given="
+            )
+        return total[:, :n], total[:, n : n + m]
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+
+def _scaled(matrix: np.ndarray, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The matrix with rows, then columns, brought to about size one, and the divisors; units count little then.
+
+    whole: the same rows with all columns: a row that hangs on the states alone must not be blown up.
+    """
+    if matrix.size == 0:
+        return matrix, np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    rows = np.abs(whole).max(axis=1)
+    rows[rows == 0] = 1.0
+    inside = matrix / rows[:, None]
+    columns = np.maximum(np.abs(inside).max(axis=0), LEAST_COLUMN)
+    return inside / columns, rows, columns
+
+
+def _condition(matrix: np.ndarray) -> float:
+    return float(np.linalg.cond(matrix)) if matrix.size else 1.0
+
+
+def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return np.linalg.solve(matrix, right) if matrix.size else right
+
+
+def _largest(shares: np.ndarray) -> list[int]:
+    sizes = np.abs(shares)
+    return [int(i) for i in np.argsort(-sizes)[:4] if sizes[i] > 0.3 * sizes.max()]

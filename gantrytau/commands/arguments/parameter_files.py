@@ -1,0 +1,102 @@
+"""TOML files of parameters, as `gantrytau calibrate` writes them and `--set FILE.toml` reads them.
+
+They hold modifications of a model: `GantryTau(prototypes.L1, **tomllib.loads(text))` is the robot with these values,
+and so is `GantryTau(L1)` with `--set FILE.toml` on the command line.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gantrytau.commands.printing.reporting import CommandError
+
+SUFFIX = ".toml"
+OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
+
+
+def read(option: str, file: Path) -> dict[str, Any]:
+    """The numbers of a file by their full names, as `arms[0].length`; CommandError if it cannot be read as TOML."""
+    table = read_toml(option, file)
+    found: dict[str, Any] = {}
+    for name, value in _leaves("", table):
+        if not _numeric(value):
+            raise CommandError(f"{option} {file}: found {name} = {value!r}, expected a number or a vector")
+        found[name] = value
+    if not found:
+        raise CommandError(f"{option} {file}: found no values, expected some, as m = 2.5")
+    return found
+
+
+def read_toml(option: str, file: Path) -> dict[str, Any]:
+    """A file as TOML; CommandError, which begins with the option, if that is not possible."""
+    where = f"{option} {file}".strip()
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise CommandError(f"{where}: there is no such file; check its path") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise CommandError(
+            f'{where}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
+        ) from error
+
+
+def prototype_of(file: Path) -> str | None:
+    """The prototype that a file says its values belong to, in its first line, as `# Parameters of GantryTau(L1)`."""
+    with file.open(encoding="utf-8-sig") as opened:
+        found = re.fullmatch(rf"# {OF}\S+\((\w+)\)\s*", opened.readline())
+    return found[1] if found else None
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _leaves(f"{name}.{key}" if name else key, part)
+    elif isinstance(value, list) and any(isinstance(part, Mapping) for part in value):
+        for k, part in enumerate(value):
+            yield from _leaves(f"{name}[{k}]", part)
+    else:
+        yield name, value
+
+
+def _numeric(value: Any) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(_numeric(part) for part in value)
+    return isinstance(value, (bool, int, float))
+
+
+def text(modifications: Mapping[str, Any], heading: str) -> str:
+    """A file of nested modifications, numbers to the last digit; heading: its first lines, as comments."""
+    comment = "".join(f"# {line}".rstrip() + "\n" for line in heading.splitlines())
+    return comment + "".join(_tables("", modifications))
+
+
+def _tables(name: str, table: Mapping[str, Any]) -> Iterator[str]:
+    """The plain values of a table, then the tables in it, each under its full name."""
+    inner = {key: value for key, value in table.items() if _holds_tables(value)}
+    for key, value in table.items():
+        if key not in inner:
+            yield f"{key} = {_value(value)}\n"
+    for key, value in inner.items():
+        full = f"{name}.{key}" if name else key
+        parts = value if isinstance(value, Sequence) else [value]
+        heading = f"[[{full}]]" if isinstance(value, Sequence) else f"[{full}]"
+        for part in parts:
+            if isinstance(value, Sequence) or not all(map(_holds_tables, part.values())):
+                yield f"\n{heading}\n"
+            yield from _tables(full, part)
+
+
+def _holds_tables(value: Any) -> bool:
+    return isinstance(value, Mapping) or (
+        isinstance(value, (list, tuple)) and any(isinstance(part, Mapping) for part in value)
+    )
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple)) or getattr(value, "ndim", 0):
+        return f"[{', '.join(map(_value, value))}]"
+    return repr(float(value))

@@ -1,0 +1,69 @@
+"""A result that was saved before, read again: where the search for an optimum starts."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gantrytau.commands.printing.reporting import CommandError
+
+if TYPE_CHECKING:
+    from gantrytau.results.result import Result
+
+FORMATS = (".csv", ".nc")
+
+
+def read_result(file: Path) -> "Result":
+    """The variables of a CSV or netCDF file as `Result.save` writes it; CommandError for another one."""
+    from gantrytau.errors import ModelError
+    from gantrytau.results.result import Result
+
+    if file.suffix.lower() not in FORMATS:
+        raise CommandError(
+            f"--guess {file}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
+        )
+    if not file.is_file():
+        raise CommandError(f"--guess {file}: there is no such file; check its path")
+    try:
+        values = _csv(file) if file.suffix.lower() == ".csv" else _netcdf(file)
+        time = values.pop("time")
+        if time.size < 2 or not np.ptp(time) > 0:
+            raise CommandError(f"--guess {file}: found {time.size} times, expected a motion over some time")
+        return Result(time, values, title=file.name)
+    except KeyError as error:
+        raise CommandError(f"--guess {file}: found no {error}, expected a result over time") from error
+    except (OSError, ValueError, csv.Error, ModelError) as error:
+        raise CommandError(f"--guess {file}: cannot be read as a result ({error})") from error
+
+
+def _csv(file: Path) -> dict[str, Any]:
+    """Column by name, without its unit."""
+    with file.open(newline="", encoding="utf-8-sig") as opened:
+        header, *rows = [row for row in csv.reader(opened) if row] or [[]]
+    names = [head.rpartition(" [")[0] or head for head in header]
+    table = np.array(rows, dtype=float).reshape(len(rows), len(names))
+    return dict(zip(names, table.T, strict=True))
+
+
+def _netcdf(file: Path) -> dict[str, Any]:
+    """Scalar by name; vectors and matrices are written whole."""
+    try:
+        import xarray
+
+        with xarray.open_dataset(file, engine="h5netcdf") as opened:
+            values = {str(name): np.asarray(array.values, float) for name, array in opened.variables.items()}
+    except ImportError as error:
+        raise CommandError(
+            f"--guess {file}: netCDF needs what is not installed; pip install 'gantrytau[results]'"
+        ) from error
+    return dict(pair for name, array in values.items() for pair in _scalars(name, array))
+
+
+def _scalars(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """The elements of a vector or matrix over time, (times, ...), by the names that the model has for them."""
+    inside = name.rstrip(")")  # der(r) has the elements der(r[0]), der(r[1]), ...
+    for index in np.ndindex(*array.shape[1:]):
+        place = f"[{','.join(map(str, index))}]" if index else ""
+        yield f"{inside}{place}{name[len(inside) :]}", array[(slice(None), *index)]

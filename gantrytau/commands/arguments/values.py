@@ -1,0 +1,91 @@
+"""What stands behind `name=` on the command line: numbers, vectors, columns of CSV files."""
+
+import ast
+import csv
+from pathlib import Path
+from typing import Any
+
+from gantrytau.commands.printing.reporting import CommandError
+from gantrytau.errors import did_you_mean
+
+
+def split(option: str, text: str) -> tuple[str, str]:
+    """The name and the value of `name=value`; CommandError if it has another form."""
+    name, sign, value = text.partition("=")
+    if not (sign and name.strip() and value.strip()):
+        raise CommandError(f"{option} {text}: expected NAME=VALUE, as {option} m=2.5")
+    return name.strip(), value.strip()
+
+
+def number(option: str, name: str, text: str) -> Any:
+    """A number, a truth value or a vector such as `[1, 2, 3]`; CommandError for all else."""
+    try:
+        value = {"true": True, "false": False}.get(text.lower())
+        value = ast.literal_eval(text) if value is None else value
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        value = None
+    if isinstance(value, tuple):
+        value = list(value)
+    if value is None or not _numeric(value):
+        raise CommandError(
+            f"{option} {name}={text}: expected a number as 2.5, a vector as '[1, 2, 3]', true or false"
+        )
+    return value
+
+
+def _numeric(value: Any) -> bool:
+    if isinstance(value, (list, tuple)):
+        return len(value) > 0 and all(_numeric(item) for item in value)
+    return isinstance(value, (bool, int, float))
+
+
+def signal(text: str) -> tuple[str, Any]:
+    """The name and the value of `--input`: a number, or samples (times, values) from a column of a CSV file.
+
+    text: `name=value`, `name=file.csv:column`, or `name=file.csv` where the column has the name of the input.
+    """
+    name, value = split("--input", text)
+    path, dot, column = value.rpartition(".csv")
+    if dot and (not column or column.startswith(":")):
+        return name, samples(Path(path + dot), column.removeprefix(":") or name)
+    return name, number("--input", name, value)
+
+
+def samples(file: Path, column: str) -> tuple[list[float], list[float]]:
+    """Times in s and values of a column of a CSV file with a header; `name [unit]` answers to `name` too."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as opened:
+            rows = [row for row in csv.reader(opened) if row]
+    except FileNotFoundError:
+        raise CommandError(f"{file}: there is no such file; check the path of --input") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise CommandError(f"{file}: cannot be read as CSV ({error})") from error
+    if len(rows) < 2:
+        raise CommandError(f"{file}: found {len(rows)} rows, expected a header and a row for each time")
+    header = [head.strip() for head in rows[0]]
+    places = {head.rpartition(" [")[0] or head: place for place, head in enumerate(header)}
+    places |= {head: place for place, head in enumerate(header)}
+    for wanted in ("time", column):
+        if wanted not in places:
+            raise CommandError(
+                f"{file} has no column '{wanted}'{did_you_mean(wanted, header)} "
+                "A file of samples has a header and a column 'time' in s"
+            )
+    try:
+        table = [[float(row[places[name]]) for name in ("time", column)] for row in rows[1:]]
+    except (ValueError, IndexError):
+        raise CommandError(f"{file}: {_bad_row(rows, places['time'], places[column])}") from None
+    return [time for time, _ in table], [value for _, value in table]
+
+
+def _bad_row(rows: list[list[str]], *places: int) -> str:
+    """Words for the first row that has no number where one is needed."""
+    for line, row in enumerate(rows[1:], start=2):
+        for place in places:
+            try:
+                float(row[place])
+            except IndexError:
+                return f"row {line} ends before column '{rows[0][place]}'; complete or remove it"
+            except ValueError:
+                return f"row {line}, column '{rows[0][place]}': found '{row[place]}', expected a number"
+    raise AssertionError("every row has its numbers")

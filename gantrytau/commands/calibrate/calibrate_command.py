@@ -1,0 +1,181 @@
+"""`gantrytau calibrate`: its argument says whether a measurement is planned or made use of."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gantrytau.commands.arguments import parameter_files
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
+from gantrytau.commands.calibrate import calibration_files as results
+from gantrytau.commands.calibrate import outcome as finishing
+from gantrytau.commands.calibrate import plan_command as planning
+from gantrytau.commands.calibrate.calibration_options import policy, rail_files
+from gantrytau.commands.calibrate.cell_example import EXAMPLES
+from gantrytau.commands.calibrate.cell_example import example as cell_of
+from gantrytau.commands.calibrate.measured_plan import Planned
+from gantrytau.commands.calibrate.measurement_file import Measured
+from gantrytau.commands.calibrate.outcome import Choice
+from gantrytau.commands.printing.reporting import CommandError, reporting
+
+Source = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="FILE",
+        help="Measured poses, as measurements.csv with the header q1,q2,...,x,y,z[,qw,qx,qy,qz] in m and rad; or a cell to "
+        "be planned, as cell.toml.",
+        show_default=False,
+    ),
+]
+RobotName = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        metavar="MODEL",
+        help="The robot with its nominal values, named as for the other commands: 'GantryTau(L1)', robot.py:Robot.",
+        show_default=False,
+    ),
+]
+Rails = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILES",
+        help="Measured guideways for models 2, 4 and 5: a CSV file q,x,y,z for each, separated by commas.",
+        show_default=False,
+    ),
+]
+ErrorModel = Annotated[
+    str | None,
+    typer.Option(
+        metavar="parallel|1..5",
+        help="Error model; 1 to 5 are those of thesis Table 5.2.",
+        show_default="straight guideways, each with its direction",
+    ),
+]
+Prior = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME=DEVIATION,...",
+        help="How well nominal values are known, as plate_offset=0.001 in m.",
+        show_default=False,
+    ),
+]
+Constraints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--constraint",
+        metavar="NAME=VALUE",
+        help="What numbers keep, with --method ipopt: 'arms[0].length=2.05', limits as 'arms[0].length=[2.0,2.1]', "
+        "'arms[1].links[0].length=arms[1].links[1].length', or '|arms[0].direction|=1' of a vector's length. Repeatable.",
+        show_default=False,
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(help="Folder for what is written.", show_default="beside the file, with its name"),
+]
+
+
+def calibrate(
+    file: Source = None,
+    robot: RobotName = None,
+    rails: Rails = None,
+    model: ErrorModel = None,
+    method: Annotated[str, typer.Option(metavar="gauss-newton|ipopt", help="How to solve.")] = "gauss-newton",
+    start: Annotated[
+        str, typer.Option(metavar="nominal|linear", help="Where to start; linear needs no nominal values.")
+    ] = "nominal",
+    orientation: Annotated[
+        str, typer.Option(metavar="local|unit|free", help="How quaternions of turntables are free.")
+    ] = "local",
+    prior: Prior = None,
+    constraint: Constraints = None,
+    robust: Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")] = False,
+    holdout: Annotated[
+        str | None,
+        typer.Option(
+            metavar="second|none",
+            help="Which poses validate: every second, or those of the fit.",
+            show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
+        ),
+    ] = None,
+    output: Output = None,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example",
+            help="Print the file of a cell, to begin with: --example l1, --example six (links), --example f1 (turntables), "
+            "or of the --robot.",
+        ),
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Calibrate a robot: plan what to measure (cell.toml), then find its parameters (measurements.csv).
+
+    cell.toml says what the tape measure knows of robot, obstacles and device: poses that are safe and visible, a robot
+    program in a collision-free order, and a verdict go into a folder. Interrupted, the same command goes on where it was.
+
+    measurements.csv gives the parameters, how sure they are, and the error that is left: a report (HTML and JSON), and
+    calibrated.toml, which all commands take: --set calibrated.toml. The plan in its folder, or --robot, says of which robot.
+    """
+    with reporting(json, source_of(robot) if robot else None):
+        if example:
+            typer.echo(cell_of(None if file is None else str(file), robot), nl=False)
+            return
+        if file is None:
+            raise CommandError(
+                "found no FILE, expected measurements, gantrytau calibrate measurements.csv, or a cell to be planned: "
+                "gantrytau calibrate --example > cell.toml"
+            )
+        if file.suffix.lower() == parameter_files.SUFFIX:
+            others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior)
+            _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
+            planning.plan(file, output, json)
+            return
+        if not file.is_file():
+            raise CommandError(f"{file}: there is no such file{_kinds(file)}")
+        how = policy(model, method, start, orientation, holdout or "second", prior, constraint or (), robust)
+        folder = output or results.folder_beside(file)
+        results.rehearse(folder)
+        choice = _robot(file, robot, prototype, set_ or ())
+        measured = Measured.read(file, rail_files(rails))
+        finishing.finish(choice, measured, how, folder, validate=holdout is None, json=json)
+
+
+def _kinds(file: Path) -> str:
+    """What may have been meant by a file that is not there."""
+    known = str(file).lower() in EXAMPLES
+    return f"; for a cell to begin with give --example {file}" if known else "; check its path"
+
+
+def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> Choice:
+    """The robot that is named, or that of the plan beside the measurements."""
+    if robot is not None:
+        chosen = build(robot, prototype, settings)
+        name = f"{chosen.name}({chosen.prototype})" if chosen.prototype else robot
+        return Choice(chosen.model, name, None)
+    planned = Planned.beside(file)
+    if planned is None:
+        raise CommandError(
+            f"{file}: found no plan beside it that says of which robot it is; name the robot with its nominal values, as "
+            f"gantrytau calibrate {file} --robot 'GantryTau(L1)'"
+        )
+    if settings or prototype:
+        raise CommandError(
+            f"{file}: the plan beside it says what the robot is ({planned.cell.name}); leave --set and --prototype out, "
+            "or give --robot"
+        )
+    return Choice(planned.cell.robot, planned.cell.name, planned)
+
+
+def _refuse_others(file: Path, options: dict[str, object]) -> None:
+    """CommandError for options that say what the file of a cell says."""
+    if given := [f"--{name}" for name, value in options.items() if value]:
+        raise CommandError(
+            f"{file} says what is planned, found {', '.join(given)} too; leave it out, or write it there"
+        )

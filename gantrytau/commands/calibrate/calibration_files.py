@@ -1,0 +1,106 @@
+"""What is kept of a calibration: the report, and the parameters in a file for `--set`. Written whole or not at all."""
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from gantrytau.commands.arguments import parameter_files
+from gantrytau.commands.printing.reporting import CommandError
+from gantrytau.errors import ModelError
+
+PARAMETERS = "calibrated.toml"
+REPORT = "report.html"
+GEOMETRY = ("length", "offset", "direction", "plate_offset", "orientation", "start", "r")
+
+
+def folder_beside(file: Path) -> Path:
+    """Where the results of a file go if no other folder is named."""
+    return file.with_name(f"{file.stem}-calibrated")
+
+
+def rehearse(folder: Path) -> None:
+    """CommandError if results cannot be written into a folder."""
+    if folder.exists() and not folder.is_dir():
+        raise CommandError(f"--output {folder}: found a file, expected a folder; name another place")
+    above = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.is_dir())
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise CommandError(
+            f"--output {folder}: no files can be written in {above}; name another place with --output"
+        )
+
+
+@contextmanager
+def whole(folder: Path) -> Iterator[Path]:
+    """A folder to write to, whose files take their places in `folder` at the end, or vanish on an error."""
+    partial = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}")
+    try:
+        partial.mkdir(parents=True)
+        yield partial
+        folder.mkdir(exist_ok=True)
+        for file in sorted(partial.iterdir()):
+            os.replace(file, folder / file.name)
+    except OSError as error:
+        raise CommandError(
+            f"Cannot write into {folder}: {error.strerror}; name another place with --output"
+        ) from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> list[str]:
+    """Report and parameters; the files written. robot: as the command line names it; source: the measurements; about: what
+    the report says besides.
+    """
+    from gantrytau_optimica.calibration.report.report import write_report
+
+    with whole(folder) as partial:
+        write_report(found, partial / REPORT, about)
+        robot_values = modifications(found)
+        if robot_values is not None:
+            heading = _heading(found, robot, source, folder / PARAMETERS, about.verdict)
+            (partial / PARAMETERS).write_text(parameter_files.text(robot_values, heading), encoding="utf-8")
+        names = sorted(file.name for file in partial.iterdir())
+    if robot_values is None:
+        (folder / PARAMETERS).unlink(missing_ok=True)  # of an earlier model, which these results are not
+    return [str(folder / name) for name in names]
+
+
+def _heading(found: Any, robot: str, source: Path, file: Path, verdict: str) -> str:
+    said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses"
+    return (
+        f"{parameter_files.OF}{robot}\n"
+        f"Calibrated with {source.name}: lengths and offsets in m.\n"
+        f"{said}.\n"
+        f"On the command line: gantrytau simulate '{robot}' --set {file.name}\n"
+        f'In Python: robot.modified(tomllib.loads(Path("{file.name}").read_text()))'
+    )
+
+
+def modifications(found: Any) -> dict[str, Any] | None:
+    """The calibrated geometry as modifications of the robot; None of models that no robot can hold."""
+    try:
+        robot = found.robot
+    except ModelError:
+        return None
+    return _geometry({k: v for k, v in robot.modifications.items() if k in ("arms", "turntables", "tool")})
+
+
+def _geometry(part: Any) -> Any:
+    """What of nested modifications is geometry."""
+    if isinstance(part, Mapping):
+        kept = {
+            key: value if key in GEOMETRY and not isinstance(value, Mapping) else _geometry(value)
+            for key, value in part.items()
+            if key in GEOMETRY or key in ("arms", "links", "turntables", "tool")
+        }
+        return {key: value for key, value in kept.items() if not _empty(value)}
+    if isinstance(part, (list, tuple)) and any(isinstance(one, Mapping) for one in part):
+        return [_geometry(one) for one in part]
+    return part
+
+
+def _empty(value: Any) -> bool:
+    return isinstance(value, Mapping) and not value

@@ -1,0 +1,217 @@
+"""`gantrytau fmu export`: a model as an FMU."""
+
+import math
+import time
+import warnings
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.model_choice import Chosen, build
+from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.fmu.fmu_info import counted
+from gantrytau.commands.fmu.fmu_words import speaking_of_options
+from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting
+from gantrytau.errors import ModelError, did_you_mean
+
+INTERFACES = {
+    "both": ("model-exchange", "co-simulation"),
+    "me": ("model-exchange",),
+    "cs": ("co-simulation",),
+}
+PLATFORMS = tuple(
+    f"{processor}-{system}"
+    for system in ("linux", "windows", "darwin")
+    for processor in ("x86_64", "aarch64")
+)
+VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
+SOLVERS = ("dopri5", "rodas4")
+
+
+def export(
+    model: ModelName,
+    to: Annotated[
+        Path | None, typer.Option(help="The file to write.", show_default="the model's name.fmu")
+    ] = None,
+    fmi: Annotated[str, typer.Option("--fmi", metavar="2.0|3.0", help="Version of the standard.")] = "3.0",
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES",
+            help=f"'native' for this machine, 'all', or {', '.join(PLATFORMS)}, separated by commas; others than "
+            "this machine need the extra 'cross'.",
+            show_default="native",
+        ),
+    ] = None,
+    solver: Annotated[
+        str, typer.Option(metavar="dopri5|rodas4", help="Of Co-Simulation; rodas4 for stiff models.")
+    ] = "dopri5",
+    interface: Annotated[
+        str, typer.Option(metavar="me|cs|both", help="Model Exchange, Co-Simulation, or both.")
+    ] = "both",
+    given: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES",
+            help="The inputs of the FMU, separated by commas, instead of the model's.",
+            show_default=False,
+        ),
+    ] = None,
+    find: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAMES", help="Its outputs, separated by commas.", show_default="all variables"),
+    ] = None,
+    states: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES", help="Preferred states, separated by commas.", show_default="chosen by gantrytau"
+        ),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Relative, of Co-Simulation.")] = 1e-6,
+    stop: Annotated[
+        float | None, typer.Option(help="Default experiment: its end, in s.", show_default="1.0")
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(help="Default experiment: step of Co-Simulation, in s.", show_default="0.004"),
+    ] = None,
+    description: Annotated[
+        str, typer.Option(metavar="TEXT", help="What the file says of the model.", show_default="the model's")
+    ] = "",
+    author: Annotated[
+        str, typer.Option(metavar="TEXT", help="Who wrote the model.", show_default=False)
+    ] = "",
+    copyright_: Annotated[
+        str, typer.Option("--copyright", metavar="TEXT", help="Whose the model is.", show_default=False)
+    ] = "",
+    license_: Annotated[
+        str,
+        typer.Option(
+            "--license", metavar="TEXT", help="Licence of the model, as BSD-3-Clause.", show_default=False
+        ),
+    ] = "",
+    model_version: Annotated[
+        str, typer.Option(metavar="TEXT", help="Version of the model.", show_default=False)
+    ] = "",
+    no_sources: Annotated[
+        bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")
+    ] = False,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Write a model as an FMU, for Simulink, Dymola, OpenModelica, or a machine without Python.
+
+    Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
+    inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
+    """
+    with reporting(json, source_of(model)), speaking_of_options():
+        policy: dict[str, Any] = {
+            "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
+            "interfaces": INTERFACES.get(interface) or _unknown("--interface", interface, INTERFACES),
+            "solver": solver if solver in SOLVERS else _unknown("--solver", solver, SOLVERS),
+            "tolerance": tolerance,
+            "platforms": listed(platforms) or ("native",),
+            "given": listed(given),
+            "find": listed(find),
+            "states": listed(states) or None,
+            "sources": not no_sources,
+            "description": description,
+            "author": author,
+            "copyright": copyright_,
+            "license": license_,
+            "version": model_version,
+            "experiment": _experiment(stop, step, tolerance),
+        }
+        chosen = build(model, prototype, set_ or ())
+        file = to or Path(f"{chosen.name}.fmu")
+        _check(file)
+        begin = time.perf_counter()
+        told = _exported(chosen, file, policy)
+        _show(chosen, file, time.perf_counter() - begin, told, json)
+
+
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> Any:
+    """The default experiment (`Experiment`), None if nothing is said of it; CommandError for times that are none."""
+    if stop is None and step is None:
+        return None
+    from gantrytau_fmu import Experiment
+
+    if stop is not None and not 0 < stop < math.inf:
+        raise CommandError(f"--stop {stop:g}: expected a time above 0, in s")
+    stop = Experiment.stop if stop is None else stop
+    if step is not None and not 0 < step <= stop:
+        raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
+    step = min(Experiment.step, stop) if step is None else step
+    return Experiment(stop=stop, step=step, tolerance=tolerance)
+
+
+def _unknown(option: str, found: str, expected: Any) -> Any:
+    raise CommandError(f"{option} {found}: expected {' or '.join(expected)}{_proposed(found, expected)}")
+
+
+def _proposed(found: str, expected: Any) -> str:
+    """The nearest word as a question; nothing if none is near, as the message lists all."""
+    words = did_you_mean(found, expected)
+    return words if "did you mean" in words else ""
+
+
+def _check(file: Path) -> None:
+    """Find out before the work whether the file can be written; CommandError if not."""
+    from gantrytau_fmu.building.archive import check_target
+
+    try:
+        check_target(file)
+    except ModelError as error:
+        raise CommandError(f"--to {error}") from error
+
+
+def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
+    """Write the FMU; what its writer warns of."""
+    from gantrytau_fmu import export_fmu
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        platforms = ", ".join(policy["platforms"])
+        with busy(f"exporting {chosen.name} for {platforms}"):
+            export_fmu(chosen.model, file, **policy)
+    return list(dict.fromkeys(str(warning.message) for warning in caught))
+
+
+def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: bool) -> None:
+    """The file, what is in it, and how long it took."""
+    from gantrytau_fmu.reading.read_fmu import read_fmu
+
+    fmu = read_fmu(file)
+    if json:
+        found = {
+            "model": chosen.name,
+            "prototype": chosen.prototype,
+            "file": str(file),
+            "size": fmu.size,
+            "fmi": fmu.fmi,
+            "platforms": fmu.platforms,
+            "inputs": fmu.inputs,
+            "outputs": fmu.outputs,
+            "parameters": fmu.parameters,
+            "states": fmu.states,
+            "variables": len(fmu.variables),
+            "seconds": seconds,
+            "warnings": told,
+        }
+        typer.echo(as_json(found))
+        return
+    for words in told:
+        note(f"Note: {words}")
+    kinds = (
+        ("input", fmu.inputs),
+        ("output", fmu.outputs),
+        ("parameter", fmu.parameters),
+        ("state", fmu.states),
+    )
+    counts = ", ".join(counted(len(names), word) for word, names in kinds)
+    typer.echo(f"{chosen.name}, FMI {fmu.fmi}: {counts}, {counted(len(fmu.variables), 'variable')} in all")
+    typer.echo(f"Platforms: {', '.join(fmu.platforms) or 'none, sources only'}")
+    typer.echo(f"Written: {file} ({fmu.size / 1000:,.0f} kB) in {seconds:.2f} s")

@@ -1,0 +1,68 @@
+"""`gantrytau fmu info`: what an FMU is, without loading anything of it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gantrytau.commands.arguments.options import Json
+from gantrytau.commands.printing.reporting import CommandError, as_json, reporting
+
+FmuFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE", help="An FMU, as robot.fmu, or a system of FMUs (.ssp).", show_default=False
+    ),
+]
+
+
+def info(
+    file: FmuFile,
+    every: Annotated[
+        bool, typer.Option("--all", help="List all variables, not only the first of a kind.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Describe an FMU of any tool: version, interfaces, platforms, inputs, outputs, parameters. Or a system (.ssp).
+
+    Only its files are read, and only if they are harmless: its binaries are not loaded.
+    """
+    with reporting(json):
+        present(file)
+        found = _read(file)
+        if json:
+            typer.echo(as_json(found.as_dict()))
+            return
+        words = found.table(None) if every else str(found)
+        typer.echo(words)
+        if "\n  ... and " in words:
+            typer.echo("\n--all lists all of them")
+
+
+def _read(file: Path) -> Any:
+    """The description of an FMU, or of a system."""
+    if is_system(file):
+        from gantrytau_fmu.systems.overview import read_system
+
+        return read_system(file)
+    from gantrytau_fmu.reading.read_fmu import read_fmu
+
+    return read_fmu(file)
+
+
+def is_system(file: Path) -> bool:
+    """Whether a file is a system of FMUs, by its name."""
+    return file.suffix.lower() == ".ssp"
+
+
+def present(file: Path) -> None:
+    """CommandError if there is no such file."""
+    from gantrytau_fmu.reading.safety import no_file
+
+    if not file.is_file():
+        raise CommandError(no_file(file))
+
+
+def counted(count: int, word: str) -> str:
+    """`no errors`, `1 error`, `2 errors`."""
+    return f"{count or 'no'} {word}{'' if count == 1 else 's'}"

@@ -1,0 +1,212 @@
+"""`gantrytau fmu run`: an FMU, or a system of them, over time."""
+
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from gantrytau.commands.arguments.options import Json, Plotted, Saved, To, listed
+from gantrytau.commands.arguments.values import number, signal, split
+from gantrytau.commands.fmu.fmu_info import is_system, present
+from gantrytau.commands.fmu.fmu_words import in_options, speaking_of_options
+from gantrytau.commands.printing import picture_output as pictures
+from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing.reporting import (
+    FAULT,
+    INTERRUPTED,
+    CommandError,
+    as_json,
+    fail,
+    note,
+    reporting,
+)
+from gantrytau.errors import SolveError, did_you_mean
+
+if TYPE_CHECKING:
+    from gantrytau.results.result import Result
+
+ORDERS = ("gauss-seidel", "jacobi", "iterate")
+SHOWN = 24  # variables in the table; files and JSON have all
+
+
+def run(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="An FMU, or a system of FMUs (.ssp).", show_default=False),
+    ],
+    stop: Annotated[
+        float | None, typer.Option(help="Time at which to stop, in s.", show_default="that of the file")
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            help="Communication step, in s; of the outputs with --me.", show_default="that of the file"
+        ),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Set a parameter or a start value, in a system robot.m=2.5. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
+            "as f=forces.csv:f. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    order: Annotated[
+        str | None,
+        typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.", show_default="gauss-seidel"),
+    ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Handed to the FMUs, or to CVode.", show_default=False)
+    ] = None,
+    me: Annotated[bool, typer.Option("--me", help="Integrate Model Exchange with CVode.")] = False,
+    isolate: Annotated[
+        bool, typer.Option("--isolate", help="Run each FMU in a process of its own: a crash is an error.")
+    ] = False,
+    output: Saved = None,
+    plot: Plotted = None,
+    to: To = None,
+    json: Json = False,
+) -> None:
+    """Run an FMU of any tool, or a system of FMUs, and print where its variables begin and end.
+
+    Its binaries are code: trust them. Ctrl-C stops early; what was computed until then is saved to --output.
+    """
+    with reporting(json), speaking_of_options():
+        present(file)
+        _check(file, order, me, isolate)
+        drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
+        start = dict(_setting(text) for text in set_ or ())
+        saving.rehearse(output)
+        place = pictures.place(drawn, to)
+        policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
+        told: list[str] = []
+        try:
+            with _noted(told, json):
+                result = _result(file, policy, order=order or ORDERS[0], me=me, isolate=isolate)
+        except SolveError as error:
+            _stop(error, output, json)
+        files = saving.save(result, output)
+        if place:
+            files += pictures.draw(result, drawn, place)
+        summary = {
+            "file": str(file),
+            "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+            "final": {name: result.final(name) for name in result.names},
+            "files": files,
+            "warnings": told,
+        }
+        if json:
+            typer.echo(as_json(summary))
+        else:
+            _show(summary, result)
+
+
+def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
+    """CommandError for options that do not go together."""
+    if order is not None and order not in ORDERS:
+        near = did_you_mean(order, ORDERS)
+        raise CommandError(
+            f"--order {order}: expected {', '.join(ORDERS[:-1])} or {ORDERS[-1]}{near if 'did you' in near else ''}"
+        )
+    if is_system(file):
+        if me:
+            raise CommandError("--me: a system is simulated by Co-Simulation; leave it out")
+        return
+    if order is not None:
+        raise CommandError(f"--order {order}: found one FMU, expected a system (.ssp); leave it out")
+    if me and isolate:
+        raise CommandError(
+            "--me --isolate: Model Exchange runs in this process, expected one of them; leave the other out"
+        )
+
+
+@contextmanager
+def _noted(told: list[str], json: bool) -> Iterator[None]:
+    """Inputs that nothing drives become a line that is printed at once, or with the JSON."""
+    from gantrytau_fmu.systems.connected_system import UnconnectedInputs
+
+    def hear(message: Warning | str, kind: type[Warning], *place: Any, **more: Any) -> None:
+        if not issubclass(kind, UnconnectedInputs):
+            show(message, kind, *place, **more)
+            return
+        told.append(in_options(str(message)))
+        if not json:
+            note(f"Note: {told[-1]}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UnconnectedInputs)
+        show, warnings.showwarning = warnings.showwarning, hear
+        yield
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, value = split("--set", text)
+    return name, number("--set", name, value)
+
+
+def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
+    if not is_system(file):
+        from gantrytau_fmu.systems.single import run_fmu
+
+        return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
+    from gantrytau_fmu.systems.cosimulate import cosimulate
+
+    chosen: Any = order
+    return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)
+
+
+def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
+    """Save what was found until it stopped, say so, and leave."""
+    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    message = str(error).partition(";")[0] if pressed else in_options(str(error))
+    files: list[str] = []
+    if output is not None and error.result is not None:
+        files = saving.save(error.result, output)
+        message += f"\nWhat was computed until then is in {output}"
+    elif pressed:
+        message += "; with --output its result would have been saved"
+    code = INTERRUPTED if pressed else FAULT
+    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
+
+
+def _show(summary: Mapping[str, Any], result: "Result") -> None:
+    """The first variables at both ends as a table; texts of the file are no markup."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    time = summary["time"]
+    typer.echo(
+        f"{summary['file']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
+        f"{len(result.names)} variables"
+    )
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("variable", no_wrap=True)
+    for heading in ("start", "end", "least", "greatest"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("unit")
+    for name in result.names[:SHOWN]:
+        values = result[name]
+        numbers = (values[0], values[-1], values.min(), values.max())
+        table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))
+    if result.names:
+        Console().print(table)
+    if len(result.names) > SHOWN:
+        typer.echo(f"and {len(result.names) - SHOWN} more; --output saves all")
+    for file in summary["files"]:
+        typer.echo(f"Written: {file}")

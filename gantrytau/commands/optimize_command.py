@@ -1,0 +1,184 @@
+"""`gantrytau optimize`: an optimal-control problem solved, its answer as figures, files and pictures."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
+from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
+from gantrytau.commands.arguments.saved_guesses import FORMATS, read_result
+from gantrytau.commands.printing import optimum_summary as answers
+from gantrytau.commands.printing import picture_output as pictures
+from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing.reporting import (
+    FAULT,
+    INTERRUPTED,
+    MISUSE,
+    CommandError,
+    as_json,
+    note,
+    reporting,
+)
+from gantrytau.errors import GantryTauError, SolveError, did_you_mean
+
+if TYPE_CHECKING:
+    from gantrytau.flattening.flat_model import FlatModel
+
+ProblemName = Annotated[
+    str,
+    typer.Argument(
+        metavar="PROBLEM",
+        help="A class that inherits from gantrytau_optimica.Optimization, as move.py:Fastest, "
+        "'move.py:Fastest(weight=0.01)' or package.module:Fastest; the file alone where it holds only one.",
+        show_default=False,
+    ),
+]
+
+
+def optimize(
+    problem: ProblemName,
+    elements: Annotated[int, typer.Option(min=1, help="Elements of the mesh.")] = 50,
+    points: Annotated[int, typer.Option(min=1, max=9, help="Collocation points in each element.")] = 3,
+    scheme: Annotated[str, typer.Option(metavar="radau|gauss", help="Kind of points.")] = "radau",
+    tolerance: Annotated[float, typer.Option(help="Of the solver.")] = 1e-8,
+    max_iterations: Annotated[int, typer.Option(min=1, help="After which the solver gives up.")] = 1000,
+    max_time: Annotated[float, typer.Option(help="In s, after which the solver gives up.")] = 300.0,
+    refine: Annotated[
+        float | None, typer.Option(help="Relative accuracy to refine the mesh to.", show_default=False)
+    ] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Number of first guesses to try.", show_default=False)
+    ] = None,
+    guess: Annotated[
+        Path | None,
+        typer.Option(help="Where the search starts: a result saved as .csv or .nc.", show_default=False),
+    ] = None,
+    plot: Plotted = None,
+    to: To = None,
+    save: Saved = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Solve an optimal-control problem, and print what was found and which limits it reaches.
+
+    Ctrl-C stops early; with --save what was reached until then is kept, and --guess goes on from there.
+    """
+    from gantrytau_optimica import Optimization
+
+    with reporting(json, source_of(problem)):
+        drawn = listed(plot)
+        place = pictures.place(drawn, to)
+        saving.rehearse(save)
+        policy: dict[str, Any] = dict(elements=elements, points=points, scheme=scheme, tolerance=tolerance)
+        policy |= dict(max_iterations=max_iterations, max_time=max_time)
+        policy |= {
+            name: value for name, value in (("refine", refine), ("starts", starts)) if value is not None
+        }
+        if guess is not None:
+            policy["guess"] = read_result(guess)
+        chosen = build(problem, prototype, set_ or (), Kind(Optimization, "problem", "move.py:Fastest"))
+        flat = _flat(chosen, drawn)
+        try:
+            optimum = _solved(chosen, quiet, policy)
+        except SolveError as error:
+            _leave(error, chosen, save, json)
+        files, wrong = _written(optimum, save, drawn, place)
+        if json:
+            found = answers.summary(chosen, optimum, files)
+            typer.echo(as_json({**found, "error": wrong} if wrong else found))
+        else:
+            answers.show(optimum, flat, files)
+        if wrong:
+            note(wrong)
+            raise typer.Exit(MISUSE)
+
+
+def _flat(chosen: Chosen, drawn: tuple[str, ...]) -> "FlatModel":
+    """The problem written out, which knows all names; CommandError for one to draw that it does not have."""
+    from gantrytau import flatten
+    from gantrytau.language.symbols import split_derivative
+
+    flat = flatten(chosen.model)
+    held = (*flat.variables, *flat.parameters, *flat.propagated)
+    names = {name: None for variable in held for name in (variable.name, *variable.elements)}
+    for name in drawn:
+        base, _ = split_derivative(name)
+        if base not in names and base != "time":
+            raise CommandError(f"--plot {name}: {chosen.name} has no '{base}'{did_you_mean(base, names)}")
+    return flat
+
+
+def _solved(chosen: Chosen, quiet: bool, policy: dict[str, Any]) -> Any:
+    """The optimum; SolveError if none is found."""
+    import gantrytau_optimica
+
+    model: Any = chosen.model
+    with _live(chosen.name, quiet) as progress:
+        return gantrytau_optimica.optimize(model, progress=progress, **policy)
+
+
+@contextmanager
+def _live(name: str, quiet: bool) -> Iterator[Callable[[int, float], None] | None]:
+    """A line on the terminal that follows the solver; none where nobody would see it."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    begin = time.perf_counter()
+    with Console(file=sys.stderr).status(Text(f"translating and building {name}")) as status:
+        yield lambda iteration, objective: status.update(
+            Text(
+                f"{name}: iteration {iteration}, objective {objective:.6g}, {time.perf_counter() - begin:.1f} s"
+            )
+        )
+
+
+def _written(
+    optimum: Any, save: Path | None, drawn: tuple[str, ...], place: str | None
+) -> tuple[list[str], str]:
+    """The files of a solution, and why some are not written, which does not cost the answer."""
+    files: list[str] = []
+    wrong: list[str] = []
+    try:
+        files += saving.save(optimum.result, save)
+    except GantryTauError as error:
+        wrong.append(str(error))
+    try:
+        files += pictures.draw(answers.selected(optimum, drawn), drawn, place) if place else []
+    except GantryTauError as error:
+        wrong.append(str(error))
+    return files, "\n".join(wrong)
+
+
+def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> NoReturn:
+    """Keep what was reached, say why there is no solution, and leave."""
+    optimum = error.optimum
+    if optimum is None:
+        raise error
+    pressed = optimum.status == "interrupted"
+    message, files = answers.in_options(str(error)), []
+    if save is not None and optimum.iterations > 0:
+        kept = save.with_name(f"{save.stem}.unfinished{save.suffix}")  # a solution saved before stays
+        try:
+            files = saving.save(optimum.result, kept)
+            message += f"\nWhat was reached until then is in {kept}"
+            if kept.suffix.lower() in FORMATS and (pressed or "limit reached" in optimum.status):
+                message += f"; --guess {kept} goes on from there"
+        except GantryTauError as wrong:
+            message += f"\nWhat was reached cannot be saved: {wrong}"
+    elif pressed:
+        message += "\nWith --save what was reached would have been kept"
+    if json:
+        typer.echo(as_json({**answers.summary(chosen, optimum, files), "error": message}))
+    note(message)
+    raise typer.Exit(INTERRUPTED if pressed else FAULT) from None

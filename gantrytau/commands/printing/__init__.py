@@ -1,0 +1,1 @@
+"""What commands answer: sentences, JSON, pictures, files."""

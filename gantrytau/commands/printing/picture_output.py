@@ -1,0 +1,65 @@
+"""Drawing a result on the command line: to a file, or in a window where there is a display."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gantrytau.commands.printing.reporting import CommandError, writable
+
+if TYPE_CHECKING:
+    from gantrytau.results.result import Result
+
+WINDOW = "window"
+
+
+def place(drawn: tuple[str, ...], to: str | None) -> str | None:
+    """Where to draw, by default in a window, or None if nothing is drawn; CommandError if that cannot be."""
+    if to is not None and not drawn:
+        raise CommandError(
+            f"--to {to}: found no names to draw, expected some; add --plot NAMES, or leave it out"
+        )
+    if not drawn:
+        return None
+    _rehearse(to or WINDOW)
+    return to or WINDOW
+
+
+def _rehearse(to: str) -> None:
+    """CommandError if there is no window to draw in, or no picture of that format or in that folder."""
+    import matplotlib
+
+    if to == WINDOW:
+        import matplotlib.pyplot as plt
+
+        from gantrytau.results.figures import has_windows
+
+        if not has_windows(plt.get_backend()):
+            raise CommandError(
+                f"--to window: no window can be opened here (Matplotlib draws with '{plt.get_backend()}'). "
+                "Write a picture with --to picture.png, or work where there is a display (ssh -X) "
+                "and a window toolkit is installed (pip install pyqt6)"
+            )
+        return
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    matplotlib.use("agg")  # a picture needs no display
+    file, formats = Path(to), FigureCanvasBase.get_supported_filetypes()
+    if file.suffix.removeprefix(".").lower() not in formats:
+        raise CommandError(
+            f"--to {to}: found the suffix '{file.suffix}', expected 'window' or a picture: "
+            f"{', '.join(f'.{name}' for name in sorted(formats))}"
+        )
+    if not file.parent.is_dir():
+        raise CommandError(f"--to {to}: the folder '{file.parent}' does not exist; create it first")
+
+
+def draw(result: "Result", names: tuple[str, ...], to: str) -> list[str]:
+    """Draw the variables; the files written."""
+    if to != WINDOW:
+        with writable(Path(to)):
+            result.plot(*names, file=to)
+        return [to]
+    import matplotlib.pyplot as plt
+
+    result.plot(*names)
+    plt.show()
+    return []

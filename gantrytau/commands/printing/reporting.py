@@ -1,0 +1,169 @@
+"""How commands speak: results and errors as sentences or as JSON, exit codes, lines of the user's own file."""
+
+import errno
+import math
+import os
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+from gantrytau.errors import GantryTauError
+from gantrytau.interruption import heeding_interrupts
+
+FAULT = 1  # exit code: the model has a fault, or its simulation stopped
+MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
+INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
+
+USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
+
+
+class CommandError(GantryTauError):
+    """The command was called with something that it cannot use."""
+
+
+class Commands(TyperGroup):
+    """All commands; an output that takes no more, as a full disk, ends them with a message instead of a traceback.
+
+    Arguments and options that do not exist or are missing are told as JSON where `--json` is among them.
+    """
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command, and see to it that all it printed has arrived."""
+        json = "--json" in [*getattr(ctx, "_protected_args", ()), *ctx.args]
+        try:
+            try:
+                with heeding_interrupts():
+                    return super().invoke(ctx)
+            finally:
+                if sys.stdout is not None:  # it may be closed
+                    sys.stdout.flush()
+        except USAGE_ERROR as error:
+            if not json:
+                raise
+            fail(error.format_message(), MISUSE, json)
+        except OSError as error:
+            if error.filename is not None or error.errno not in FULL:
+                raise
+            _drop_output()
+            note(f"Cannot write: {error.strerror}; make room, or send the output to another place")
+            raise typer.Exit(MISUSE) from None
+
+
+def _drop_output() -> None:
+    """Let what is left in the buffer of stdout vanish; Python would complain of it at its end."""
+    with suppress(OSError, ValueError, AttributeError):  # stdout need not be a file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def reporting(json: bool, source: Path | None = None) -> Iterator[None]:
+    """Errors inside become a message and an exit code instead of a traceback.
+
+    json: print `{"error": ...}`; source: the user's file, of which the lines that failed are shown.
+    An error that comes neither from the toolkit nor from `source` is a bug of the toolkit and passes.
+    """
+    try:
+        yield
+    except CommandError as error:
+        fail(str(error), MISUSE, json)
+    except GantryTauError as error:
+        place = "".join(f"\n  {line}" for line in places(error, source)[-1:])
+        fail(f"{error}{place}", FAULT, json, kind=type(error).__name__)
+    except KeyboardInterrupt:
+        fail("Interrupted; nothing was written", INTERRUPTED, json)
+    except (SystemExit, typer.Exit):
+        raise
+    except Exception as error:
+        lines = places(error, source)
+        if not lines:
+            raise
+        fail(in_words(error, lines), FAULT, json, kind=type(error).__name__)
+
+
+def fail(message: str, code: int, json: bool, **more: Any) -> NoReturn:
+    """Say what is wrong, on stdout as JSON or else on stderr, and leave with an exit code."""
+    if json:
+        typer.echo(as_json({"error": message, **more}))
+    else:
+        typer.echo(message, err=True)
+    raise typer.Exit(code) from None
+
+
+def note(message: str) -> None:
+    """Something worth knowing beside the output, on stderr."""
+    typer.echo(message, err=True)
+
+
+def as_json(value: Any) -> str:
+    """JSON text; numbers that are not finite become null, which JSON can say."""
+    import json
+
+    return json.dumps(_finite(value), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return value
+
+
+def places(error: BaseException | None, source: Path | None) -> list[str]:
+    """The lines of the user's file through which an error, or what caused it, came: `robot.py, line 3: ...`."""
+    found: list[str] = []
+    while error is not None and source is not None:
+        if isinstance(error, SyntaxError) and error.filename == str(source):
+            found.append(f"{source.name}, line {error.lineno}: {(error.text or '').strip()}")
+        for frame in traceback.extract_tb(error.__traceback__):
+            if frame.filename == str(source):
+                found.append(f"{source.name}, line {frame.lineno}: {frame.line}")
+        error = error.__cause__
+    return list(dict.fromkeys(found))
+
+
+def in_words(error: BaseException, lines: list[str]) -> str:
+    """A Python error and the user's lines that led to it, the last one nearest."""
+    words = error.msg if isinstance(error, SyntaxError) else str(error)
+    return "\n  ".join([f"{type(error).__name__}: {words}".removesuffix(": "), *lines])
+
+
+@contextmanager
+def busy(words: str) -> Iterator[None]:
+    """A turning sign on the terminal while something takes its time."""
+    from rich.console import Console
+
+    with Console(file=sys.stderr).status(words):
+        yield
+
+
+def write_text(text: str, file: Path) -> None:
+    """Write a text file whole; CommandError if that is not possible."""
+    from gantrytau.results.files import replacing
+
+    with writable(file), replacing(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def writable(file: Path) -> Iterator[None]:
+    """Whatever prevents writing `file` becomes a CommandError with a remedy."""
+    try:
+        if file.is_dir():
+            raise CommandError(f"{file} is a folder, expected the name of a file in it")
+        yield
+    except CommandError:
+        raise
+    except GantryTauError as error:  # from the writers of results: folder, suffix, extra
+        raise CommandError(str(error)) from error
+    except OSError as error:
+        raise CommandError(f"Cannot write {file}: {error.strerror}; name another place") from error

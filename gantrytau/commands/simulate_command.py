@@ -1,0 +1,145 @@
+"""`gantrytau simulate`: a model over time, its result as figures, files and pictures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.model_choice import Chosen, build
+from gantrytau.commands.arguments.options import (
+    Json,
+    ModelName,
+    Plotted,
+    PrototypeName,
+    Saved,
+    Settings,
+    To,
+    listed,
+)
+from gantrytau.commands.arguments.values import signal
+from gantrytau.commands.printing import picture_output as pictures
+from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, busy, fail, reporting
+from gantrytau.errors import SolveError
+
+if TYPE_CHECKING:
+    from gantrytau.dae import Dae
+    from gantrytau.results.result import Result
+
+
+def simulate(
+    model: ModelName,
+    stop: Annotated[float, typer.Option(help="Time at which to stop, in s.", show_default=False)],
+    start: Annotated[float, typer.Option(help="Time at which to start, in s.")] = 0.0,
+    tolerance: Annotated[float, typer.Option(help="Relative and absolute error per step.")] = 1e-8,
+    points: Annotated[int, typer.Option(help="Number of output times.")] = 501,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
+            "as f=forces.csv:f. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Saved = None,
+    plot: Plotted = None,
+    to: To = None,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Simulate a model from its start values, and print where its states begin and end.
+
+    Ctrl-C stops early; what was computed until then is saved to --output.
+    """
+    with reporting(json, source_of(model)):
+        drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
+        saving.rehearse(output)
+        place = pictures.place(drawn, to)
+        chosen = build(model, prototype, set_ or ())
+        dae = _translated(chosen, drawn)
+        try:
+            result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
+        except SolveError as error:
+            _stop(error, output, json)
+        files = saving.save(result, output)
+        if place:
+            files += pictures.draw(result, drawn, place)
+        summary = _summary(chosen, dae, result, files)
+        if json:
+            typer.echo(as_json(summary))
+        else:
+            _show(summary, dae, result)
+
+
+def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
+    """The model with the derivatives that are to be drawn; ModelError for a name that it does not have."""
+    from gantrytau import translate
+
+    with busy(f"translating {chosen.name}"):
+        find = [name for name in drawn if name.startswith("der(")]
+        dae = translate(chosen.model, find=find, events=True)
+    for name in drawn:
+        dae.expand(name)
+    return dae
+
+
+def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
+    import gantrytau
+
+    return gantrytau.simulate(dae, inputs=signals, **policy)
+
+
+def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
+    """Save what a simulation found until it stopped, say so, and leave."""
+    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    message = str(error).partition(";")[0] if pressed else str(error)
+    files: list[str] = []
+    if output is not None and error.result is not None:
+        files = saving.save(error.result, output)
+        message += f"\nWhat was computed until then is in {output}"
+    elif pressed:
+        message += "; with --output its result would have been saved"
+    code = INTERRUPTED if pressed else FAULT
+    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
+
+
+def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> dict[str, Any]:
+    return {
+        "model": chosen.name,
+        "prototype": chosen.prototype,
+        "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+        "states": dae.states,
+        "final": {name: result.final(name) for name in result.names},
+        "files": files,
+    }
+
+
+def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
+    """The states at both ends as a table; texts of the model are no markup."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    time = summary["time"]
+    typer.echo(
+        f"{summary['model']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
+        f"{len(result.names)} variables"
+    )
+    if dae.states:
+        table = Table(box=SIMPLE, pad_edge=False)
+        table.add_column("state", no_wrap=True)
+        for heading in ("start", "end", "least", "greatest"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("unit")
+        for name in dae.states:
+            values = result[name]
+            numbers = (values[0], values[-1], values.min(), values.max())
+            table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))
+        Console().print(table)
+    for file in summary["files"]:
+        typer.echo(f"Written: {file}")

@@ -1,0 +1,1 @@
+"""From a flat model to equations of index one, sorted into blocks."""

@@ -1,0 +1,331 @@
+"""Alias elimination: variables that are equal to another one, up to sign, factor, constant or derivative.
+
+`v == der(s)` makes v the first derivative of s, so that mechanics stays of second order.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from gantrytau.compiler.definitions import Definitions
+from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+ZERO = ca.SX(0)
+LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
+
+
+@dataclass(frozen=True, eq=False)
+class Alias:
+    """variable = factor * (order-th derivative of root) + offset; root None: a constant."""
+
+    root: str | None
+    order: int
+    factor: float
+    offset: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Equations that are left, and for every variable what it is an alias of.
+
+    residuals: one scalar SX per remaining equation, in symbols of `chains`; compact: the same in the symbols
+    of the definitions as well; equations: where they come from; redundant: equations that turned out to
+    say 0 == 0.
+    """
+
+    residuals: tuple[ca.SX, ...]
+    compact: tuple[ca.SX, ...]
+    definitions: Definitions
+    equations: tuple[Equation, ...]
+    aliases: Mapping[str, Alias]
+    unknowns: tuple[str, ...]
+    known: frozenset[str]
+    chains: "Chains"
+    redundant: tuple[Equation, ...] = ()
+    rates: Mapping[int, ca.SX] = field(default_factory=dict)
+
+    def written(self, expression: ca.SX) -> ca.SX:
+        """An expression of the model's variables in the symbols of the reduced equations; others stay."""
+        expression = self.definitions.resolve(expression)
+        old, new = [], []
+        for leaf in ca.symvar(expression):
+            base, order = split_derivative(leaf.name())
+            alias = self.aliases.get(base)
+            if alias is not None:
+                offset = alias.offset if order == 0 else ZERO
+                old.append(leaf)
+                new.append(
+                    alias_expression(
+                        Alias(alias.root, alias.order + order, alias.factor, offset), self.chains
+                    )
+                )
+        return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
+
+
+class Chains:
+    """Symbols of variables and their derivatives, the missing ones made when asked for."""
+
+    def __init__(self, flat: FlatModel):
+        self._sx: dict[str, ca.SX] = dict(flat.derivatives)
+        for variable in flat.variables:
+            self._sx.update(zip(variable.elements, variable.symbol.elements(), strict=True))
+
+    def sx(self, root: str, order: int = 0) -> ca.SX:
+        """The symbol of the order-th derivative of a variable."""
+        name = derivative_name(root, order)
+        if name not in self._sx:
+            self._sx[name] = ca.SX.sym(name)
+        return self._sx[name]
+
+    def named(self, name: str) -> ca.SX:
+        """The symbol of that name, `x` or `der(x)`."""
+        return self.sx(*split_derivative(name))
+
+
+class _Terms:
+    """A sum of factors times symbols plus an offset of parameters."""
+
+    def __init__(self) -> None:
+        self.factors: dict[str, float] = {}
+        self.offset = ZERO
+
+
+def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Reduced:
+    """Remove all aliases. `known`: scalars that are given as functions of time."""
+    return _Elimination(flat, table, known).run()
+
+
+class _Elimination:
+    def __init__(self, flat: FlatModel, table: ParameterTable, known: frozenset[str]):
+        self.flat, self.known = flat, known
+        self.chains = Chains(flat)
+        self.parents: dict[str, Alias] = {}
+        self.parameters = set(table.independent)
+        self.rank: dict[str, tuple[int, ...]] = {}
+        for place, variable in enumerate(flat.variables):
+            for name in variable.elements:
+                self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
+        self.rated = [i for i, e in enumerate(flat.equations) if e.rate is not None]
+        sides = table.reduce(
+            ca.vertcat(
+                *(e.residual for e in flat.equations),
+                *(e.rate for e in flat.equations if e.rate is not None),
+            )
+        )
+        names = list(flat.definitions)
+        defined = table.reduce(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
+        self.defined = dict(zip(names, defined.elements(), strict=True))
+        self.rates = (
+            dict(zip(flat.rates, table.reduce(ca.vertcat(*flat.rates.values())).elements(), strict=True))
+            if flat.rates
+            else {}
+        )
+        self.definition_symbols = {
+            n: s for v in flat.propagated for n, s in zip(v.elements, v.symbol.elements(), strict=True)
+        }
+        self.residuals = self._without_constants(ca.SX(sides).elements() if flat.equations else [])
+
+    def run(self) -> Reduced:
+        remaining = list(range(len(self.flat.equations)))  # behind them stand the given rates
+        while True:
+            sums = {i: terms for i in remaining if (terms := self._sum(self.residuals[i])) is not None}
+            changed = False
+            while True:
+                used = [i for i, terms in sums.items() if self._use(terms)]
+                if not used:
+                    break
+                changed = True
+                for i in used:
+                    del sums[i]
+                    remaining.remove(i)
+            if not changed:
+                break
+            for i, new in zip(
+                remaining, self._substitute([self.residuals[i] for i in remaining]), strict=True
+            ):
+                self.residuals[i] = new
+        # what became 0 == 0 repeats other equations: two ends that both say that they carry no torque
+        redundant = [i for i in remaining if self.residuals[i].is_zero()]
+        remaining = [i for i in remaining if i not in redundant]
+        names = [n for v in self.flat.variables for n in v.elements]
+        aliases = {n: self.resolve(n, 0) for n in names}
+        used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
+        unknowns = tuple(n for n in names if n in used_names and n not in self.known)
+        compact = [self.residuals[i] for i in remaining]
+        definitions = self._definitions(aliases)
+        rates = self._substitute(self.residuals[len(self.flat.equations) :])
+        rate_of = dict(zip(self.rated, rates, strict=True))
+        return Reduced(
+            tuple(definitions.resolve(ca.vertcat(*compact)).elements()) if compact else (),
+            tuple(compact),
+            definitions,
+            tuple(self.flat.equations[i] for i in remaining),
+            aliases,
+            unknowns,
+            self.known,
+            self.chains,
+            tuple(self.flat.equations[i] for i in redundant),
+            {k: rate_of[i] for k, i in enumerate(remaining) if i in rate_of},
+        )
+
+    def _definitions(self, aliases: Mapping[str, Alias]) -> Definitions:
+        symbols = {
+            n: self.flat.derivatives[n]
+            for n in self.flat.derivatives
+            if split_derivative(n)[0] in self.definition_symbols
+        }
+
+        def variable(name: str, order: int) -> ca.SX | None:
+            return self.chains.sx(name, order) if name in aliases else None
+
+        return Definitions(
+            {**self.definition_symbols, **symbols},
+            dict(zip(self.defined, self._substitute(list(self.defined.values())), strict=True)),
+            dict(zip(self.rates, self._substitute(list(self.rates.values())), strict=True)),
+            variable,
+        )
+
+    def _without_constants(self, residuals: list[ca.SX]) -> list[ca.SX]:
+        """Residuals with those definitions inserted that, with parameters folded in, are numbers after all."""
+        done: set[str] = set()
+        while True:
+            steady = {n: e for n, e in self.defined.items() if n not in done and self._steady(e)}
+            if not steady:
+                return residuals
+            done |= steady.keys()
+            count, names = len(residuals), list(self.defined)
+            rates = list(self.rates)
+            everything = ca.vertcat(*residuals, *self.defined.values(), *self.rates.values())
+            old = [self.definition_symbols[n] for n in steady]
+            new = list(steady.values())
+            for leaf in ca.symvar(everything):
+                base, order = split_derivative(leaf.name())
+                if order and base in steady:
+                    old.append(leaf)
+                    new.append(ca.SX(0))
+            found = ca.substitute(everything, ca.vertcat(*old), ca.vertcat(*new)).elements()
+            residuals = found[:count]
+            self.defined = dict(zip(names, found[count:], strict=False))
+            self.rates = dict(zip(rates, found[count + len(names) :], strict=True))
+
+    def _steady(self, expression: ca.SX) -> bool:
+        return expression.is_constant() or all(
+            leaf.name() in self.parameters for leaf in ca.symvar(expression)
+        )
+
+    def resolve(self, name: str, order: int) -> Alias:
+        """What the order-th derivative of a variable is."""
+        factor, offset = 1.0, ZERO
+        while (alias := self.parents.get(name)) is not None:
+            if order == 0:
+                offset = _plus(offset, factor, alias.offset)
+            if alias.root is None:
+                return Alias(None, 0, 0.0, offset)
+            factor *= alias.factor
+            name, order = alias.root, order + alias.order
+        return Alias(name, order, factor, offset)
+
+    def _sum(self, expression: ca.SX) -> _Terms | None:
+        """The expression as a sum of symbols times numbers, or None if it is none."""
+        terms = _Terms()
+        stack = [(expression, 1.0)]
+        for _ in range(3 * LONGEST_SUM):
+            if not stack:
+                return terms
+            node, factor = stack.pop()
+            if node.is_symbolic():
+                name = node.name()
+                if split_derivative(name)[0] in self.defined:
+                    return None
+                if name in self.parameters:
+                    terms.offset = terms.offset + factor * node
+                elif name == self.flat.time.name():
+                    return None
+                else:
+                    terms.factors[name] = terms.factors.get(name, 0.0) + factor
+            elif node.is_constant():
+                terms.offset = terms.offset + factor * float(node)
+            elif node.is_op(ca.OP_ADD):
+                stack += [(node.dep(0), factor), (node.dep(1), factor)]
+            elif node.is_op(ca.OP_SUB):
+                stack += [(node.dep(0), factor), (node.dep(1), -factor)]
+            elif node.is_op(ca.OP_NEG):
+                stack.append((node.dep(0), -factor))
+            elif node.is_op(ca.OP_TWICE):
+                stack.append((node.dep(0), 2 * factor))
+            elif node.is_op(ca.OP_MUL) and node.dep(0).is_constant():
+                stack.append((node.dep(1), factor * float(node.dep(0))))
+            elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
+                stack.append((node.dep(0), factor * float(node.dep(1))))
+            elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
+                terms.offset = terms.offset + factor * node
+            else:
+                return None
+        return None
+
+    def _use(self, terms: _Terms) -> bool:
+        """Turn the sum into an alias if at most two symbols are left in it."""
+        factors: dict[tuple[str, int], float] = {}
+        offset = terms.offset
+        for name, factor in terms.factors.items():
+            alias = self.resolve(*split_derivative(name))
+            offset = _plus(offset, factor, alias.offset)
+            if alias.root is not None:
+                key = (alias.root, alias.order)
+                factors[key] = factors.get(key, 0.0) + factor * alias.factor
+        left = [(key, factor) for key, factor in factors.items() if abs(factor) > 1e-12]
+        if not left or len(left) > 2:
+            return False
+        if len(left) == 1:
+            ((name, order), factor) = left[0]
+            if order > 0 or name in self.known:
+                return False
+            self.parents[name] = Alias(None, 0, 0.0, _plus(ZERO, -1 / factor, offset))
+            return True
+        (a, factor_a), (b, factor_b) = left
+        if a[1] == b[1] == 0:
+            if self.rank[a[0]] < self.rank[b[0]]:
+                a, b, factor_a, factor_b = b, a, factor_b, factor_a
+        elif a[1] > 0 and b[1] == 0:
+            a, b, factor_a, factor_b = b, a, factor_b, factor_a
+        if a[1] > 0 or a[0] in self.known or a[0] == b[0] or (b[1] > 0 and not offset.is_zero()):
+            return False
+        self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, _plus(ZERO, -1 / factor_a, offset))
+        return True
+
+    def _substitute(self, residuals: list[ca.SX]) -> list[ca.SX]:
+        if not residuals:
+            return []
+        vector = ca.vertcat(*residuals)
+        old, new = [], []
+        for leaf in ca.symvar(vector):
+            name, order = split_derivative(leaf.name())
+            if name in self.parents:
+                alias = self.resolve(name, order)
+                old.append(leaf)
+                new.append(self.expression(alias))
+        return ca.substitute(vector, ca.vertcat(*old), ca.vertcat(*new)).elements() if old else residuals
+
+    def expression(self, alias: Alias) -> ca.SX:
+        return alias_expression(alias, self.chains)
+
+
+def _plus(total: ca.SX, factor: float, offset: ca.SX) -> ca.SX:
+    """Total + factor * offset; offsets are nearly always zero, and arithmetic on symbols is slow."""
+    if offset.is_zero():
+        return total
+    scaled = offset if factor == 1.0 else (-offset if factor == -1.0 else factor * offset)
+    return scaled if total.is_zero() else total + scaled
+
+
+def alias_expression(alias: Alias, chains: Chains) -> ca.SX:
+    """The alias written out."""
+    if alias.root is None:
+        return alias.offset
+    symbol = chains.sx(alias.root, alias.order)
+    scaled = symbol if alias.factor == 1.0 else (-symbol if alias.factor == -1.0 else alias.factor * symbol)
+    return _plus(scaled, 1.0, alias.offset)

@@ -1,0 +1,119 @@
+"""Tearing: a few unknowns of a block are guessed, the others follow one after the other.
+
+Elmqvist and Otter, ESM 1994. The unknown to tear is the one after which most others follow at once.
+"""
+
+from collections.abc import Collection, Mapping, Set
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.blocks.pivots import reliable
+
+RELAXED_PIVOT = 0.1  # smallest pivot relative to its row, at all sample points, that is divided by
+
+
+@dataclass(frozen=True)
+class Torn:
+    """assignments: (equation, unknown) in order; tears: unknowns; residuals: equations; all as positions."""
+
+    assignments: tuple[tuple[int, int], ...]
+    tears: tuple[int, ...]
+    residuals: tuple[int, ...]
+
+
+def tear(
+    jacobian: ca.SX,
+    numbers: np.ndarray,
+    x: ca.SX,
+    *,
+    relaxed: bool,
+    partner: Mapping[int, int],
+    first: Set[int],
+    steady: Collection[str] | None = None,
+) -> Torn:
+    """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
+
+    relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
+    partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
+    first: columns that are torn before others; steady: if given, only pivots of these symbols are accepted.
+    """
+    largest = np.abs(numbers).max(axis=2, keepdims=True)
+    sizes = reliable(numbers, largest)
+    rows, columns = jacobian.sparsity().get_triplet()
+    incidence: dict[int, set[int]] = {i: set() for i in range(jacobian.shape[0])}
+    solvable: set[tuple[int, int]] = set()
+    for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
+        incidence[i].add(j)
+        if steady is not None and not all(leaf.name() in steady for leaf in ca.symvar(entry)):
+            large = False
+        elif i in partner:
+            large = partner[i] == j and sizes[i, j] > 0
+        elif entry.is_constant():
+            large = sizes[i, j] >= 1e-6
+        else:
+            large = (relaxed or not ca.depends_on(entry, x)) and sizes[i, j] >= RELAXED_PIVOT
+        if large:
+            solvable.add((i, j))
+    return _search(incidence, solvable, first, set(partner.values()))
+
+
+def _search(
+    incidence: dict[int, set[int]], solvable: set[tuple[int, int]], first: Set[int], last: Set[int]
+) -> Torn:
+    """Tear until every equation is solved or left over; columns in these are torn first or last."""
+    holders: dict[int, list[int]] = {}
+    for i, row in incidence.items():
+        for j in row:
+            holders.setdefault(j, []).append(i)
+    open_rows = {i: set(row) for i, row in incidence.items()}
+    assignments, tears = _follow(open_rows, holders, solvable, []), []
+    while any(open_rows.values()):
+        candidates = set().union(*open_rows.values())
+        candidates = sorted(candidates & first or candidates - last or candidates)
+        best = max(candidates, key=lambda j: (_gain(open_rows, holders, solvable, j), len(holders[j])))
+        tears.append(best)
+        for i in holders[best]:
+            if i in open_rows:
+                open_rows[i].discard(best)
+        assignments += _follow(open_rows, holders, solvable, [best])
+    return Torn(tuple(assignments), tuple(tears), tuple(sorted(open_rows)))
+
+
+def _gain(open_rows, holders, solvable, candidate: int) -> int:
+    """How many equations can be solved at once when the candidate is torn."""
+    known, solved = {candidate}, set()
+    counts: dict[int, int] = {}
+    queue = [candidate]
+    for column in queue:
+        for i in holders[column]:
+            if i not in open_rows or i in solved or column not in open_rows[i]:
+                continue
+            counts[i] = counts.get(i, len(open_rows[i])) - 1
+            if counts[i] == 1:
+                j = next(iter(open_rows[i] - known), None)
+                if j is not None and (i, j) in solvable:
+                    solved.add(i)
+                    known.add(j)
+                    queue.append(j)
+    return len(solved)
+
+
+def _follow(open_rows, holders, solvable, changed: list[int]) -> list[tuple[int, int]]:
+    """Solve every equation in which one unknown is left, until none is; `open_rows` shrinks."""
+    found: list[tuple[int, int]] = []
+    queue = [i for j in changed for i in holders[j] if i in open_rows] if changed else list(open_rows)
+    for i in queue:
+        if i not in open_rows or len(open_rows[i]) != 1:
+            continue
+        (j,) = open_rows[i]
+        if (i, j) not in solvable:
+            continue
+        del open_rows[i]
+        found.append((i, j))
+        for other in holders[j]:
+            if other in open_rows:
+                open_rows[other].discard(j)
+                queue.append(other)
+    return found

@@ -1,0 +1,99 @@
+"""Refuses models whose equations have the right number and form, but do not determine their unknowns in numbers.
+
+A body without mass, a rotation that no torque depends on: the coefficient is there, and it is zero.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.blocks.solution import Block
+from gantrytau.compiler.index_reduction import Indexed
+from gantrytau.errors import StructureError
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.symbols import split_derivative
+
+LEAST = 1e-12  # of a coefficient, or of a singular value, relative to the terms of its equation
+
+
+def refuse_undetermined(
+    blocks: Sequence[Block], indexed: Indexed, reduced: Reduced, sample: Mapping[str, float], flat: FlatModel
+) -> None:
+    """StructureError that names the unknowns which the equations leave free at the start, and why."""
+    watched = [b for b in blocks if b.tears and b.kind in ("explicit", "linear")]
+    if not watched:
+        return
+    residual = ca.vertcat(*(r for b in watched for r in b.residuals))
+    leaves = ca.symvar(residual)
+    jacobian = ca.jacobian(residual, ca.vertcat(*leaves))
+    function = ca.Function("terms", [ca.vertcat(*leaves)], [ca.densify(ca.vertcat(*jacobian.nonzeros()))])
+    entries = np.array(function([sample[leaf.name()] for leaf in leaves])).ravel()
+    rows, columns = (np.array(x, dtype=int) for x in jacobian.sparsity().get_triplet())
+    largest = np.zeros(residual.numel())
+    np.maximum.at(largest, rows, np.nan_to_num(np.abs(entries)))
+    place = {leaf.name(): j for j, leaf in enumerate(leaves)}
+    begin = 0
+    for block in watched:
+        count = len(block.tears)
+        own = {place[y.name()]: k for k, y in enumerate(block.tears) if y.name() in place}
+        matrix = np.zeros((count, count))
+        for k in np.flatnonzero((rows >= begin) & (rows < begin + count)):
+            if columns[k] in own:
+                matrix[rows[k] - begin, own[columns[k]]] = entries[k]
+        free = _free(block, matrix, largest[begin : begin + count, None])
+        begin += count
+        if free:
+            raise StructureError(_message(block, free, indexed, reduced, flat))
+
+
+def _free(block: Block, matrix: np.ndarray, terms: np.ndarray) -> list[str]:
+    """Unknowns that a matrix leaves free; terms: the largest coefficient in each equation."""
+    if not np.all(np.isfinite(matrix)):
+        return []
+    _, values, right = np.linalg.svd(matrix / np.maximum(terms, 1e-300))
+    if values[-1] > LEAST * max(values[0], 1e-3):
+        return []
+    shares = np.abs(right[-1])
+    return [block.tears[k].name() for k in np.argsort(-shares) if shares[k] > 0.1 * shares.max()]
+
+
+def _message(block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduced, flat: FlatModel) -> str:
+    hints = {
+        (alias.root, alias.order): flat.hints[name]
+        for name, alias in reduced.aliases.items()
+        if name in flat.hints
+    }
+    words = []
+    for name in free[:4]:
+        base, order = split_derivative(name)
+        hint = next((hints[base, k] for k in range(order, -1, -1) if (base, k) in hints), "")
+        words.append(name + (f" ({hint})" if hint else ""))
+    equations = dict.fromkeys(indexed.names[i] for i, _ in block.equations)
+    shown = "; ".join(list(equations)[:4]) + (f" and {len(equations) - 4} more" if len(equations) > 4 else "")
+    return (
+        f"{flat.name}: {', '.join(words)} {'is' if len(words) == 1 else 'are'} not determined at the start: the "
+        f"coefficients in {shown} leave it free. Expected mass, inertia or a drive for every motion: give it one, hold "
+        "the motion, or start from another pose"
+    )
+
+
+def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureError | None:
+    """What a failed start may come from: a motion without inertia, such as that of a bar about itself.
+
+    Nothing accelerates its coordinate, so it would have to follow from a balance of forces.
+    """
+    flows = {n for v in flat.variables if v.kind == "flow" for n in v.elements}
+    roots = {reduced.aliases[n].root for n in flows}
+    for i, residual in enumerate(reduced.residuals):
+        names = [leaf.name() for leaf in ca.symvar(residual)]
+        slow = [n for n in names if indexed.orders.get(n) == 1 and n in flat.hints]
+        if slow and any(n in roots for n in names):
+            words = ", ".join(f"{n} ({flat.hints[n]})" for n in slow[:4])
+            return StructureError(
+                f"{flat.name}: {words} would have to follow from a balance of forces, {indexed.names[i]}, because this "
+                "motion has neither mass nor inertia. Expected a mass or an inertia for every motion: put a Body "
+                "there, or hold the motion"
+            )
+    return None

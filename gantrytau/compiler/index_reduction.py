@@ -1,0 +1,216 @@
+"""How often each equation has to be differentiated, and the differentiated equations.
+
+The signature method (Pryce, BIT 41, 2001) on integers: it asks for the same differentiations as
+Pantelides' algorithm (SIAM J. Sci. Stat. Comput. 9, 1988) and also gives the stages in which
+consistent values are found: positions, then velocities, then accelerations and forces.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.matching import best_matching, largest_matching
+from gantrytau.compiler.start.consistency import Level
+from gantrytau.errors import StructureError
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+Key = tuple[int, int]  # equation, times differentiated
+
+
+@dataclass(frozen=True, eq=False)
+class Indexed:
+    """The equations with all their derivatives that are needed.
+
+    residuals: by (equation, times differentiated); names: of the equations; counts: how often each
+    equation is differentiated; orders: highest derivative of each unknown, by name; structural_index as Pryce defines it.
+    """
+
+    residuals: Mapping[Key, ca.SX]
+    names: tuple[str, ...]
+    counts: tuple[int, ...]
+    orders: Mapping[str, int]
+
+    @property
+    def structural_index(self) -> int:
+        """Differentiation index of the equations as their structure shows it."""
+        algebraic = any(order == 0 for order in self.orders.values())
+        return max(self.counts, default=0) + int(algebraic)
+
+    @cached_property
+    def levels(self) -> tuple[Level, ...]:
+        """Positions, velocities, accelerations and forces: the equations and unknowns of each level."""
+        found: list[Level] = []
+        for stage in range(-max(self.orders.values(), default=0), 1):
+            keys = [(i, stage + c) for i, c in enumerate(self.counts) if stage + c >= 0]
+            unknowns = [derivative_name(n, stage + top) for n, top in self.orders.items() if stage + top >= 0]
+            words = [self.names[i] + (f", differentiated {m} times" if m else "") for i, m in keys]
+            found.append(Level(tuple(self.residuals[k] for k in keys), tuple(words), tuple(unknowns)))
+        return tuple(found)
+
+    @cached_property
+    def whole(self) -> Level:
+        """All levels as one."""
+        return Level(
+            tuple(r for level in self.levels for r in level.residuals),
+            tuple(n for level in self.levels for n in level.names),
+            tuple(n for level in self.levels for n in level.unknowns),
+        )
+
+    def unknown_symbols(self) -> list[str]:
+        """Every unknown with all its derivatives up to the highest, by name."""
+        return [derivative_name(n, k) for n, top in self.orders.items() for k in range(top + 1)]
+
+
+def reduce_index(reduced: Reduced, flat: FlatModel) -> Indexed:
+    """Differentiate what must be differentiated; StructureError if equations and unknowns do not match."""
+    signature = _signature(reduced)
+    if len(reduced.residuals) != len(reduced.unknowns):
+        raise StructureError(unbalanced(reduced, signature, flat))
+    counts, tops = _offsets(reduced, signature, flat)
+    residuals = _differentiated(reduced, counts)
+    orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
+    names = tuple(e.name for e in reduced.equations)
+    return Indexed(residuals, names, tuple(int(c) for c in counts), orders)
+
+
+def _signature(reduced: Reduced) -> list[dict[int, int]]:
+    """For each equation the highest derivative of each unknown in it."""
+    place = {name: j for j, name in enumerate(reduced.unknowns)}
+    rows: list[dict[int, int]] = []
+    for residual in reduced.residuals:
+        row: dict[int, int] = {}
+        for leaf in ca.symvar(residual):
+            name, order = split_derivative(leaf.name())
+            if name in place:
+                row[place[name]] = max(order, row.get(place[name], 0))
+        rows.append(row)
+    return rows
+
+
+def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel):
+    n = len(signature)
+    matched = best_matching(signature)
+    if matched is None:
+        raise StructureError(unbalanced(reduced, signature, flat))
+    counts = np.zeros(n, dtype=int)
+    mentioned = _mentioned(reduced, flat)
+    while True:
+        tops = mentioned.copy()
+        for i, row in enumerate(signature):
+            for j, order in row.items():
+                tops[j] = max(tops[j], order + counts[i])
+        new = np.array([tops[j] - signature[i][j] for i, j in enumerate(matched)], dtype=int)
+        if np.array_equal(new, counts):
+            return counts, tops
+        counts = new
+
+
+def _mentioned(reduced: Reduced, flat: FlatModel) -> np.ndarray:
+    """For each unknown the highest derivative that the model or its user names, by whatever alias."""
+    place = {name: j for j, name in enumerate(reduced.unknowns)}
+    found = np.zeros(len(place), dtype=int)
+    for name in (*reduced.aliases, *flat.derivatives):
+        base, order = split_derivative(name)
+        alias = reduced.aliases.get(base)
+        if alias is not None and alias.root in place:
+            found[place[alias.root]] = max(found[place[alias.root]], alias.order + order)
+    return found
+
+
+def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
+    """Differentiated in the symbols of the definitions, where derivatives are short, and then resolved."""
+    below = dict(enumerate(reduced.compact))
+    residuals: dict[Key, ca.SX] = {(i, 0): r for i, r in enumerate(reduced.residuals)}
+    keys: list[Key] = []
+    compact: list[ca.SX] = []
+    for level in range(1, max(counts, default=0) + 1):
+        rows = [i for i, count in enumerate(counts) if count >= level]
+        new = reduced.definitions.differentiated(ca.vertcat(*(below[i] for i in rows))).elements()
+        given = reduced.rates if level == 1 else {}
+        new = [given.get(i, rate) for i, rate in zip(rows, new, strict=True)]
+        below = dict(zip(rows, new, strict=True))
+        keys += [(i, level) for i in rows]
+        compact += new
+    if keys:
+        resolved = reduced.definitions.resolve(ca.vertcat(*compact))
+        residuals.update(zip(keys, ca.densify(resolved).elements(), strict=True))
+    return residuals
+
+
+def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel) -> str:
+    """Which unknowns stay undetermined and which equations are one too many, in the model's words."""
+    of_row = largest_matching(signature, len(reduced.unknowns))
+    of_column = {int(j): i for i, j in enumerate(of_row) if j >= 0}
+    free = [j for j in range(len(reduced.unknowns)) if j not in of_column]
+    extra = [i for i in range(len(signature)) if of_row[i] < 0]
+    n, m = (
+        sum(len(v.elements) for v in flat.variables) - len(reduced.known),
+        len(flat.equations) - len(reduced.redundant),
+    )
+    text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
+    if free:
+        reached = {reduced.unknowns[j]: j in free for j in _reach_columns(free, signature, of_column)}
+        text += _undetermined(reached, len(free), reduced, flat)
+    if extra:
+        text += _overdetermined(sorted(_reach_rows(extra, signature, of_row)), len(extra), reduced, signature)
+    return text
+
+
+def _undetermined(reached: Mapping[str, bool], count: int, reduced: Reduced, flat: FlatModel) -> str:
+    """reached: names of which `count` are free, True for those that no equation was found for."""
+    inputs = {reduced.aliases[n].root: n for n in flat.inputs if n not in reduced.known}
+    names = sorted(reached, key=lambda n: (n not in inputs, not reached[n], n.count(".")))
+    first = inputs.get(names[0], names[0])
+    hint = flat.hints.get(names[0])
+    others = ", ".join(inputs.get(n, n) for n in names[1:6]) + (", ..." if len(names) > 6 else "")
+    text = f" Undetermined: {first}" + (f" ({hint})" if hint else "")
+    text += f"; {count} of it and {others} {'is' if count == 1 else 'are'} free" if others else ""
+    if names[0] in inputs:
+        return f"{text}. Name {first} among the given, or add {count} equation{'s' if count > 1 else ''}."
+    where = first.rpartition(".")[0] or "the model"
+    return (
+        f"{text}. Add {count} equation{'s' if count > 1 else ''} for it in {where}, declare it an Input, or "
+        "connect a component that determines it."
+    )
+
+
+def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: list[dict[int, int]]) -> str:
+    lines = []
+    for i in rows[:4]:
+        found = "" if signature[i] else ", whose variables all follow from other equations"
+        lines.append(f"{reduced.equations[i].name} `{reduced.equations[i].text[:80]}`{found}")
+    more = f"; and {len(rows) - 4} others" if len(rows) > 4 else ""
+    return (
+        f" Overdetermined by {count}: these equations contradict or repeat each other: "
+        f"{'; '.join(lines)}{more}. "
+        "Remove one of them, or let one more variable be unknown."
+    )
+
+
+def _reach_columns(
+    start: list[int], signature: list[dict[int, int]], of_column: Mapping[int, int]
+) -> set[int]:
+    row_of = {i: j for j, i in of_column.items()}
+    reached, queue = set(start), list(start)
+    for j in queue:
+        for i, row in enumerate(signature):
+            if j in row and i in row_of and row_of[i] not in reached:
+                reached.add(row_of[i])
+                queue.append(row_of[i])
+    return reached
+
+
+def _reach_rows(start: list[int], signature: list[dict[int, int]], of_row) -> set[int]:
+    row_of = {int(j): i for i, j in enumerate(of_row) if j >= 0}
+    reached, queue = set(start), list(start)
+    for i in queue:
+        for j in signature[i]:
+            if j in row_of and row_of[j] not in reached:
+                reached.add(row_of[j])
+                queue.append(row_of[j])
+    return reached

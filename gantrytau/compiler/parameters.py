@@ -1,0 +1,204 @@
+"""Values of parameters: bindings resolved, some replaced by new numbers, some folded into the equations."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.flattening.flat_model import FlatModel, FlatParameter
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterTable:
+    """The parameters of a model sorted out.
+
+    independent: names of the scalars that stay symbols; values: numbers of all scalars by name;
+    expressions: all others in terms of the independent ones (a number where folded); symbols by name.
+    """
+
+    independent: tuple[str, ...]
+    values: Mapping[str, float]
+    expressions: Mapping[str, ca.SX]
+    symbols: Mapping[str, ca.SX]
+
+    def reduce(self, expression: ca.SX) -> ca.SX:
+        """The expression with dependent and folded parameters replaced."""
+        if not self.expressions or expression.numel() == 0:
+            return expression
+        old = ca.vertcat(*(self.symbols[name] for name in self.expressions))
+        return ca.substitute(expression, old, ca.vertcat(*self.expressions.values()))
+
+    def number(self, expression: ca.SX) -> np.ndarray:
+        """The value of an expression of parameters."""
+        names = list(self.values)
+        if expression.is_constant():
+            return np.array(ca.DM(expression)).ravel()
+        value = ca.substitute(
+            expression, ca.vertcat(*(self.symbols[n] for n in names)), ca.DM([self.values[n] for n in names])
+        )
+        return np.array(ca.evalf(value)).ravel()
+
+
+def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
+    """The model with other numbers for some parameters; ModelError for unknown names or wrong shapes."""
+    if not values:
+        return flat
+    if not isinstance(values, Mapping):
+        raise ModelError(
+            f"{flat.name}: found {type(values).__name__} as parameters, expected names and their values, {{name: value}}"
+        )
+    remaining = dict(values)
+    known = [*(p.name for p in flat.parameters), *(e for p in flat.parameters for e in p.elements)]
+    for name in values:
+        if name not in known:
+            raise ModelError(f"{flat.name} has no parameter '{name}'{did_you_mean(name, known)}")
+    return replace(flat, parameters=tuple(_with_value(p, remaining) for p in flat.parameters))
+
+
+def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:
+    elements = list(parameter.value)
+    if parameter.name in values:
+        array = _numbers(parameter.name, values[parameter.name])
+        if array.shape != parameter.shape:
+            raise ModelError(f"{parameter.name}: value has shape {array.shape}, expected {parameter.shape}")
+        elements = [ca.SX(float(x)) for x in array.ravel(order="F")]
+    for index, name in enumerate(parameter.elements):
+        if name in values and name != parameter.name:
+            number = _numbers(name, values[name])
+            if number.shape:
+                raise ModelError(f"{name}: value has shape {number.shape}, expected ()")
+            elements[index] = ca.SX(float(number))
+    for name, element in zip(parameter.elements, elements, strict=True):
+        if element.is_constant() and not np.isfinite(float(element)):
+            raise ModelError(f"{name}: value is {element}, expected a finite number")
+    return replace(parameter, value=tuple(elements))
+
+
+def _numbers(name: str, value: object) -> np.ndarray:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"parameters: {name}: found {value!r}, expected a number or an array") from None
+
+
+def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> ParameterTable:
+    """Sort the parameters of a model out; `keep` names scalars that stay symbols come what may.
+
+    Raises ModelError for parameters that are defined by each other, or that come out not finite.
+    """
+    symbols = {n: s for p in flat.parameters for n, s in zip(p.elements, p.symbol.elements(), strict=True)}
+    bindings = {n: v for p in flat.parameters for n, v in zip(p.elements, p.value, strict=True)}
+    folded = {n for p in flat.parameters if p.fold for n in p.elements}
+    needs = {n: [s.name() for s in ca.symvar(v)] for n, v in bindings.items()}
+    for name, others in needs.items():
+        foreign = [other for other in others if other not in bindings]
+        if foreign:
+            raise ModelError(
+                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a "
+                "parameter is "
+                "constant, declare it Real if it is not"
+            )
+    order = _sorted(needs)
+    for name in reversed(order):  # what decides a folded value is folded too
+        if name in folded:
+            folded.update(needs[name])
+    # what follows from a parameter that stays a symbol is no number either
+    loose = set(keep) | {n for p in flat.parameters if p.free for n in p.elements}
+    for name in order:
+        if name in loose or any(other in loose for other in needs[name]):
+            loose.add(name)
+    folded -= loose
+    values: dict[str, float] = {}
+    expressions: dict[str, ca.SX] = {}
+    independent: list[str] = []
+    for name in order:
+        binding = bindings[name]
+        if needs[name]:
+            inside = ca.vertcat(*(symbols[n] for n in needs[name]))
+            values[name] = float(
+                ca.evalf(ca.substitute(binding, inside, ca.DM([values[n] for n in needs[name]])))
+            )
+        else:
+            values[name] = float(binding)
+        if not np.isfinite(values[name]):
+            raise ModelError(f"{name} = {binding}: found {values[name]}, expected a finite number")
+        if name in folded:
+            expressions[name] = ca.SX(values[name])
+        elif needs[name] and name not in keep:
+            inner = [n for n in needs[name] if n in expressions]
+            expressions[name] = (
+                ca.substitute(
+                    binding,
+                    ca.vertcat(*(symbols[n] for n in inner)),
+                    ca.vertcat(*(expressions[n] for n in inner)),
+                )
+                if inner
+                else binding
+            )
+        else:
+            independent.append(name)
+    _check_limits(flat, values)
+    _check_requirements(flat, values, symbols)
+    declared = [n for p in flat.parameters for n in p.elements]
+    return ParameterTable(tuple(n for n in declared if n in set(independent)), values, expressions, symbols)
+
+
+def _check_limits(flat: FlatModel, values: Mapping[str, float]) -> None:
+    """ModelError for a parameter outside of its min and max; one that is free is the optimiser's concern."""
+    for parameter in flat.parameters:
+        for place, name in enumerate(parameter.elements):
+            for limit, word in ((parameter.min, "at least"), (parameter.max, "at most")):
+                if limit is None or parameter.free or not limit[place].is_constant():
+                    continue
+                bound = float(limit[place])
+                if values[name] < bound if word == "at least" else values[name] > bound:
+                    raise ModelError(
+                        f"{name}: value is {values[name]:g}, expected {word} {bound:g} ({parameter.description}); correct it"
+                    )
+
+
+def _check_requirements(flat: FlatModel, values: Mapping[str, float], symbols: Mapping[str, ca.SX]) -> None:
+    """ModelError for parameters that a component cannot work with."""
+    if not flat.requirements:
+        return
+    conditions = ca.vertcat(*(ca.SX(r.condition) for r in flat.requirements))
+    names = [leaf.name() for leaf in ca.symvar(conditions)]
+    foreign = [n for n in names if n not in values]
+    if foreign:
+        raise ModelError(f"require: found the variable {foreign[0]} in a condition, expected parameters only")
+    function = ca.Function("conditions", [ca.vertcat(*(symbols[n] for n in names))], [conditions])
+    for requirement, holds in zip(
+        flat.requirements, np.array(function([values[n] for n in names])).ravel(), strict=True
+    ):
+        if not holds:
+            here = sorted(s.name() for s in ca.symvar(ca.SX(requirement.condition)))
+            found = ", ".join(f"{n} = {values[n]:g}" for n in here[:9])
+            raise ModelError(
+                f"{requirement.path or 'the model'} ({requirement.model}): found {found}; {requirement.message}"
+            )
+
+
+def _sorted(needs: Mapping[str, list[str]]) -> list[str]:
+    """Names in an order in which each comes after those it needs."""
+    order: dict[str, None] = {}
+    for start in needs:
+        stack, path = [start], []
+        while stack:
+            name = stack[-1]
+            if name in order:
+                stack.pop()
+                continue
+            missing = [n for n in needs[name] if n not in order]
+            if not missing:
+                order[name] = None
+                stack.pop()
+            elif name in path:
+                raise ModelError(
+                    f"parameters {', '.join(dict.fromkeys(path))} are defined by each other in a circle"
+                )
+            else:
+                path.append(name)
+                stack += missing
+    return list(order)

@@ -1,0 +1,255 @@
+"""Constraints that repeat others: found by numerical rank at poses where the loops are closed.
+
+A planar loop in space closes with three of its six residuals; which three depends on the plane. The rows
+of all equations between positions are orthogonalised, those that cannot be dropped first; of the others
+the most independent are taken one after another, and what is left over repeats them. A pose may be
+special, such as a parallelogram stretched flat, so poses around it are looked at too.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.aliases import Reduced, eliminate_aliases
+from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.start_values import Guess, starting_guess
+from gantrytau.errors import InitializationError, StructureError
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.statements import Equation
+
+RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
+CLOSED = 1e-12  # residual of a pose beyond which ranks seen there are not trusted
+POSES = 8  # besides the start
+STEP = 0.6  # of a move to the next pose, in rad, or relative to the size of the coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What constrains positions: rows, of which those with a dual may be dropped, and unknowns.
+
+    equations: of the droppable rows, which come last; known: names of what is given as a function of time.
+    """
+
+    level: Level
+    equations: tuple[Equation, ...]
+    known: frozenset[str]
+
+    @property
+    def moving(self) -> list[str]:
+        """The unknowns that occur."""
+        return [n for n in self.level.unknowns if n in set(self.level.leaves)]
+
+    @property
+    def firm(self) -> int:
+        """Number of rows that cannot be dropped."""
+        return len(self.level.residuals) - len(self.equations)
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A model without redundant constraints, and start values where its loops are closed.
+
+    redundant: the constraints left out, whose forces are zero; guess: numbers of positions by symbol.
+    """
+
+    flat: FlatModel
+    redundant: tuple[Equation, ...] = ()
+    guess: Mapping[str, float] = field(default_factory=dict)
+
+
+def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Settled:
+    """Leave out the constraints that repeat others. InitializationError if the loops cannot be closed."""
+    duals = [e for e in flat.equations if e.dual]
+    if not duals:
+        return Settled(flat)
+    bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
+    reduced = eliminate_aliases(bare, table, known)
+    constraints = _constraints(flat, table, reduced, duals)
+    guess = starting_guess(flat, table, reduced, list(constraints.level.leaves))
+    try:
+        closed = _close(constraints, guess, guess.values, flat.name)
+    except InitializationError as error:
+        raise _open_loops(flat, error) from None
+    matrices = [_matrix(constraints, closed)]
+    matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, flat.name)]
+    kept = _independent(matrices, constraints.firm)
+    _refuse_conflicts(flat, constraints, closed, kept)
+    redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
+    return Settled(_with_zero_forces(flat, redundant), redundant, closed)
+
+
+def _open_loops(flat: FlatModel, error: InitializationError) -> InitializationError:
+    """Which loops stay open and by how much, where the failure is one of closing."""
+    words = []
+    for loop in flat.loops:
+        place = f"{loop.a} - {loop.b}, "
+        gaps = {
+            kind: np.linalg.norm([v for n, v in error.residuals.items() if n.startswith(place + kind)])
+            for kind in ("position", "orientation")
+        }
+        # least squares leave a share of the gap in every part of the loop
+        for member in loop.members:
+            shares = [v for n, v in error.residuals.items() if n.startswith(f"{member} (")]
+            gaps["position"] += np.linalg.norm(shares)
+        if any(gaps.values()):
+            # the residual of orientation is 2 tan(angle / 2)
+            angle = np.degrees(2 * np.arctan(gaps["orientation"] / 2))
+            words.append(
+                f"the loop through {', '.join(loop.members)} stays open between {loop.a} and {loop.b}, by "
+                f"{gaps['position']:.3g} m and {angle:.3g} deg"
+            )
+    if not words:
+        return error
+    return InitializationError(
+        f"{flat.name}: {'; '.join(words)}. Expected frames that meet: correct lengths, offsets or joint axes, or, if it "
+        "can be closed, give start values of its joints nearer to that",
+        residuals=error.residuals,
+    )
+
+
+def _constraints(
+    flat: FlatModel, table: ParameterTable, reduced: Reduced, duals: Sequence[Equation]
+) -> Constraints:
+    """The equations between positions on which the droppable ones depend.
+
+    Positions and forces are told apart by the connectors: an equation with a flow in it is one of forces.
+    """
+    forces = {n for v in flat.variables if v.kind == "flow" for n in v.elements} | {e.dual for e in duals}
+    roots = {reduced.aliases[n].root for n in forces}
+    closing = reduced.written(table.reduce(ca.vertcat(*(e.residual for e in duals))))
+    positions = {}
+    for i, residual in enumerate(reduced.residuals):
+        names = [leaf.name() for leaf in ca.symvar(residual)]
+        if not any(n in roots or n.startswith("der(") for n in names):
+            positions[i] = [n for n in names if n in reduced.aliases and n not in reduced.known]
+    unknown = _unknowns(closing, reduced)
+    rows: list[int] = []
+    while new := [i for i, names in positions.items() if i not in rows and unknown & set(names)]:
+        rows += new
+        unknown |= {n for i in new for n in positions[i]}
+    level = Level(
+        (*(reduced.residuals[i] for i in rows), *closing.elements()),
+        (*(reduced.equations[i].name for i in rows), *(e.name for e in duals)),
+        tuple(n for n in reduced.unknowns if n in unknown),
+    )
+    return Constraints(level, tuple(duals), reduced.known)
+
+
+def _unknowns(expression: ca.SX, reduced: Reduced) -> set[str]:
+    names = {leaf.name() for leaf in ca.symvar(expression)}
+    return {n for n in names if n in reduced.aliases and n not in reduced.known}
+
+
+def _close(
+    constraints: Constraints, guess: Guess, values: Mapping[str, float], title: str
+) -> dict[str, float]:
+    return solve_levels(
+        [constraints.level],
+        values,
+        held=guess.fixed,
+        started=guess.started,
+        title=title,
+        thorough=True,
+    )
+
+
+def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
+    """Jacobian of the rows by unknowns and `known`, each of length one; rows that are zero stay zero."""
+    level = constraints.level
+    _, slopes = level.look(np.array([values[n] for n in level.leaves]))
+    place = {n: k for k, n in enumerate(level.leaves)}
+    found = level.jacobian(slopes)[:, [place[n] for n in (*constraints.moving, *known)]]
+    sizes = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
+
+
+def _poses(
+    constraints: Constraints, guess: Guess, closed: Mapping[str, float], title: str
+) -> list[dict[str, float]]:
+    """Other poses, on a walk in random directions that the constraints leave free."""
+    found: list[dict[str, float]] = []
+    random = np.random.default_rng(0)
+    names = constraints.moving
+    loose = replace(guess, fixed=frozenset(), started=frozenset())
+    here = dict(closed)
+    for _ in range(POSES):
+        _, sizes, right = np.linalg.svd(_matrix(constraints, here))
+        free = right[np.count_nonzero(sizes > RANK) :]
+        if not len(free):
+            break
+        point = np.array([here[n] for n in names])
+        move = random.standard_normal(len(free)) @ free
+        move *= STEP * max(1.0, float(np.abs(point).max())) / np.abs(move).max()
+        try:
+            here = _close(
+                constraints, loose, {**here, **dict(zip(names, (point + move).tolist(), strict=True))}, title
+            )
+        except InitializationError:
+            continue
+        residual, _ = constraints.level.look(np.array([here[n] for n in constraints.level.leaves]))
+        if np.abs(residual).max() < CLOSED:
+            found.append(here)
+    return found
+
+
+def _independent(matrices: Sequence[np.ndarray], firm: int) -> set[int]:
+    """Which of the rows after the firm ones to keep; poses of lower rank than others have no say."""
+    ranks = [np.linalg.matrix_rank(m, tol=RANK) for m in matrices]
+    rests = [_beyond(m[firm:], m[:firm]) for m, r in zip(matrices, ranks, strict=True) if r == max(ranks)]
+    kept: set[int] = set()
+    while True:
+        sizes = np.min([np.linalg.norm(rest, axis=1) for rest in rests], axis=0, initial=np.inf)
+        if sizes.size == 0 or sizes.max() <= RANK:
+            return kept
+        best = int(np.argmax(sizes))
+        kept.add(best)
+        for rest in rests:
+            direction = rest[best] / np.linalg.norm(rest[best])
+            rest -= np.outer(rest @ direction, direction)
+            rest[best] = 0.0
+
+
+def _refuse_conflicts(
+    flat: FlatModel, constraints: Constraints, closed: Mapping[str, float], kept: set[int]
+) -> None:
+    """StructureError where a constraint repeats others only as long as the inputs happen to agree."""
+    inputs = [n for n in constraints.level.leaves if n in constraints.known]
+    if not inputs:
+        return
+    matrix = _matrix(constraints, closed, inputs)
+    firm = constraints.firm
+    rows = [*range(firm), *(firm + k for k in sorted(kept))]
+    rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)
+    against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
+    if against:
+        raise StructureError(
+            f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
+            "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: "
+            "leave one drive out, or drive by a force"
+        )
+
+
+def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """What of the rows lies beyond the span of the others."""
+    if not len(others):
+        return rows.copy()
+    _, sizes, right = np.linalg.svd(others, full_matrices=False)
+    span = right[sizes > RANK * sizes[0]]
+    rest = rows - (rows @ span.T) @ span
+    return rest - (rest @ span.T) @ span
+
+
+def _with_zero_forces(flat: FlatModel, redundant: Sequence[Equation]) -> FlatModel:
+    """The forces of redundant constraints are zero; the constraints are gone."""
+    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
+    left_out = {id(e) for e in redundant}
+    equations = tuple(
+        replace(e, left=symbols[e.dual], right=ca.SX(0), label=f"no force for {e.name}")
+        if id(e) in left_out
+        else e
+        for e in flat.equations
+    )
+    return replace(flat, equations=equations)

@@ -1,0 +1,71 @@
+"""What the start values of a model say about the symbols of its reduced equations."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.errors import InitializationError
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable
+from gantrytau.language.symbols import derivative_name
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold."""
+
+    values: Mapping[str, float]
+    started: frozenset[str]
+    fixed: frozenset[str]
+
+
+def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> Guess:
+    """Start attributes carried over to the symbols of the reduced equations."""
+    values: dict[str, float] = dict.fromkeys(symbols, 0.0)
+    owners: dict[str, tuple[bool, int]] = {}
+    fixed: dict[str, str] = {}
+    for variable in flat.variables:
+        if variable.start is None:
+            continue
+        numbers = table.number(ca.vertcat(*variable.start))
+        for name, number in zip(variable.elements, numbers, strict=True):
+            _place(variable, name, float(number), table, reduced, values, owners, fixed)
+    for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
+        values[event.name] = _own_start(flat, table, event.name)
+    values.update(table.values)
+    values[flat.time.name()] = 0.0
+    return Guess(values, frozenset(owners), frozenset(fixed))
+
+
+def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
+    variable = next(v for v in flat.variables if name in v.elements)
+    if variable.start is None:
+        return 0.0
+    return float(table.number(variable.start[variable.elements.index(name)])[0])
+
+
+def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:
+    alias = reduced.aliases[name]
+    if alias.root is None:
+        constant = float(table.number(alias.offset)[0])
+        if variable.fixed and abs(number - constant) > 1e-9 * max(1.0, abs(constant)):
+            raise InitializationError(
+                f"{name}: found the fixed start {number:g}, but it is constant and equal to {constant:g}; leave it out"
+            )
+        return
+    symbol = derivative_name(alias.root, alias.order)
+    value = (number - float(table.number(alias.offset)[0])) / alias.factor
+    if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
+        raise InitializationError(
+            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
+            "it is an alias; "
+            "release one with Start(...) instead of Fixed(...)"
+        )
+    rank = (not variable.fixed, name.count("."))
+    if symbol not in owners or rank < owners[symbol]:
+        owners[symbol] = rank
+        values[symbol] = value
+    if variable.fixed:
+        fixed[symbol] = name

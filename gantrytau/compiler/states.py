@@ -1,0 +1,115 @@
+"""Choice of states: dummy derivatives as a greedy weighted basis on numbers.
+
+Mattsson and Söderlind, SIAM J. Sci. Comput. 14, 1993: where a constraint was differentiated, as many
+derivatives become plain unknowns. Which ones is decided on the Jacobian at a consistent point, the least
+preferred variables first, so that the choice cannot be singular there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.blocks.pivots import sample_values
+from gantrytau.compiler.index_reduction import Indexed
+from gantrytau.errors import StructureError
+from gantrytau.language.declarations import StateSelect
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+GOOD_PIVOT = 0.05  # of the column before elimination: smaller ones wait for a better preferred variable
+LEAST_PIVOT = 1e-9
+
+
+@dataclass(frozen=True)
+class StateChoice:
+    """states: names, in order; dummies: derivatives that became plain unknowns; condition: of the choice."""
+
+    states: tuple[str, ...]
+    dummies: tuple[str, ...]
+    condition: float
+
+
+def choose_states(
+    indexed: Indexed,
+    reduced: Reduced,
+    sample: Mapping[str, float],
+    preference: Mapping[str, int],
+    wanted: Sequence[str],
+    title: str,
+) -> StateChoice:
+    """States of the index-reduced system.
+
+    sample: consistent numbers; preference: StateSelect by variable; wanted: names the caller asks for.
+    Raises StructureError if a wanted or compulsory state cannot be one, or the equations are singular.
+    """
+    dummies: set[str] = set()
+    condition = 1.0
+    allowed: list[str] = [n for n, top in indexed.orders.items() if top >= 1]
+    for level in range(1, max(indexed.counts, default=0) + 1):
+        rows = [i for i, count in enumerate(indexed.counts) if count >= level]
+        columns = [n for n in allowed if indexed.orders[n] >= level]
+        chosen, conditioned = _basis(indexed, reduced, sample, preference, wanted, rows, columns, title)
+        condition = max(condition, conditioned)
+        dummies |= {derivative_name(n, indexed.orders[n] - level) for n in chosen}
+        allowed = chosen
+    states = tuple(
+        derivative_name(n, order)
+        for order in range(max(indexed.orders.values(), default=0))
+        for n, top in indexed.orders.items()
+        if order < top and derivative_name(n, order) not in dummies
+    )
+    missing = [n for n in wanted if n not in states]
+    if missing:
+        raise StructureError(
+            f"{title}: {missing[0]} cannot be a state together with the others asked for; the states of this "
+            f"model can be {', '.join(states)} ({len(states)} in all). Name other variables in "
+            "states=, or fewer"
+        )
+    return StateChoice(states, tuple(sorted(dummies)), condition)
+
+
+def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -> tuple[list[str], float]:
+    """Which variables become dependent: as many as there are rows, the least preferred first."""
+    x = ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in columns))
+    f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
+    matrix = sample_values(ca.jacobian(f, x), sample)
+    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
+    asked = {split_derivative(n)[0] for n in wanted}
+    groups: dict[int, list[int]] = {}
+    for place, name in enumerate(columns):
+        weight = StateSelect.ALWAYS + 1 if name in asked else preference.get(name, StateSelect.DEFAULT)
+        groups.setdefault(int(weight), []).append(place)
+    rest = matrix.copy()
+    norms = np.linalg.norm(matrix, axis=0)
+    chosen: list[int] = []
+    rounds = [(GOOD_PIVOT, w) for w in sorted(groups) if w <= StateSelect.ALWAYS]
+    rounds += [(LEAST_PIVOT, w) for w in sorted(groups)]  # what is asked for is given up last
+    for least, weight in rounds:
+        candidates = [j for j in groups[weight] if j not in chosen]
+        while len(chosen) < len(rows) and candidates:
+            sizes = np.linalg.norm(rest[:, candidates], axis=0)
+            best = int(np.argmax(sizes))
+            if not sizes[best] > least * max(norms[candidates[best]], 1e-12):
+                break
+            column = candidates.pop(best)
+            direction = rest[:, column] / np.linalg.norm(rest[:, column])
+            rest -= np.outer(direction, direction @ rest)
+            chosen.append(column)
+    if len(chosen) < len(rows):
+        raise StructureError(_singular(reduced, rows, matrix, title))
+    singular_values = np.linalg.svd(matrix[:, chosen], compute_uv=False)
+    return [columns[j] for j in sorted(chosen)], float(singular_values[0] / singular_values[-1])
+
+
+def _singular(reduced: Reduced, rows: Sequence[int], matrix: np.ndarray, title: str) -> str:
+    left, values, _ = np.linalg.svd(matrix)
+    weak = [i for i in np.argsort(-np.abs(left[:, -1]))[:4] if abs(left[i, -1]) > 0.1]
+    names = "; ".join(
+        f"{reduced.equations[rows[i]].name} `{reduced.equations[rows[i]].text[:80]}`" for i in sorted(weak)
+    )
+    return (
+        f"{title}: constraints depend on each other at the start (smallest singular value {values[-1]:.2g}, expected "
+        f"above {LEAST_PIVOT:g}): {names}. Start from another pose, or remove the constraint that repeats another"
+    )

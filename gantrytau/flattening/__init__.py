@@ -1,0 +1,1 @@
+"""From instances to one flat list of variables and equations: `FlatModel`."""

@@ -1,0 +1,313 @@
+"""From an inert model to one whose members are symbols: modifications applied, paths given, symbols made."""
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, StateSelect, evaluate
+from gantrytau.language.model import (
+    Connector,
+    Declared,
+    Model,
+    Outer,
+    check_member,
+    is_setting,
+    refuse_container,
+)
+from gantrytau.language.symbols import Symbols, element_names
+
+ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "description")
+
+
+@dataclass(frozen=True, eq=False)
+class Leaf:
+    """A modification and the instance in which its formulas are to be read.
+
+    more: modifications of a component that replaces another, from further out.
+    """
+
+    value: Any
+    scope: Any
+    more: Mapping[Any, Any] = field(default_factory=dict)
+
+
+@dataclass(eq=False)
+class Placed:
+    """A quantity of the instantiated model while its attributes are still formulas."""
+
+    path: str
+    name: str
+    declaration: Quantity
+    shape: tuple[int, ...]
+    symbol: ca.SX
+    attributes: dict[str, Leaf]
+    elements: list[str] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class Instance:
+    """An instantiated model: the root whose members are symbols, and lists of all that is in it."""
+
+    root: Any
+    symbols: Symbols
+    quantities: list[Placed]
+    components: list[tuple[str, Any]]
+    connectors: list[tuple[str, Any, str]]  # path, connector, path of the component it belongs to
+    paths: dict[int, str]  # id of a component or connector -> its path
+
+    def path(self, member: Any) -> str:
+        """The dotted path of a component or connector of this model."""
+        return self.paths[id(member)]
+
+
+def _made(kind: Any) -> Model:
+    """An instance of a class whose parameters all have values."""
+    try:
+        inspect.signature(kind).bind()
+    except TypeError as error:
+        raise ModelError(
+            f"{kind.__name__}: found the class, which needs arguments ({error}), expected an instance; write "
+            f"{kind.__name__}(...)"
+        ) from None
+    return kind()
+
+
+def instantiate(model: Model) -> Instance:
+    """A fresh instance of `model` with symbols of its own; ModelError with the path of what is wrong."""
+    if isinstance(model, type) and issubclass(model, Model):
+        model = _made(model)
+    if not isinstance(model, Model):
+        raise ModelError(f"found {type(model).__name__}, expected a Model (an instance, or its class)")
+    builder = _Builder()
+    root = builder.build(model, "", {}, None, [])
+    builder.resolve_outers()
+    return Instance(
+        root, builder.symbols, builder.quantities, builder.components, builder.connectors, builder.paths
+    )
+
+
+class _Builder:
+    def __init__(self) -> None:
+        self.symbols = Symbols()
+        self.quantities: list[Placed] = []
+        self.components: list[tuple[str, Any]] = []
+        self.connectors: list[tuple[str, Any, str]] = []
+        self.paths: dict[int, str] = {}
+        self.outers: list[tuple[Any, str, Outer, list[Any]]] = []
+
+    def build(self, template: Declared, path: str, outer: Mapping[Any, Any], scope: Any, around: list[Any]):
+        cls = type(template)
+        instance = cls.__new__(cls)
+        for name, value in vars(template).items():
+            if name == "_modifications":
+                continue
+            refuse_container(f"{path or cls.__name__}.{name}", value)
+            if isinstance(value, (Declared, Quantity, Array)):
+                raise ModelError(
+                    f"{path or cls.__name__}.{name} is assigned in __init__, where it would be lost; "
+                    "declare it in the class body and modify it by keyword"
+                )
+            instance.__dict__[name] = value
+        self.paths[id(instance)] = path
+        modifications = _merge(_wrap(template.modifications, scope), outer)
+        for name in modifications:
+            check_member(cls, name, f"{path} ({cls.__name__})" if path else cls.__name__)
+            if is_setting(getattr(cls, name), name):
+                instance.__dict__[name] = _setting(modifications[name], f"{path}.{name}")
+        if isinstance(instance, Connector):
+            owner = next((one for one in reversed(around) if not isinstance(one, Connector)), None)
+            self.connectors.append((path, instance, "" if owner is None else self.paths[id(owner)]))
+        else:
+            self.components.append((path, instance))
+        members = cls.members()
+        quantities = {name: m for name, m in members.items() if isinstance(m, Quantity)}
+        for name, member in quantities.items():
+            self._quantity(instance, path, name, member, modifications.get(name))
+        for name, member in members.items():
+            if name not in quantities:
+                self._component(instance, path, name, member, modifications.get(name, {}), around)
+        return instance
+
+    def _component(
+        self, instance: Any, path: str, name: str, member: Any, modification: Any, around: list[Any]
+    ):
+        place = f"{path}.{name}" if path else name
+        scope = instance
+        if isinstance(modification, Leaf):  # redeclaration
+            wanted, scope = modification.value, modification.scope
+            if not isinstance(wanted, (Declared, Array)) or isinstance(wanted, Array) != isinstance(
+                member, Array
+            ):
+                raise ModelError(
+                    f"{place}: found {wanted!r} as modification, expected a component that replaces "
+                    f"{type(member).__name__}, or dict(...) to modify it"
+                )
+            member, modification = wanted, modification.more
+        if isinstance(member, Outer):
+            self.outers.append((instance, name, member, [*around, instance]))
+        elif isinstance(member, Array):
+            common = {key: value for key, value in modification.items() if isinstance(key, str)}
+            count = 1 + max((key for key in modification if isinstance(key, int)), default=-1)
+            if count not in (0, len(member)):
+                raise ModelError(
+                    f"{place}: found {count} modifications, expected one for each of {len(member)}"
+                )
+            built = []
+            for index, element in enumerate(member):
+                one = modification.get(index, {})
+                here, own = scope, one
+                if isinstance(one, Leaf):
+                    element, here, own = one.value, one.scope, one.more
+                built.append(
+                    self.build(element, f"{place}[{index}]", _merge(common, own), here, [*around, instance])
+                )
+            instance.__dict__[name] = tuple(built)
+        else:
+            instance.__dict__[name] = self.build(member, place, modification, scope, [*around, instance])
+
+    def _quantity(self, instance: Any, path: str, name: str, declaration: Quantity, modification: Any):
+        full = f"{path}.{name}" if path else name
+        attributes = {
+            key: Leaf(getattr(declaration, key), instance)
+            for key in ATTRIBUTES
+            if getattr(declaration, key, None) is not None
+        }
+        if (
+            isinstance(modification, Leaf)
+            and isinstance(modification.value, Quantity)
+            and not modification.value.name
+        ):
+            # an unnamed declaration replaces this one: mass=Free(9.0)
+            new = modification.value
+            attributes |= {
+                key: Leaf(getattr(new, key), modification.scope)
+                for key in ATTRIBUTES
+                if getattr(new, key, None) not in (None, "")
+            }
+            declaration = new
+        elif modification is not None:
+            changes = _attributes(modification, full)
+            if isinstance(declaration, Parameter) and changes.keys() & {"start", "fixed"}:
+                raise ModelError(
+                    f"{full}: found a start value, but it is a parameter, which has one value; write "
+                    f"{name}=... with the number"
+                )
+            attributes |= changes
+        shape = _shape(declaration, attributes, instance, full)
+        names = element_names(full, shape)
+        kind = declaration.kind
+        vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
+        symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
+        instance.__dict__[name] = symbol
+        self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names))
+
+    def resolve_outers(self) -> None:
+        for instance, name, wanted, around in self.outers:
+            for enclosing in reversed(around):
+                found = [x for x in vars(enclosing).values() if isinstance(x, wanted.component)]
+                if len(found) > 1:
+                    kind = wanted.component.__name__
+                    raise ModelError(
+                        f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found "
+                        f"{' and '.join(self.paths[id(x)] for x in found)}, each a {kind}, of which "
+                        f"{self.paths[id(instance)]} cannot choose one; expected one {kind}; for other frames that do not "
+                        "move take Fixed"
+                    )
+                if found and found[0] is not instance:
+                    instance.__dict__[name] = found[0]
+                    break
+            else:
+                place = self.paths[id(instance)] or type(instance).__name__
+                kind = wanted.component.__name__
+                raise ModelError(
+                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, "
+                    "expected one; "
+                    f"declare `{kind.lower()} = {kind}()` in the body of {type(around[0]).__name__}"
+                )
+
+
+def _setting(modification: Any, path: str) -> Any:
+    if isinstance(modification, Leaf) and isinstance(modification.value, (bool, int, float, str)):
+        return modification.value
+    raise ModelError(f"{path}: found a modification that is no plain value, expected a number, bool or text")
+
+
+def _shape(
+    declaration: Quantity, attributes: Mapping[str, Leaf], instance: Any, path: str
+) -> tuple[int, ...]:
+    shape = evaluate(declaration.declared_shape, instance)
+    if (
+        isinstance(declaration, Parameter)
+        and shape == ()
+        and declaration.value is None
+        and "value" in attributes
+    ):
+        value = attributes["value"].value
+        if isinstance(value, (int, float, list, tuple, np.ndarray)):
+            shape = np.shape(value)
+    if isinstance(shape, (int, np.integer)):
+        shape = (int(shape),)
+    if not isinstance(shape, tuple) or len(shape) > 2 or any(not isinstance(n, int) or n < 1 for n in shape):
+        raise ModelError(f"{path}: found shape {shape!r}, expected (), a positive int, or two of them")
+    return shape
+
+
+def _attributes(modification: Any, path: str) -> dict[str, Leaf]:
+    """The attributes that a modification of a variable or parameter sets."""
+    if isinstance(modification, Leaf):
+        if isinstance(modification.value, (Start, Bounds)):
+            found = modification.value.attributes()
+            return {key: Leaf(value, modification.scope) for key, value in found.items() if value is not None}
+        if isinstance(modification.value, (Declared, Array)):
+            raise ModelError(f"{path}: found a component as modification of a quantity, expected a value")
+        return {"value": modification}
+    unknown = set(modification) - set(ATTRIBUTES)
+    if unknown:
+        raise ModelError(f"{path} has no attribute '{unknown.pop()}'; there is {', '.join(ATTRIBUTES)}.")
+    return dict(modification)
+
+
+def _wrap(modifications: Mapping[str, Any], scope: Any) -> dict[Any, Any]:
+    return {name: _wrap_value(value, scope) for name, value in modifications.items()}
+
+
+def _wrap_value(value: Any, scope: Any) -> Any:
+    if isinstance(value, (Start, Bounds)):  # attributes, so that one does not erase the other
+        return {key: Leaf(x, scope) for key, x in value.attributes().items() if x is not None}
+    if isinstance(value, Mapping):
+        return _wrap(value, scope)
+    if isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value):
+        return {index: _wrap_value(item, scope) for index, item in enumerate(value)}
+    return Leaf(value, scope)
+
+
+def _replaces(modification: Any) -> bool:
+    """Whether a modification is a component in place of another."""
+    return isinstance(modification, Leaf) and isinstance(modification.value, Declared)
+
+
+def _merge(below: Mapping[Any, Any], above: Mapping[Any, Any]) -> dict[Any, Any]:
+    merged = dict(below)
+    numbered = [key for key in below if isinstance(key, int)]
+    for key, value in above.items():
+        if numbered and isinstance(key, str):  # for every element of an array
+            for index in numbered:
+                if isinstance(merged[index], dict):
+                    merged[index] = _merge(merged[index], {key: value})
+        elif isinstance(merged.get(key), dict) and isinstance(value, dict):
+            merged[key] = _merge(merged[key], value)
+        elif _replaces(merged.get(key)) and isinstance(value, dict):
+            merged[key] = replace(merged[key], more=_merge(merged[key].more, value))
+        else:
+            merged[key] = value
+    return merged
+
+
+def prefer_of(attributes: Mapping[str, Leaf]) -> StateSelect:
+    """The state preference among the attributes of a variable."""
+    return StateSelect(attributes["prefer"].value) if "prefer" in attributes else StateSelect.DEFAULT

@@ -1,0 +1,265 @@
+"""Orientation and the like are passed on along a spanning tree of the connectors, not solved for.
+
+Modelica breaks loops of orientation by overconstrained equation operators; here a propagated quantity is
+an expression from the start. The tree takes the unbreakable branches inside components first, then the
+connections, then branches that may be cut. A connection that is left over closes a loop.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.flattening.flat_model import Loop
+from gantrytau.flattening.instantiation import Instance
+from gantrytau.language.model import Connector
+from gantrytau.language.statements import Branch, Connection, Equation, Root
+from gantrytau.language.symbols import scalars, split_derivative
+
+
+@dataclass(frozen=True, eq=False)
+class _Edge:
+    a: str
+    b: str
+    branch: Branch | None  # None: a connection, all quantities are equal
+    connection: tuple[str, Connection] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """How propagated quantities reach every connector.
+
+    reached: (connector, edge, root) in an order in which each comes after the one it is reached from;
+    used: ids of the branches and roots whose coordinates exist; closing: connections that close loops.
+    """
+
+    nodes: Mapping[str, Any]
+    reached: tuple[tuple[str, _Edge | None, Root | None], ...]
+    used: frozenset[int]
+    closing: tuple[tuple[tuple[str, Connection], Loop], ...]
+    repeated: frozenset[int]  # ids of connections that say what others say
+
+
+def spanning_tree(
+    instance: Instance,
+    connections: Iterable[tuple[str, Connection]],
+    branches: Sequence[Branch],
+    roots: Sequence[Root],
+) -> Tree:
+    """The spanning tree over all connectors with propagated quantities."""
+    nodes = {path: c for path, c, _ in instance.connectors if propagated(c)}
+    firm = [_Edge(instance.path(b.a), instance.path(b.b), b) for b in branches if b.coordinates is None]
+    loose = [_Edge(instance.path(b.a), instance.path(b.b), b) for b in branches if b.coordinates is not None]
+    joins = [
+        _Edge(instance.path(c.a), instance.path(c.b), None, (where, c))
+        for where, c in connections
+        if isinstance(c.a, Connector)
+        and propagated(c.a)
+        and id(c.a) in instance.paths
+        and id(c.b) in instance.paths
+    ]
+    group, together = _Groups(), _Groups()
+    at = {instance.path(r.connector): r for r in roots if r.coordinates is None}
+    for path in list(at)[1:]:  # several roots hang on one virtual root
+        group.join(path, next(iter(at)))
+    tree: list[_Edge] = []
+    closing: list[_Edge] = []
+    repeated: set[int] = set()
+    for edge in (*firm, *joins, *loose):
+        if edge.connection is not None and not together.join(edge.a, edge.b):
+            repeated.add(id(edge.connection[1]))
+        elif group.join(edge.a, edge.b):
+            tree.append(edge)
+        elif edge.connection is not None or edge in firm:
+            closing.append(edge)
+    for candidate in roots:
+        path = instance.path(candidate.connector)
+        if candidate.coordinates is not None and not (at and group.find(path) == group.find(next(iter(at)))):
+            at[path] = candidate
+            group.join(path, next(iter(at)))
+    reached = tuple(_from_the_roots(tree, at))
+    used = {id(e.branch) for e in tree if e.branch} | {id(r) for r in at.values()}
+    way = {path: edge for path, edge, _ in reached}
+    loops = []
+    for edge in closing:
+        if edge.connection is None:
+            raise ModelError(
+                f"{edge.a} and {edge.b}: rigid ways inside of components close a loop, expected a connection in "
+                "each loop; let one of the components connect its parts"
+            )
+        loops.append((edge.connection, Loop(edge.a, edge.b, _round(instance, edge, way))))
+    return Tree(nodes, reached, frozenset(used), tuple(loops), frozenset(repeated))
+
+
+class _Groups:
+    """Sets of names that grow together."""
+
+    def __init__(self) -> None:
+        self.parent: dict[str, str] = {}
+
+    def find(self, name: str) -> str:
+        while (above := self.parent.setdefault(name, name)) != name:
+            self.parent[name] = self.parent.get(above, above)
+            name = above
+        return name
+
+    def join(self, a: str, b: str) -> bool:
+        """Whether the two were apart before."""
+        a, b = self.find(a), self.find(b)
+        self.parent[a] = b
+        return a != b
+
+
+def propagated(connector: Connector) -> dict[str, Any]:
+    """The propagated quantities that a connector declares, by name."""
+    return {n: m for n, m in type(connector).members().items() if getattr(m, "kind", "") == "propagated"}
+
+
+def _from_the_roots(
+    tree: Iterable[_Edge], roots: Mapping[str, Root]
+) -> Iterator[tuple[str, _Edge | None, Root | None]]:
+    neighbours: dict[str, list[tuple[str, _Edge]]] = {}
+    for edge in tree:
+        neighbours.setdefault(edge.a, []).append((edge.b, edge))
+        neighbours.setdefault(edge.b, []).append((edge.a, edge))
+    queue: list[tuple[str, _Edge | None, Root | None]] = [(path, None, r) for path, r in roots.items()]
+    seen = set(roots)
+    for path, edge, here in queue:
+        yield path, edge, here
+        for other, way in neighbours.get(path, ()):
+            if other not in seen:
+                seen.add(other)
+                queue.append((other, way, None))
+
+
+def _round(instance: Instance, closing: _Edge, way: Mapping[str, _Edge | None]) -> tuple[str, ...]:
+    """Components on the way from one end of a closing connection through the tree to the other."""
+    owners = {path: owner for path, _, owner in instance.connectors}
+
+    def up(path: str) -> list[str]:
+        found = [path]
+        while (edge := way.get(found[-1])) is not None:
+            found.append(edge.a if edge.b == found[-1] else edge.b)
+        return found
+
+    one, two = up(closing.a), up(closing.b)
+    while len(one) > 1 and len(two) > 1 and one[-2:] == two[-2:]:
+        one.pop()
+        two.pop()
+    paths = [*one, *reversed(two[:-1] if one[-1] == two[-1] else two)]
+    return tuple(dict.fromkeys(owners[path] for path in paths if owners[path]))
+
+
+def propagate(instance: Instance, tree: Tree) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
+    """What propagated scalars are: those equal to a number or another symbol, and the expressions of the others.
+
+    Both by name, in an order in which each comes after those it needs. Quantities that no root reaches
+    are in neither.
+    """
+    plain: dict[str, ca.SX] = {}
+    defined: dict[str, ca.SX] = {}
+    for path, edge, root in tree.reached:
+        connector = tree.nodes[path]
+        given = _given(path, connector, edge, root, instance, tree)
+        for name, declaration in propagated(connector).items():
+            value = ca.densify(ca.SX(given.get(name, declaration.start)))
+            symbols = scalars(getattr(connector, name))
+            if value.numel() != len(symbols):
+                raise ModelError(
+                    f"{path}: {name} is given with shape {value.shape}, expected {getattr(connector, name).shape}"
+                )
+            leaves = [leaf for leaf in ca.symvar(value) if leaf.name() in plain]
+            if leaves:
+                known = ca.vertcat(*(plain[leaf.name()] for leaf in leaves))
+                value = ca.substitute(value, ca.vertcat(*leaves), known)
+            for symbol, element in zip(symbols, value.elements(), strict=True):
+                simple = element.is_constant() or element.is_symbolic()
+                (plain if simple else defined)[symbol.name()] = element
+    return plain, defined
+
+
+def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, instance: Instance, tree: Tree):
+    """The propagated quantities of a connector in terms of the one it is reached from."""
+    if root is not None or edge is None:
+        return {} if root is None else root.values
+    if edge.branch is None:
+        source = tree.nodes[edge.a if path == edge.b else edge.b]
+        return {name: getattr(source, name) for name in propagated(source)}
+    given = edge.branch.forward if path == edge.b else edge.branch.backward
+    missing = [name for name in propagated(connector) if name not in given]
+    if missing:
+        raise ModelError(
+            f"branch({edge.a}, {edge.b}) says nothing of {missing[0]}, expected {', '.join(propagated(connector))} "
+            "in forward and in backward"
+        )
+    return given
+
+
+class Spread:
+    """Propagated quantities of an instantiated model, and equations with the plain ones replaced.
+
+    definitions: expressions by scalar name; rates: declared time derivatives of those that are not plain.
+    """
+
+    def __init__(self, instance: Instance, tree: Tree):
+        self._symbols = instance.symbols
+        self._plain, defined = propagate(instance, tree)
+        self._nodes = tree.nodes
+        self.rates: dict[str, ca.SX] = {}
+        for connector in tree.nodes.values():
+            for name, declaration in propagated(connector).items():
+                names = [s.name() for s in scalars(getattr(connector, name))]
+                if declaration.rate is not None and any(n in defined for n in names):
+                    rate = self._inserted(ca.densify(declaration.rate(connector))).elements()
+                    self.rates.update((n, r) for n, r in zip(names, rate, strict=True) if n in defined)
+        self.definitions = {**self._plain, **defined}
+
+    def _inserted(self, expression: ca.SX) -> ca.SX:
+        """The expression with plain quantities and their derivatives replaced."""
+        old, new = [], []
+        for leaf in ca.symvar(expression):
+            base, order = split_derivative(leaf.name())
+            if base in self._plain:
+                value = self._plain[base]
+                for _ in range(order):
+                    value = self._symbols.total_derivative(value)
+                old.append(leaf)
+                new.append(value)
+        return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
+
+    def substituted(self, equations: Iterable[Equation]) -> tuple[Equation, ...]:
+        """The equations with plain quantities replaced."""
+        equations = tuple(equations)
+        if not equations:
+            return ()
+        rated = [e.rate for e in equations if e.rate is not None]
+        sides = [side for e in equations for side in (e.left, e.right)]
+        found = self._inserted(ca.vertcat(*sides, *rated)).elements()
+        rates = iter(found[len(sides) :])
+        return tuple(
+            replace(
+                e, left=found[2 * i], right=found[2 * i + 1], rate=None if e.rate is None else next(rates)
+            )
+            for i, e in enumerate(equations)
+        )
+
+    def refuse_undefined(self, equations: Iterable[Equation]) -> None:
+        """StructureError for an orientation that something depends on and nothing determines."""
+        everything = {
+            s.name(): path
+            for path, c in self._nodes.items()
+            for n in propagated(c)
+            for s in scalars(getattr(c, n))
+        }
+        undefined = everything.keys() - self.definitions.keys()
+        for equation in equations if undefined else ():
+            for leaf in ca.symvar(equation.residual):
+                name = split_derivative(leaf.name())[0]
+                if name in undefined:
+                    raise StructureError(
+                        f"{everything[name]}: nothing determines the orientation of this frame, on which "
+                        f"{equation.name} depends: its rotation is free. Connect it to the world through joints, or "
+                        "to a Body, which brings inertia and an orientation of its own"
+                    )

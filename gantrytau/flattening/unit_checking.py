@@ -1,0 +1,226 @@
+"""Checks that the two sides of every equation, and the terms of every sum, have one dimension.
+
+A number has no unit of its own: in a product it counts as one, in a sum it takes the unit of its
+neighbours. Quantities declared without a unit fit anywhere.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+import casadi as ca
+
+from gantrytau.errors import ModelError
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.events import unit_equations
+from gantrytau.language.symbols import split_derivative
+from gantrytau.language.units import ONE, Dimension, dimension, unit_text
+
+NUMBER = "number"
+ANY = "any"
+Unit = Dimension | str
+
+SAME = {
+    ca.OP_ADD,
+    ca.OP_SUB,
+    ca.OP_FMIN,
+    ca.OP_FMAX,
+    ca.OP_HYPOT,
+    ca.OP_FMOD,
+    ca.OP_REMAINDER,
+    ca.OP_COPYSIGN,
+}
+RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
+KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
+ANGLES = {
+    getattr(ca, f"OP_{name}"): name.lower()
+    for name in [
+        "SIN",
+        "COS",
+        "TAN",
+        "ASIN",
+        "ACOS",
+        "ATAN",
+        "SINH",
+        "COSH",
+        "TANH",
+        "ASINH",
+        "ACOSH",
+        "ATANH",
+        "EXP",
+        "LOG",
+        "LOG1P",
+        "EXPM1",
+        "ERF",
+    ]
+}
+POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
+
+
+def check_units(flat: FlatModel) -> None:
+    """ModelError naming equation, the two terms and their units, for the first that disagree."""
+    units = symbol_units(flat)
+    symbols = [
+        flat.time,
+        *(
+            s
+            for v in (*flat.variables, *flat.parameters, *flat.propagated)
+            for s in v.symbol.elements()
+            if s.is_symbolic()
+        ),
+    ]
+    symbols += list(flat.derivatives.values())
+    given = [units[s.name()] for s in symbols]
+    for equations in (flat.equations, flat.initial_equations, unit_equations(flat)):
+        sides = [side for e in equations for side in (e.left, e.right)]
+        found = _infer(symbols, given, sides, lambda place, _eqs=equations: _eqs[place // 2].name)
+        for equation, left, right in zip(equations, found[::2], found[1::2], strict=True):
+            if not _agree(left, right):
+                raise ModelError(
+                    f"{equation.name}: units disagree in `{equation.text[:160]}`: the left side is in "
+                    f"{_text(left)}, the right side in {_text(right)}; correct the equation or a declaration"
+                )
+
+
+def symbol_units(flat: FlatModel) -> Mapping[str, Unit]:
+    """Dimension of every scalar symbol, derivatives included, by name."""
+    units: dict[str, Unit] = {flat.time.name(): dimension("s")}
+    for variable in (*flat.variables, *flat.parameters, *flat.propagated):
+        unit: Unit = ANY if variable.unit is None else _read(variable.unit, variable.name)
+        units.update(dict.fromkeys(variable.elements, unit))
+    for name in flat.derivatives:
+        base, order = split_derivative(name)
+        unit = units.get(base, ANY)
+        units[name] = unit if isinstance(unit, str) else _times(unit, dimension("s"), Fraction(-order))
+    return units
+
+
+def _read(unit: str, path: str) -> Dimension:
+    try:
+        return dimension(unit)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def _infer(symbols, given, expressions, place_name) -> list[Unit]:
+    """Units of scalar expressions, by one walk over their instructions."""
+    function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
+    work: dict[int, Unit] = {}
+    text: dict[int, str] = {}
+    found: list[Unit] = [ANY] * len(expressions)
+    failures: dict[int, str] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        inputs = function.instruction_input(k)
+        outputs = function.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            found[outputs[0]] = work[inputs[0]]
+            if inputs[0] in failures:
+                raise ModelError(f"{place_name(outputs[0])}: {failures[inputs[0]]}")
+            continue
+        target = outputs[0]
+        failures.pop(target, None) if target not in inputs else None
+        if operation == ca.OP_INPUT:
+            work[target], text[target] = given[inputs[0]], symbols[inputs[0]].name()
+            continue
+        if operation == ca.OP_CONST:
+            value = function.instruction_constant(k)
+            work[target], text[target] = (ANY if value == 0 else NUMBER), f"{value:g}"
+            continue
+        carried = next((failures[i] for i in inputs if i in failures), None)
+        units, words = [work[i] for i in inputs], [text[i] for i in inputs]
+        constant = None
+        if operation in (ca.OP_POW, ca.OP_CONSTPOW) and units[1] == NUMBER:
+            constant = Fraction(words[1]).limit_denominator(1000)
+        unit, fault = _unit(operation, units, words, constant)
+        work[target], text[target] = unit, _words(operation, words)
+        if carried or fault:
+            failures[target] = carried or fault or ""
+        else:
+            failures.pop(target, None)
+    return found
+
+
+def _unit(
+    operation: int, units: list[Unit], words: list[str], power: Fraction | None
+) -> tuple[Unit, str | None]:
+    """Unit of one operation, and a message if its operands do not fit."""
+    first, second = units[0], units[-1]
+    if operation in SAME or operation in RELATIONS:
+        fault = None
+        if not _agree(first, second):
+            fault = (
+                f"units disagree: `{words[0][:60]}` is in {_text(first)}, `{words[1][:60]}` in "
+                f"{_text(second)}; "
+                "both must be the same to be added or compared"
+            )
+        merged = next((u for u in units if not isinstance(u, str)), ANY if ANY in units else NUMBER)
+        return (ONE if operation in RELATIONS else merged), fault
+    if operation in KEEP:
+        return first, None
+    if operation == ca.OP_MUL:
+        return _product(first, second, Fraction(1)), None
+    if operation == ca.OP_DIV:
+        return _product(first, second, Fraction(-1)), None
+    if operation == ca.OP_TWICE:
+        return first, None
+    if operation in POWERS:
+        return _power(first, POWERS[operation]), None
+    if operation in (ca.OP_POW, ca.OP_CONSTPOW):
+        return (_power(first, power) if power is not None else ANY), None
+    if operation == ca.OP_ATAN2:
+        return ONE, None if _agree(first, second) else f"atan2({words[0]}, {words[1]}) of different units"
+    if operation in ANGLES:
+        if isinstance(first, str) or first == ONE:
+            return ONE, None
+        name = ANGLES[operation]
+        return ONE, (
+            f"the argument of {name}, `{words[0][:60]}`, is in {_text(first)}, expected 1 or rad; "
+            "divide it by a Parameter with that unit"
+        )
+    if operation == ca.OP_IF_ELSE_ZERO:
+        return second, None
+    return (ONE if operation in (ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN) else ANY), None
+
+
+def _product(first: Unit, second: Unit, sign: Fraction) -> Unit:
+    if ANY in (first, second):
+        return ANY
+    if first == NUMBER and second == NUMBER:
+        return NUMBER
+    a = ONE if isinstance(first, str) else first
+    b = ONE if isinstance(second, str) else second
+    return _times(a, b, sign)
+
+
+def _times(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
+    if second == ONE:
+        return first
+    if power == 1:
+        return tuple(a + b for a, b in zip(first, second, strict=True))
+    return tuple(a + power * b for a, b in zip(first, second, strict=True))
+
+
+def _power(unit: Unit, power: Fraction) -> Unit:
+    return unit if isinstance(unit, str) else tuple(power * exponent for exponent in unit)
+
+
+def _agree(first: Unit, second: Unit) -> bool:
+    return isinstance(first, str) or isinstance(second, str) or first == second
+
+
+def _text(unit: Unit) -> str:
+    return unit if isinstance(unit, str) else f"'{unit_text(unit)}'"
+
+
+SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+
+
+def _words(operation: int, words: list[str]) -> str:
+    if operation in SIGNS:
+        inside = SIGNS[operation].join(words)
+        return f"({inside})"[:200]
+    if operation == ca.OP_SQ:
+        return f"{words[0]}^2"
+    if operation == ca.OP_NEG:
+        return f"-{words[0]}"
+    return f"{ANGLES.get(operation, 'f')}({', '.join(words)})"[:200]

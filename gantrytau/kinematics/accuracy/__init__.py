@@ -1,0 +1,1 @@
+"""How far errors of the actuators carry the tool."""

@@ -1,0 +1,106 @@
+"""What is wrong with a hexapod, and what is special about it."""
+
+from typing import Any
+
+import numpy as np
+
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.kinematics.modes.link_crossings import PAIRS
+from gantrytau.kinematics.modes.study_coordinates import quadrics
+from gantrytau.kinematics.modes.study_roots import placed
+from gantrytau.kinematics.poses import floats, real, told
+
+EXACT = 1e-9  # by the size of the hexapod: joints nearer than this coincide
+DEPENDENT = 1e-10  # least singular value of the conditions of the links by the largest; the F1 has 0.05
+_PATH = "assembly_modes"
+
+
+def checked_hexapod(base: Any, platform: Any, lengths: Any, diameter: float) -> tuple[np.ndarray, ...]:
+    """Joints and lengths as arrays of floats. Raises ModelError and StructureError as `assembly_modes` says."""
+    base, platform = _array(base, "base", (6, 3)), _array(platform, "platform", (6, 3))
+    lengths = _array(lengths, "lengths", (6,))
+    if (lengths <= 0).any():
+        k = int(np.flatnonzero(lengths <= 0)[0])
+        raise ModelError(
+            f"{_PATH}: found lengths[{k}] = {lengths[k]:g}, expected lengths above 0 m; a link joins two places"
+        )
+    if not 0 <= real(diameter) < np.inf:
+        raise ModelError(
+            f"{_PATH}: found diameter {diameter!r}, expected 0 or more, in m; leave it out for thin links"
+        )
+    for name, joints in (("base", base), ("platform", platform)):
+        if _extents(joints)[1] <= EXACT * max(_extents(joints)[0], EXACT * lengths.max()):
+            raise StructureError(
+                f"{_PATH}: found all joints of the {name} on one line, about which links do not hold it; expected "
+                "joints that span a plane at least; move one of them"
+            )
+    _check_dependence(base, platform, lengths)
+    return base, platform, lengths
+
+
+def specialities(base: np.ndarray, platform: np.ndarray, lengths: np.ndarray) -> list[str]:
+    """What about the joints makes modes fewer, pairs of them, or singular."""
+    found = []
+    small = EXACT * max(lengths.max(), _extents(base)[0])
+    for name, joints in (("base", base), ("platform", platform)):
+        pairs = _pairs(_distances(joints) < small)
+        if pairs:
+            found.append(
+                f"joints {pairs} of the {name} coincide: modes are fewer than 40 where three do, or pairs do"
+            )
+    if all(_extents(joints)[2] < EXACT * _extents(joints)[0] for joints in (base, platform)):
+        found.append(
+            "joints lie in a plane on base and platform: modes are pairs, mirrored by the plane of the base"
+        )
+    i, j = PAIRS.T
+    alike = (np.abs(_distances(base) - _distances(platform)) < small) & (_distances(base) >= small)
+    if pairs := _pairs(alike & (np.abs(lengths[i] - lengths[j]) < small)):
+        found.append(f"links {pairs} form parallelograms: modes with crossed links are near singular ones")
+    return found
+
+
+def _array(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    expected = f"{'six joints, (6, 3)' if len(shape) == 2 else 'six lengths, (6,)'} in m"
+    found = floats(value)
+    if found.shape == ():
+        raise ModelError(
+            f"{_PATH}: found {name} {told(value)}, expected {expected}; give numbers, not complex ones"
+        )
+    if found.shape != shape:
+        raise ModelError(
+            f"{_PATH}: found {name} of shape {found.shape}, expected {expected}; one hexapod and one pose at a time"
+        )
+    if not np.isfinite(found).all():
+        k = int(np.flatnonzero(~np.isfinite(found).reshape(6, -1).all(1))[0])
+        raise ModelError(
+            f"{_PATH}: found {name}[{k}] = {found[k]}, expected finite numbers in m; leave no gaps"
+        )
+    return found
+
+
+def _extents(joints: np.ndarray) -> np.ndarray:
+    """Principal extents of joints (6, 3), from large to small, (3,) in m."""
+    return np.linalg.svd(joints - joints.mean(0), compute_uv=False)
+
+
+def _check_dependence(base: np.ndarray, platform: np.ndarray, lengths: np.ndarray) -> None:
+    """Refuse links whose conditions repeat or contradict each other whatever the pose.
+
+    On two similar hexagons they do (architecture singularity): five conditions leave curves of poses, or none.
+    """
+    *hexapod, _ = placed(base, platform, lengths)
+    values = np.linalg.svd(quadrics(*hexapod).reshape(6, 64), compute_uv=False)
+    if values[-1] < DEPENDENT * values[0]:
+        raise StructureError(
+            f"{_PATH}: found {int((values >= DEPENDENT * values[0]).sum())} independent conditions of six links, "
+            "expected 6; their modes are no separate poses; move a joint out of the pattern of the others"
+        )
+
+
+def _distances(joints: np.ndarray) -> np.ndarray:
+    i, j = PAIRS.T
+    return np.linalg.norm(joints[i] - joints[j], axis=1)
+
+
+def _pairs(chosen: np.ndarray) -> str:
+    return ", ".join(f"{i}-{j}" for i, j in PAIRS[chosen])

@@ -1,0 +1,1 @@
+"""Robots on rods of known length: closed forms, Newton, branches."""

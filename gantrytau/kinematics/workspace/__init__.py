@@ -1,0 +1,1 @@
+"""Where the tool can go, and what stops it."""

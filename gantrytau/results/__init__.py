@@ -1,0 +1,1 @@
+"""Signals over time by name: the record, its files and figures."""

@@ -1,0 +1,91 @@
+"""Figures of results: variables over time, one axis for each unit."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gantrytau.errors import ModelError
+from gantrytau.results.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gantrytau.results.result import Result
+
+_FEW = 12  # lines that one figure still shows distinctly
+
+
+def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] | None) -> "Figure":
+    """The figure of the named variables of a result over time, saved to `file` if one is named."""
+    import matplotlib.pyplot as plt
+
+    if file is not None:
+        check_suffix(file)
+    lines = _lines(result, names)
+    axes_of_unit: dict[str, list[str]] = {}
+    for name in lines:
+        axes_of_unit.setdefault(result.unit(name), []).append(name)
+    height = 1.2 + 2.2 * len(axes_of_unit)
+    figure, axes = plt.subplots(
+        len(axes_of_unit), sharex=True, squeeze=False, figsize=(7.0, height), layout="constrained"
+    )
+    for axis, (unit, members) in zip(axes[:, 0], axes_of_unit.items(), strict=True):
+        for name in members:
+            axis.plot(result.time, result[name], label=name)
+        axis.set_ylabel(_label(result, members, unit))
+        axis.grid(alpha=0.3)
+        if len(members) > 1:
+            axis.legend(fontsize="small")
+    axes[-1, 0].set_xlabel("time [s]")
+    if result.title:
+        figure.suptitle(result.title)
+    if file is not None:
+        with replacing(file) as partial:
+            figure.savefig(partial, dpi=150)
+    if file is not None or not has_windows(plt.get_backend()):
+        plt.close(figure)  # there is no window: the figure belongs to its caller alone
+    return figure
+
+
+def check_suffix(file: str | os.PathLike[str]) -> None:
+    """ModelError unless a file has the suffix of a format in which Matplotlib draws."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    suffix, formats = Path(file).suffix, sorted(FigureCanvasBase.get_supported_filetypes())
+    if suffix.removeprefix(".").lower() not in formats:
+        known = ", ".join(f".{name}" for name in formats)
+        raise ModelError(
+            f"plot: found the file '{file}' with the suffix '{suffix}', expected one of {known}; name the file "
+            f"{Path(file).stem}.png, for example"
+        )
+
+
+def has_windows(backend: str) -> bool:
+    """Whether figures of a Matplotlib backend stay open until their reader closes them: "TkAgg" yes, "agg" no."""
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    interactive = backend_registry.list_builtin(BackendFilter.INTERACTIVE)
+    # notebooks with living figures: `%matplotlib widget`
+    return backend.lower() in {*interactive, "widget", "ipympl", "module://ipympl.backend_nbagg"}
+
+
+def _lines(result: "Result", names: tuple[str, ...]) -> list[str]:
+    """The scalars that the names stand for."""
+    if not names:
+        names = result.names
+        if not 0 < len(names) <= _FEW:
+            raise ModelError(
+                f"{result.title or 'Result'}: plot() found {len(names)} variables, expected 1 to {_FEW}; "
+                "name those to draw, as in plot('tool.r')"
+            )
+    lines: list[str] = []
+    for name in names:
+        result[name]  # an unknown name raises
+        lines += list(result.arrays[name].flat) if name in result.arrays else [name]
+    return list(dict.fromkeys(lines))
+
+
+def _label(result: "Result", members: list[str], unit: str) -> str:
+    """The name if there is one line only, and the unit unless it is one."""
+    name = members[0] if len(members) == 1 else ""
+    return " ".join(filter(None, [name, f"[{unit}]" if unit else ""]))

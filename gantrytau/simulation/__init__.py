@@ -1,0 +1,1 @@
+"""Simulation on all coordinates, from instant to instant."""

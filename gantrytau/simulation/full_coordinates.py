@@ -1,0 +1,236 @@
+"""The model with all its coordinates as states, for the integrator, and the constraints they must keep."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.start.consistent_start import consistent_start
+from gantrytau.compiler.start.start_values import Guess
+from gantrytau.dae import Dae
+from gantrytau.errors import SolveError
+from gantrytau.language.symbols import derivative_name, time
+from gantrytau.simulation.conditioning import Conditioning
+
+LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
+STEPS = 10
+OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
+LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
+
+Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, time, sampled inputs
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """x' = ode(t, x, z, w), 0 = algebraic; invariants(t, x, w) are levels that must stay zero,
+    rows the names of their equations.
+
+    states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
+    that the model samples; known: expression of each known symbol in time and w (values of the sampled
+    inputs, their slopes, values of the held variables); definitions: all symbols in terms of (t, x, z, w);
+    renewed: what the held variables become at an instant.
+    """
+
+    dae: Dae
+    states: tuple[str, ...]
+    algebraics: tuple[str, ...]
+    sampled: tuple[str, ...]
+    held: tuple[str, ...]
+    x: ca.SX
+    z: ca.SX
+    w: ca.SX
+    t0: ca.SX
+    ode: ca.SX
+    algebraic: ca.SX
+    invariants: tuple[ca.SX, ...]
+    rows: tuple[tuple[str, ...], ...]
+    known: Mapping[str, ca.SX]
+    definitions: tuple[tuple[ca.SX, ca.SX], ...]
+    pivots: ca.SX
+    dropped: ca.Function
+    renewed: ca.Function
+    conditioning: Conditioning
+
+    @property
+    def constrained(self) -> bool:
+        """Whether there are constraints to hold."""
+        return any(level.numel() for level in self.invariants)
+
+    @property
+    def stepwise(self) -> bool:
+        """Whether there are signals that are known interval by interval."""
+        return bool(self.sampled or self.held)
+
+    def integrator(
+        self, count: int, tolerance: float, *, size: float = 1.0, compiled: bool = False
+    ) -> ca.Function:
+        """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
+
+        size: of algebraics, which need not be more exact than `tolerance` of it.
+
+        p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
+        intervals may differ then.
+        """
+        tau = ca.SX.sym("tau")
+        if self.stepwise:
+            u = ca.SX.sym("u", 3 + self.w.numel())
+            t, h, w, p = u[0] + u[1] * (tau - u[2]), u[1], u[3:], ca.SX(0, 1)
+            begin = u[0]
+        else:
+            p, u, w = ca.SX.sym("p", 2), ca.SX(0, 1), ca.SX(0, 1)
+            t, h, begin = p[0] + p[1] * tau, p[1], p[0]
+        old = ca.vertcat(time, self.t0, self.w)
+        new = ca.vertcat(t, begin, w)
+        ode, algebraic = ca.cse(ca.substitute([h * self.ode, self.algebraic], [old], [new]))
+        # an integrator needs a state: a model without one gets a constant
+        x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
+        problem = {"t": tau, "x": x, "p": p, "u": u, "ode": ode}
+        options: dict[str, Any] = {
+            "abstol": tolerance,
+            "reltol": tolerance,
+            "max_num_steps": 100_000,
+            "disable_internal_warnings": True,
+            "show_eval_warnings": False,
+        }
+        if compiled:
+            options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
+        if self.algebraics:
+            problem |= {"z": self.z, "alg": algebraic}
+            options["linear_solver"] = "csparse"
+            if size > 1:
+                options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
+            options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
+            return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
+        return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
+
+    def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent states and algebraics at the start, with the inputs as they are then."""
+        dae = self.dae
+        at = ca.Function("known", [time, self.t0, self.w], [ca.vertcat(*self.known.values())])
+        values = {**dae.start, time.name(): t}
+        if self.known:
+            values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
+        started = frozenset(dae.settings["started"])
+        fixed = frozenset(dae.settings["fixed"])
+        guess = Guess(values, started | frozenset(self.known), fixed)
+        found = consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess)
+        x = np.array([found[n] for n in self.states])
+        return x, np.array([found[n] for n in self.algebraics])
+
+    @cached_property
+    def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
+        """Each level: its columns, the function to its residual and Jacobian, the names of its rows."""
+        found = []
+        positions = {n: k for k, n in enumerate(self.states)}
+        for stage, residual in enumerate(self.invariants, start=-len(self.invariants)):
+            own = {leaf.name() for leaf in ca.symvar(residual)}
+            tops = self.dae.indexed.orders.items()
+            level = [derivative_name(n, stage + top) for n, top in tops if stage + top >= 0]
+            columns = [positions[n] for n in level if n in own and n in positions]
+            if not columns:
+                continue
+            x = self.x[columns]
+            jacobian = ca.densify(ca.jacobian(residual, x))
+            arguments = [self.x, time, self.t0, self.w]
+            function = ca.Function("level", arguments, [residual, jacobian], {"cse": True})
+            found.append((columns, function, self.rows[stage]))
+        return found
+
+    def project(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """The nearest points that satisfy all constraints, (points, n); SolveError where there is none near.
+
+        x: (points, n); t: (points,); w: (points, m).
+        """
+        x = x.copy()
+        for columns, level, _ in self._levels:
+            worst = np.zeros(len(x))
+            for _ in range(STEPS):
+                residual, jacobian = (np.array(m) for m in level(x.T, t[None], t[None], w.T))
+                jacobian = jacobian.reshape(len(residual), len(x), len(columns)).transpose(1, 0, 2)
+                scale = np.maximum(np.einsum("kij,kj->ki", np.abs(jacobian), np.abs(x[:, columns])), 1e-3)
+                worst = np.max(np.abs(residual.T) / scale, axis=1)
+                if not np.any(worst > LARGEST_DRIFT):
+                    break
+                x[:, columns] -= _shortest(jacobian, residual.T)
+            lost = np.flatnonzero(~(worst <= 1e-8))
+            if lost.size:
+                when = float(t[lost[0]])
+                raise SolveError(
+                    f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when
+                )
+        return x
+
+    def opened(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> tuple[int, str] | None:
+        """The first point at which a constraint that was left out as redundant does not hold, and its name."""
+        if not self.dae.redundant:
+            return None
+        residual = np.array(self.dropped(x.T, t[None], t[None], w.T)).reshape(len(self.dae.redundant), len(x))
+        bad = np.flatnonzero(~(np.abs(residual).max(axis=0) <= OPEN))
+        if not bad.size:
+            return None
+        return int(bad[0]), self.dae.redundant[int(np.argmax(np.abs(residual[:, bad[0]])))].name
+
+    def settle(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
+        for _ in range(STEPS if self.algebraics else 0):
+            residual, jacobian = (np.array(m) for m in self._algebra(x.T, z.T, t[None], t[None], w.T))
+            jacobian = jacobian.reshape(len(residual), len(x), z.shape[1]).transpose(1, 0, 2)
+            try:
+                step = np.linalg.solve(jacobian, residual.T[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                return z
+            if not np.all(np.isfinite(step)):
+                return z
+            z = z - step
+            if np.all(np.abs(step) <= LARGEST_DRIFT * (1.0 + np.abs(z))):
+                return z
+        return z
+
+    @cached_property
+    def _algebra(self) -> ca.Function:
+        jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
+        arguments = [self.x, self.z, time, self.t0, self.w]
+        return ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+
+    def weakest(self, point: Point, start: Point) -> list[str]:
+        """Names of the equations that nearly depend on each other at a point, if they did not at the start.
+
+        The constraints are asked first: where they are sound, all equations of the accelerations are.
+        """
+        for _, level, names in self._levels:
+            here, before = (np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start))
+            found = _dependent(here, before, names)
+            if found:
+                return found
+        if self.pivots.numel() == 0:
+            return []
+        function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
+        here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
+        return _dependent(here, before, [e.name for e in self.dae.reduced.equations])
+
+
+def _shortest(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The shortest steps d with jacobian d = residual, (points, n)."""
+    square = jacobian @ jacobian.transpose(0, 2, 1)
+    try:
+        found = jacobian.transpose(0, 2, 1) @ np.linalg.solve(square, residual[:, :, None])
+        return found[:, :, 0]
+    except np.linalg.LinAlgError:
+        pairs = zip(jacobian, residual, strict=True)
+        return np.array([np.linalg.lstsq(j, r, rcond=1e-12)[0] for j, r in pairs])
+
+
+def _dependent(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> list[str]:
+    """Rows of a matrix that nearly depend on each other here, while before they did not."""
+    if not (here.size and np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
+        return []
+    rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
+    columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
+    left, values, _ = np.linalg.svd(here / rows / columns)
+    if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
+        return []
+    shares = np.abs(left[:, len(values) - 1])
+    return [names[int(i)] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]

@@ -1,0 +1,178 @@
+"""The equations of motion in all coordinates of a model, made of its translated equations."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+import casadi as ca
+
+from gantrytau.compiler.blocks.pattern import block_pattern
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.index_reduction import Key
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError
+from gantrytau.language.symbols import derivative_name, split_derivative, time
+from gantrytau.simulation.conditioning import Conditioning
+from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.signals import Samples, Signal
+
+
+def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[str] = ()) -> Coordinates:
+    """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
+    without value, or a sampled one that has to be differentiated.
+    """
+    sampled = tuple(n for n in dae.known if isinstance(signals.get(n), Samples))
+    held = tuple(s.name for s in dae.flat.sampled)
+    w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held)), ca.SX.sym("t0")
+    chains, given = dae.reduced.chains, dependents(dae)
+    states = _states(dae, {name for _, name in given})
+    highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
+    last = {(i, c): dae.indexed.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
+    blocks = _highest_blocks(dae, states, last, highest)
+    known = _known_symbols(dae, signals, sampled, w, t0, outputs)
+    known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
+    definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
+    definitions += [(chains.named(n), e) for n, e in known.items()]
+    definitions += definitions_of(dae, given)
+    definitions += [pair for block in blocks for pair in block.definitions]
+    implicit = [b for b in blocks if b.solution is None]
+    tears = [y for b in implicit for y in b.tears]
+    matrices = [
+        ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears))
+        for b in blocks
+        if len(b.unknowns) > 1 and b.tears
+    ]
+    levels, rows = _invariants(dae, {i for i, _ in given})
+    left_out = dae.table.reduce(_column([e.residual for e in dae.redundant]))
+    wanted = [
+        _column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
+        _column([r for b in implicit for r in b.residuals]),
+        ca.densify(ca.jacobian(_column(list(last.values())), _column(list(highest.values())))),
+        dae.reduced.written(left_out),
+        dae.reduce(_column([s.expression for s in dae.flat.sampled])),
+        *matrices,
+        *levels,
+    ]
+    symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
+    _, (ode, algebraic, pivots, dropped, renewed, *rest) = ca.substitute_inplace(
+        symbols, values, wanted, False
+    )
+    matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
+    row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
+    divisors = [pivots[row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
+    x, z = _column([chains.named(n) for n in states]), _column(tears)
+    constraints = _constraints(dae, invariants, states)
+    return Coordinates(
+        dae=dae,
+        states=states,
+        algebraics=tuple(y.name() for y in tears),
+        sampled=sampled,
+        held=held,
+        x=x,
+        z=z,
+        w=w,
+        t0=t0,
+        ode=ode,
+        algebraic=algebraic,
+        invariants=tuple(invariants),
+        rows=tuple(rows),
+        known=known,
+        definitions=tuple(definitions),
+        pivots=pivots,
+        dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
+        renewed=ca.Function("renewed", [x, z, time, t0, w], [ca.densify(renewed)], {"cse": True}),
+        conditioning=Conditioning(*constraints, divisors, matrices, [x, z, time, t0, w]),
+    )
+
+
+def _column(elements: Sequence[ca.SX]) -> ca.SX:
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+
+def _states(dae: Dae, follow: Collection[str]) -> tuple[str, ...]:
+    """Every derivative below the highest of the variables that do not follow from others."""
+    orders = dae.indexed.orders
+    return tuple(
+        derivative_name(n, k)
+        for k in range(max(orders.values(), default=0))
+        for n, top in orders.items()
+        if k < top and n not in follow
+    )
+
+
+def _highest_blocks(
+    dae: Dae, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
+) -> list[Block]:
+    """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
+    guide = Guide(dae.start, dae.table.values, states)
+    for block in dae.blocks:
+        if not highest.keys() & set(block.unknowns):
+            block.enter(guide)
+    return solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
+
+
+def _constraints(dae: Dae, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
+    """Jacobian of the constraints of speeds, and which of its columns belong to dependent coordinates."""
+    if not invariants:
+        return ca.SX(0, 0), []
+    level = [derivative_name(n, top - 1) for n, top in dae.indexed.orders.items() if top]
+    names = [n for n in level if n in set(states)]
+    speeds = ca.vertcat(*(dae.reduced.chains.named(n) for n in names))
+    jacobian = ca.jacobian(invariants[-1], speeds)
+    used = [j for j in range(len(names)) if jacobian[:, j].nnz()]
+    chosen = set(dae.choice.states)
+    return jacobian[:, used], [k for k, j in enumerate(used) if names[j] not in chosen]
+
+
+def _invariants(dae: Dae, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
+    """Residuals of the levels below the last, positions, then velocities, and the names of their equations.
+
+    used: equations that give dependent variables, which hold anyway.
+    """
+    counts, found, names = dae.indexed.counts, [], []
+    for stage in range(-max(counts, default=0), 0):
+        rows = [(i, stage + c) for i, c in enumerate(counts) if stage + c >= 0 and i not in used]
+        found.append(ca.vertcat(*(dae.indexed.residuals[key] for key in rows)) if rows else ca.SX(0, 1))
+        names.append(tuple(dae.reduced.equations[i].name for i, _ in rows))
+    return found, names
+
+
+def _known_symbols(
+    dae: Dae,
+    signals: Mapping[str, Signal],
+    sampled: Sequence[str],
+    w: ca.SX,
+    t0: ca.SX,
+    outputs: Sequence[str],
+) -> dict[str, ca.SX]:
+    """Inputs and those of their derivatives that occur, as expressions of time and samples."""
+    occurring = {leaf.name() for r in dae.indexed.residuals.values() for leaf in ca.symvar(r)}
+    for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
+        base, order = split_derivative(asked)
+        alias = dae.reduced.aliases.get(base)
+        if alias is not None and alias.root in dae.known:
+            occurring.add(derivative_name(alias.root, alias.order + order))
+    starts = {n for v in dae.flat.variables if v.start is not None for n in v.elements}
+    known: dict[str, ca.SX] = {}
+    for name in dae.inputs:
+        signal = signals.get(name)
+        top = max((k for b, k in map(split_derivative, occurring) if b == name), default=0)
+        if isinstance(signal, Samples):
+            if top > 0:
+                raise ModelError(
+                    f"input {name} is differentiated {top} times by the model, which samples do not allow; give "
+                    "a function of time that accepts symbols, or pass the samples through a filter component"
+                )
+            k = sampled.index(name)
+            known[name] = w[k] + w[len(sampled) + k] * (time - t0)
+            continue
+        if signal is None:
+            if name not in starts:
+                raise ModelError(
+                    f"input {name} has no value; give inputs={{'{name}': ...}}, or a start value"
+                )
+            signal = ca.SX(dae.start[name])
+        for order in range(top + 1):
+            known[derivative_name(name, order)] = signal
+            signal = ca.densify(ca.jacobian(signal, time))
+    return known

@@ -1,0 +1,108 @@
+"""Simulation: CVODES or IDAS from CasADi on all coordinates of the model, held to its constraints.
+
+The integrator sees every coordinate, not a choice of independent ones, so it cannot meet a singularity
+that only the choice makes. Constraints and their derivatives are kept by projecting onto them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau.compiler.parameters import with_values
+from gantrytau.compiler.translation import names, retranslate, translate
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError, SolveError
+from gantrytau.language.events import refuse_sticking
+from gantrytau.language.model import Model
+from gantrytau.language.symbols import split_derivative
+from gantrytau.results.result import Result
+from gantrytau.simulation.integration import Run
+from gantrytau.simulation.motion import all_coordinates
+from gantrytau.simulation.signals import Samples, Signal, read_signals
+from gantrytau.simulation.to_result import result_of
+
+MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
+OFTEN = 1e-2  # of that, where the integrator starts anew at hundreds of instants, in steps of first order
+LEAST = 1e-13  # of a step: rounding
+
+
+def simulate(
+    model: Model | Dae,
+    *,
+    stop: float,
+    start: float = 0.0,
+    inputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    outputs: Sequence[str] | None = None,
+    tolerance: float = 1e-8,
+    points: int = 501,
+) -> Result:
+    """Simulate a model from its start values and return all its variables over time.
+
+    start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,) or (n, k)),
+    joined by straight lines; an input that is not named keeps its start value. parameters: name -> value;
+    outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the integrator gets
+    a tenth, and errors of long motions add up); points: of the result.
+    Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
+    when there is no consistent start, ModelError for wrong names and values.
+    """
+    _check(start, stop, tolerance, points)
+    dae = model if isinstance(model, Dae) else translate(model, events=True)
+    refuse_sticking(dae.flat)
+    if parameters:
+        dae = retranslate(dae, with_values(dae.flat, parameters))
+    wanted = names(outputs or ())
+    for name in wanted:
+        dae.expand(name)
+    if any(split_derivative(name)[1] for name in wanted):
+        chosen = {**dae.settings, "find": (*dae.settings["find"], *wanted)}
+        dae = retranslate(replace(dae, settings=chosen), dae.flat)
+    signals = read_signals(inputs or {}, dae.expand)
+    _check_inputs(dae, signals, start, stop)
+    coordinates = all_coordinates(dae, signals, wanted)
+    grid = np.linspace(start, stop, points)
+    margin = MARGIN * (OFTEN if dae.flat.sampled else 1.0)
+    run = Run(coordinates, signals, grid, max(margin * tolerance, min(LEAST, MARGIN * tolerance)))
+    try:
+        run.go()
+    except SolveError as error:
+        error.result = result_of(coordinates, signals, *run.so_far(), outputs)
+        raise
+    except KeyboardInterrupt:
+        reached = run.so_far()
+        raise SolveError(
+            f"{dae.name}: simulation interrupted at t = {reached[0][-1]:.4g} s; .result holds what was computed",
+            time=float(reached[0][-1]),
+            result=result_of(coordinates, signals, *reached, outputs),
+        ) from None
+    return result_of(coordinates, signals, *run.so_far(), outputs)
+
+
+def _check(start: float, stop: float, tolerance: float, points: int) -> None:
+    numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
+    if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
+        raise ModelError(
+            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s"
+        )
+    if not isinstance(tolerance, (float, np.floating)) or not 0 < tolerance < 1:
+        raise ModelError(
+            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8"
+        )
+    if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
+        raise ModelError(f"simulate: found points={points!r}, expected a whole number of at least 2")
+
+
+def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:
+    for name, signal in signals.items():
+        if name not in dae.inputs:
+            raise ModelError(
+                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.inputs) or 'none'}); "
+                "to impose it, translate with given=..., to change a parameter use parameters="
+            )
+        if isinstance(signal, Samples) and (signal.times[0] > start or signal.times[-1] < stop):
+            raise ModelError(
+                f"input {name}: samples cover {signal.times[0]:g} to {signal.times[-1]:g} s, expected "
+                f"{start:g} to {stop:g} s; add samples or simulate a shorter time"
+            )

@@ -1,0 +1,82 @@
+"""From states over time to a Result with every variable of the model."""
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.dae import Dae
+from gantrytau.language.symbols import derivative_name, split_derivative, time
+from gantrytau.language.units import dimension, unit_text
+from gantrytau.results.result import Result
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.signals import Samples, Signal
+
+
+def result_of(
+    coordinates: Coordinates,
+    signals: Mapping[str, Signal],
+    times: np.ndarray,
+    x: np.ndarray,
+    z: np.ndarray,
+    held: np.ndarray,
+    outputs: Sequence[str] | None,
+) -> Result:
+    """Every variable and derivative (or only `outputs`) at the given times."""
+    dae = coordinates.dae
+    samples = [signals[n] for n in coordinates.sampled]
+    values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, Samples)]
+    w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
+    names = _names(dae, outputs)
+    expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
+    symbols, definitions = [v for v, _ in coordinates.definitions], [e for _, e in coordinates.definitions]
+    _, (found,) = ca.substitute_inplace(symbols, definitions, [expressions], False)
+    found = ca.substitute(found, coordinates.t0, time)
+    function = ca.Function(
+        "variables", [time, coordinates.x, coordinates.z, coordinates.w], [ca.densify(found)]
+    )
+    rows = np.array(function(times[None, :], x.T, z.T, w))
+    rows = (
+        rows.reshape(len(names), -1) if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)
+    )
+    table = dict(zip(names, rows, strict=True))
+    for parameter in dae.flat.parameters if outputs is None else ():
+        table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
+    units, words = labels(dae)
+    return Result(times, table, units=units, descriptions=words, title=dae.name)
+
+
+def _names(dae: Dae, outputs: Sequence[str] | None) -> list[str]:
+    if outputs is not None:
+        return [n for name in outputs for n in dae.expand(name)]
+    names = list(dae.variables)
+    orders = dae.indexed.orders
+    for name in dae.variables:
+        alias = dae.reduced.aliases.get(name)
+        if alias is not None and alias.root is not None and alias.root in orders:
+            names += [derivative_name(name, k) for k in range(1, orders[alias.root] - alias.order + 1)]
+    return names
+
+
+def labels(dae: Dae) -> tuple[dict[str, str], dict[str, str]]:
+    """Units and descriptions by name, derivatives included."""
+    units: dict[str, str] = {}
+    words: dict[str, str] = {}
+    for variable in (*dae.flat.variables, *dae.flat.parameters):
+        for name in (variable.name, *variable.elements):
+            if variable.unit is not None:
+                units[name] = variable.unit
+            words[name] = variable.description
+    for name in _names(dae, None):
+        base, order = split_derivative(name)
+        if order and base in units:
+            units[name] = _rate_unit(units[base], order)
+            words[name] = f"derivative of {base}"
+    return units, words
+
+
+def _rate_unit(unit: str, order: int) -> str:
+    if "/" in unit or unit == "1":
+        exponents = [e - order * s for e, s in zip(dimension(unit), dimension("s"), strict=True)]
+        return unit_text(tuple(exponents))
+    return f"{unit}/s{order if order > 1 else ''}"

@@ -1,0 +1,1 @@
+"""What drives and measures the robots: plants, references, controllers."""

@@ -1,0 +1,102 @@
+"""The six-link Gantry-Tau robot: the plate is a rigid body that six links hold.
+
+Dressler (2012), section 4.4. Where the links of an arm are exactly parallel and of equal length the plate
+keeps its orientation; offsets and lengths of their own make this the kinematic error model of (4.14).
+"""
+
+import numpy as np
+
+from gantrytau import Array, Model, Real, StateSelect, connect
+from gantrytau.errors import ModelError
+from gantrytau.mechanics.multibody import Body, World
+from gantrytau.mechanics.translational import Friction, TanhFriction
+from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks
+from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
+from gantrytau_models.prototypes import Arm as Record
+from gantrytau_models.prototypes import Prototype
+
+
+class Plate(Body):
+    """The plate with its tool, a rigid body that only the links hold."""
+
+    R = Real((3, 3), unit="1", description="orientation, world = R @ plate")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.R == self.frame_a.R
+
+
+class SixLinkGantryTau(Model):
+    """The six-link Gantry-Tau robot, driven by the actuator forces `carts[i].f`.
+
+    prototype: a record such as `prototypes.L1` with links; friction: the class of friction of the carts, or
+    None. Further keywords modify members. `tool.r`, `tool.v`, `tool.w` and `tool.R` are the pose of the plate;
+    lengths and offsets are the parameters `arms[i].links[j].length`, `.offset`, `.plate_offset`.
+    """
+
+    world = World()
+    arms = Array(Arm, [Arm(), TwoLinks(), ThreeLinks()])
+    carts = Array(Cart, 3)
+    tool = Plate(r=dict(prefer=StateSelect.PREFER), v=dict(prefer=StateSelect.PREFER))
+
+    def __init__(
+        self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications
+    ):
+        name = type(self).__name__
+        carts = driven_carts(prototype, friction, name)
+        found = tuple(len(arm.links) for arm in prototype.arms)
+        if found != (1, 2, 3):
+            raise ModelError(
+                f"{name}: found {prototype.name} with {found} links on its arms, expected (1, 2, 3); write another "
+                "structure as a Model of its own, of Arm and Link"
+            )
+        defaults = dict(
+            arms=[_arm(arm) for arm in prototype.arms],
+            carts=carts,
+            tool=dict(
+                m=prototype.plate_mass,
+                J=np.array(prototype.plate_inertia),
+                r_cm=list(prototype.plate_centre),
+                r=dict(start=tool_ahead_of_carts(prototype)),
+                v=dict(start=0.0),
+                q=dict(start=quaternion(np.array(prototype.plate_rotation))),
+            ),
+        )
+        super().__init__(defaults, **modifications)
+
+    def equations(self):
+        for arm, cart in zip(self.arms, self.carts, strict=True):
+            yield connect(self.world.frame_b, arm.frame_a)
+            yield connect(arm.frame_cart, cart.frame)
+            yield connect(arm.frame_cart, arm.frame_links)
+            yield connect(arm.axis, cart.axis)
+            yield connect(arm.frame_b, self.tool.frame_a)
+
+
+def _arm(arm: Record) -> dict:
+    links = [
+        dict(
+            length=link.length,
+            offset=list(link.offset),
+            plate_offset=list(link.plate_offset),
+            mass=link.mass,
+        )
+        for link in arm.links
+    ]
+    return dict(direction=list(arm.direction), links=links)
+
+
+def quaternion(R: np.ndarray) -> list[float]:
+    """The unit quaternion of a rotation matrix, scalar first and not negative."""
+    # the largest of four times the squares of its components is safe to divide by (Shepperd, 1978)
+    a = np.array([
+        1 + R[0, 0] + R[1, 1] + R[2, 2],
+        1 + R[0, 0] - R[1, 1] - R[2, 2],
+        1 - R[0, 0] + R[1, 1] - R[2, 2],
+        1 - R[0, 0] - R[1, 1] + R[2, 2],
+    ])  # fmt: skip
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    p, s, t = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
+    rows = np.array([[a[0], x, y, z], [x, a[1], p, s], [y, p, a[2], t], [z, s, t, a[3]]])
+    row = rows[int(np.argmax(a))]
+    return list(row / np.linalg.norm(row) * (1.0 if row[0] >= 0 else -1.0))

@@ -1,0 +1,1 @@
+"""Optima, looked up by the model's own names."""

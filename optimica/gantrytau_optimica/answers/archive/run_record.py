@@ -1,0 +1,301 @@
+"""A record of a run as JSON: what was asked, with which versions, and what came out."""
+
+import hashlib
+import inspect
+import json
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.results.files import replacing
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.control_problem import Phase
+from gantrytau_optimica.problem.optimization import Optimization
+from gantrytau_optimica.problem.reading import ReadProblem
+
+PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")
+DIGITS = 16  # of a hash: two different problems meet by chance in one of 10^19 pairs
+ALIKE = 1e-9  # relative: numbers of two runs closer than this are the same
+PASSING = ("started", "durations")  # differ between any two runs
+
+
+def run_record(
+    optimum: Optimum,
+    *,
+    problem: Optimization | type[Optimization] | None = None,
+    options: Mapping[str, Any] | None = None,
+    started: datetime | None = None,
+    read_time: float | None = None,
+) -> dict[str, Any]:
+    """The record of a run, solved or not (then of `error.optimum`), of plain values that JSON can hold.
+
+    problem: the class or instance, for its source file; options: keywords of `optimize` as given; started: when;
+    read_time: s spent on reading the problem. What is not given is None. Keys always come in the same order; numbers
+    that JSON lacks are the words "inf", "-inf" and "nan".
+    """
+    program = optimum.program
+    return plain(
+        {
+            "problem": _problem(optimum, problem),
+            "parameters": _parameters(optimum),
+            "options": {k: _told(v) for k, v in sorted((options or {}).items())},
+            "transcription": [_transcription(phase) for phase in optimum.phases.values()],
+            "unknowns": program.places.size,
+            "conditions": program.assembled.rows,
+            "versions": versions(),
+            "platform": {"system": platform.system(), "machine": platform.machine()},
+            "hashes": hashes(optimum),
+            "started": None if started is None else started.astimezone(UTC).isoformat(timespec="seconds"),
+            "durations": {"read": read_time, "build": optimum.build_time, "solve": optimum.solve_time},
+            "iterations": optimum.iterations,
+            "success": optimum.success,
+            "status": optimum.status,
+            "objective": optimum.objective,
+            "horizon": [optimum.start_time, optimum.final_time],
+            "free": dict(sorted(optimum.free.items())),
+            "verdict": _verdict(optimum),
+            "report": optimum.report().splitlines(),
+        }
+    )
+
+
+def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[str], **details: Any) -> Path:
+    """Write a record to a file, or to a new file in a folder, and return its path.
+
+    optimum: an Optimum, with `details` as keywords of run_record, or a record. A file in a folder is named after
+    the problem and the time, and never replaces another; a file that is named is replaced when the new one is complete.
+    """
+    record = run_record(optimum, **details) if isinstance(optimum, Optimum) else dict(optimum)
+    path = Path(path)
+    text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
+    if path.is_dir():
+        path = _reserved(path, record)
+    elif path.suffix.lower() != ".json":
+        raise ModelError(
+            f"{path}: found neither a folder nor a name that ends in .json, expected one of them"
+        )
+    with replacing(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def require_place(path: Any) -> None:
+    """ModelError for a place to which no record can be written; a name that ends in "/" becomes a folder."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ModelError(f"record={path!r}: expected a folder or the name of a .json file")
+    place = Path(path)
+    if str(path).endswith(("/", os.sep)):
+        place.mkdir(parents=True, exist_ok=True)
+    if place.is_dir():
+        return
+    if place.suffix.lower() != ".json":
+        raise ModelError(
+            f"record={path}: found neither a folder nor a name that ends in .json, expected one of them"
+        )
+    if not place.parent.is_dir():
+        raise ModelError(f"record={path}: there is no folder {place.parent}; make it first")
+
+
+def compare_records(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
+    """What differs between two records, line by line: where, the first value and the second; "" if nothing does.
+
+    Numbers within 1e-9 of each other are the same. Start times and durations are left out.
+    """
+    return "\n".join(f"{where}: {first} -> {second}" for where, first, second in _differences("", a, b))
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that compute, and of Python."""
+    return {**{name: version(name) for name in PACKAGES}, "python": platform.python_version()}
+
+
+def hashes(optimum: Optimum) -> dict[str, str]:
+    """Of the model's equations as they are written, and of the whole problem: objective, constraints, horizon.
+
+    Values of parameters and limits belong to the problem, guesses to neither.
+    """
+    read = optimum.built.read
+    equations = "\n".join(_equations(read))
+    return {"equations": _hash(equations), "problem": _hash(f"{equations}\n" + "\n".join(_statements(read)))}
+
+
+def plain(value: Any) -> Any:
+    """A value of dictionaries, lists, strings, booleans, None and finite numbers; others become words."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(v) for v in (sorted(value, key=str) if isinstance(value, (set, frozenset)) else value)]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def _problem(optimum: Optimum, problem: Any) -> dict[str, Any]:
+    kind = problem if isinstance(problem, type) else type(problem)
+    given = kind if issubclass(kind, Optimization) else None
+    file = None if given is None else _source(given)
+    return {
+        "name": optimum.name,
+        "class": None if given is None else f"{given.__module__}.{given.__qualname__}",
+        "file": None if file is None else file.name,
+        "file_hash": None if file is None else _hash(file.read_bytes()),
+    }
+
+
+def _source(kind: type) -> Path | None:
+    """The file that holds a class; None for one typed into a session."""
+    try:
+        path = Path(inspect.getsourcefile(kind) or "")
+    except TypeError:
+        return None
+    return path if path.is_file() else None
+
+
+def _parameters(optimum: Optimum) -> dict[str, Any]:
+    """Values of all parameters that are not free, held ones as they were for this solve."""
+    held = {n.name: n.guess for n in optimum.program.problem.free if n.held}
+    values = {**optimum.dae.table.values, **held}
+    return {name: values[name] for name in sorted(values) if name not in optimum.free}
+
+
+def _transcription(phase: Any) -> dict[str, Any]:
+    layout = phase.layout
+    return {
+        "phase": layout.phase.name,
+        "scheme": layout.scheme.scheme,
+        "points": int(layout.scheme.points.size),
+        "elements": layout.mesh.elements,
+        "borders": phase.mesh.borders if layout.mesh.moving or not _equal(layout.mesh.borders) else "equal",
+        "controls": _controls(layout.phase),
+    }
+
+
+def _equal(borders: np.ndarray) -> bool:
+    return bool(np.allclose(np.diff(borders), 1 / (borders.size - 1), rtol=1e-9))
+
+
+def _controls(phase: Phase) -> dict[str, Any]:
+    return {
+        u.name: {
+            "kind": u.pieces.kind,
+            "elements": u.pieces.elements,
+            "max_step": u.pieces.max_step,
+            "step_penalty": u.pieces.step_penalty,
+        }
+        for u in phase.inputs
+        if u.pieces.kind != "free"
+    }
+
+
+def _verdict(optimum: Optimum) -> dict[str, Any]:
+    """Solved or not, what failed, and what a playback found between the points where there is one."""
+    failed = (
+        [] if optimum.success else [line.strip() for line in optimum.report().splitlines() if " is " in line]
+    )
+    return {"solved": optimum.success, "failed": failed, "between_points": _between(optimum)}
+
+
+def _between(optimum: Optimum) -> float | None:
+    """The largest violation between the points, where the optimum can be played back."""
+    return float(optimum.playback.violation) if optimum.success and optimum.playback.complete else None
+
+
+def _equations(read: ReadProblem) -> Iterator[str]:
+    """The flat model in lines: declarations without numbers, equations, initial equations."""
+    flat = read.dae.flat
+    for quantity in (*flat.variables, *flat.parameters):
+        yield f"{quantity.kind} {quantity.name} {quantity.shape} [{quantity.unit}]"
+    yield from (f"{name} := {expression}" for name, expression in flat.definitions.items())
+    yield from (f"{equation.text}" for equation in flat.equations)
+    yield from (f"initially {equation.text}" for equation in flat.initial_equations)
+    yield f"known {', '.join(read.dae.inputs)}"
+
+
+def _statements(read: ReadProblem) -> Iterator[str]:
+    """Objective, constraints, horizon and values in lines."""
+    yield f"minimise {read.objective}"
+    for phase in read.phases:
+        yield f"phase {phase.name} from {phase.start_time} to {phase.final_time}, integrand {phase.integrand}"
+    yield from (f"point {p.symbol} of {p.expression} at {p.time}" for p in read.points)
+    yield from (f"{c.lower} <= {c.expression} <= {c.upper}" for c in read.constraints)
+    yield from (f"link {link.first} {link.second} {link.jump}" for link in read.links)
+    for target in read.targets:
+        yield f"samples {target.symbol} of {target.expression} {_samples(target.samples)} {target.integrated}"
+    for name, course in sorted(read.courses.items(), key=lambda item: item[0]):
+        words = f"{_samples(course[0])} column {course[1]}" if isinstance(course, tuple) else str(course)
+        yield f"course {name} = {words}"
+    for quantity in (*read.dae.flat.variables, *read.dae.flat.parameters):
+        start = quantity.start if quantity.fixed else None
+        yield f"{quantity.name} {quantity.fixed} {start} {quantity.min} {quantity.max} {quantity.free}"
+    free = {n for p in read.dae.flat.parameters if p.free for n in p.elements}
+    yield from (f"{n} = {x!r}" for n, x in sorted(read.dae.table.values.items()) if n not in free)
+
+
+def _samples(samples: Any) -> str:
+    return _hash(b"".join(np.ascontiguousarray(a).tobytes() for a in (samples.times, samples.values)))
+
+
+def _hash(content: str | bytes) -> str:
+    data = content.encode() if isinstance(content, str) else content
+    return hashlib.sha256(data).hexdigest()[:DIGITS]
+
+
+def _told(value: Any) -> Any:
+    """An option as it was given, long or living things by what they are."""
+    if isinstance(value, Mapping):
+        return {str(k): _told(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray) and value.size > 32:
+        return f"array of shape {value.shape}, hash {_hash(np.ascontiguousarray(value).tobytes())}"
+    if callable(value):
+        return f"function {getattr(value, '__qualname__', type(value).__name__)}"
+    return value if isinstance(value, (str, np.ndarray, list, tuple)) else plain(value)
+
+
+def _reserved(folder: Path, record: Mapping[str, Any]) -> Path:
+    """A new empty file in the folder: problem, time of the start or of now, and a number if others run as well."""
+    moment = str(record["started"] or datetime.now(UTC).isoformat(timespec="seconds"))
+    stem = f"{record['problem']['name']}-{moment[:19].replace(':', '')}"
+    for k in count():
+        path = folder / f"{stem}{f'-{k}' if k else ''}.json"
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        return path
+    raise AssertionError("unreachable")
+
+
+def _differences(where: str, a: Any, b: Any) -> Iterator[tuple[str, str, str]]:
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        for key in dict.fromkeys((*a, *b)):
+            if where or key not in PASSING:
+                inner = f"{where}.{key}" if where else str(key)
+                yield from _differences(inner, a.get(key), b.get(key))
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        for k, (first, second) in enumerate(zip(a, b, strict=True)):
+            yield from _differences(f"{where}[{k}]", first, second)
+    elif not _same(a, b):
+        yield where, _short(a), _short(b)
+
+
+def _same(a: Any, b: Any) -> bool:
+    numbers = [isinstance(x, (int, float)) and not isinstance(x, bool) for x in (a, b)]
+    return abs(a - b) <= ALIKE * max(abs(a), abs(b)) if all(numbers) else a == b
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    if isinstance(value, list):
+        return f"{len(value)} entries"
+    return "nothing" if value is None else str(value)

@@ -1,0 +1,1 @@
+"""Optima played back, and where they switch."""

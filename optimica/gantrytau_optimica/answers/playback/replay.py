@@ -1,0 +1,251 @@
+"""The equations of a phase integrated anew, with the solution's own inputs: what a robot would do with them.
+
+    dx/ds = h f(t0 + h s, x, z, u(s)),  0 = g(...),  0 <= s <= 1        on every piece between two borders
+
+Inputs are the polynomials of the solution, so a piece is smooth; CVODES or IDAS integrates it to a tolerance far
+below that of the transcription.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+
+from gantrytau_optimica.control.build import Built, known
+from gantrytau_optimica.transcription.layout import lagrange
+from gantrytau_optimica.transcription.trajectory import Trajectory
+
+TOLERANCE = 1e-10
+PLACES = 0.5 - 0.5 * np.cos(
+    np.pi * np.arange(17) / 16
+)  # Chebyshev's extremes: interpolation between them converges
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """States and algebraics of one phase, pieces one after another.
+
+    pieces (n, 2): begin and end in s; x (n, 17, nx), z (n, 17, nz) at Chebyshev places of each piece; local (n, nx):
+    by how much the end of a piece misses the solution if it begins on it; complete: whether the integration came
+    to the end.
+    """
+
+    trajectory: Trajectory
+    pieces: np.ndarray
+    x: np.ndarray
+    z: np.ndarray
+    local: np.ndarray
+    complete: bool
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """All times in s, (17 n,); borders occur twice, once for each side."""
+        return (self.pieces[:, :1] + np.diff(self.pieces, axis=1) * PLACES).ravel()
+
+    @cached_property
+    def signals(self) -> np.ndarray:
+        """States, algebraics, inputs and known courses (k, 17 n) at all times."""
+        phase, count = self.trajectory.phase, len(self.pieces)
+        inputs = _course_values(self.trajectory, self.pieces, PLACES)
+        total = count * PLACES.size
+        rows = [self.x.transpose(2, 0, 1).reshape(len(phase.states), total)]
+        rows.append(self.z.transpose(2, 0, 1).reshape(len(phase.algebraics), total))
+        rows.append(inputs.reshape(-1, total) if inputs.size else np.zeros((0, total)))
+        return np.vstack(rows)
+
+    def values(self, expressions: ca.SX) -> np.ndarray:
+        """Expressions of the phase's symbols (m,) at all times: (m, 17 n)."""
+        rows = np.array(self.trajectory.function(expressions)(self.times[None, :], self.signals))
+        return rows if rows.shape[1] == self.times.size else np.repeat(rows, self.times.size, axis=1)
+
+    def at(self, expressions: ca.SX, times: np.ndarray) -> np.ndarray:
+        """Expressions (m,) at times (k,), (m, k), interpolated between the places of their pieces."""
+        piece = np.clip(np.searchsorted(self.pieces[:, 1], times - 1e-12), 0, len(self.pieces) - 1)
+        begin, end = self.pieces[piece].T
+        place = np.clip((times - begin) / (end - begin), 0.0, 1.0)
+        weights = lagrange(np.tile(PLACES, (times.size, 1)), place)
+        rows = self.values(expressions).reshape(expressions.numel(), -1, PLACES.size)
+        return np.einsum("mkp,kp->mk", rows[:, piece], weights)
+
+    def integral(self, expressions: ca.SX) -> np.ndarray:
+        """Integrals of expressions over the phase, (m,), by Clenshaw's and Curtis' weights."""
+        rows = self.values(expressions).reshape(expressions.numel(), -1, PLACES.size)
+        return np.einsum("mpk,k,p->m", rows, _weights(PLACES), np.diff(self.pieces, axis=1)[:, 0])
+
+
+def _weights(places: np.ndarray) -> np.ndarray:
+    """Weights of the quadrature on [0, 1] that is exact for polynomials through the places."""
+    powers = np.arange(places.size)
+    shifted = np.polynomial.legendre.legvander(2 * places - 1, places.size - 1)
+    exact = np.where(powers == 0, 1.0, 0.0)
+    return np.linalg.solve(shifted.T, exact)
+
+
+def replay(built: Built, trajectory: Trajectory, tolerance: float = TOLERANCE) -> Replayed:
+    """Integrate a phase with the inputs of the solution, from the solution's start."""
+    phase = trajectory.phase
+    pieces, owner = _pieces(trajectory)
+    if not phase.states:
+        return _unmoved(trajectory, pieces)
+    system = _system(built, trajectory)
+    nodes = _nodes(trajectory)
+    courses = _course_values(trajectory, pieces, nodes)  # (k, n, m)
+    numbers = trajectory.numbers
+    sizes = np.array([s.nominal for s in phase.states])
+    starts = trajectory.signals(pieces[:, 0])[: len(phase.states)].T
+    first = np.array([trajectory.w[trajectory.layout.starts[e]] for e in owner])
+    on_border = np.concatenate([[True], owner[1:] != owner[:-1]])
+    starts = np.where(on_border[:, None], first, starts)
+    after = np.vstack([starts[1:], trajectory.w[trajectory.layout.starts[-1]][None, :]])
+    guesses = _algebraics(trajectory, pieces)
+    x = np.zeros((len(pieces), PLACES.size, len(phase.states)))
+    z = np.zeros((len(pieces), PLACES.size, len(phase.algebraics)))
+    local = np.full((len(pieces), len(phase.states)), np.nan)
+    state, complete = starts[0], True
+    for k, (begin, end) in enumerate(pieces):
+        p = np.concatenate([courses[:, k].ravel(), [begin, end - begin], numbers])
+        try:
+            x[k], z[k] = system.run(state, guesses[k], p, sizes)
+            local[k] = system.run(starts[k], guesses[k], p, sizes)[0][-1] - after[k]
+        except RuntimeError:  # the integrator gave up: what follows is unknown
+            x[k:], z[k:], complete = np.nan, np.nan, False
+            break
+        state = x[k][-1]
+    return Replayed(trajectory, pieces, x, z, local, complete)
+
+
+def _unmoved(trajectory: Trajectory, pieces: np.ndarray) -> Replayed:
+    """A phase without states: its algebraics are those of the solution, there is nothing to integrate."""
+    nz = len(trajectory.phase.algebraics)
+    times = (pieces[:, :1] + np.diff(pieces, axis=1) * PLACES).ravel()
+    z = trajectory.signals(times)[:nz].T.reshape(len(pieces), PLACES.size, nz)
+    none = np.zeros((len(pieces), PLACES.size, 0))
+    return Replayed(trajectory, pieces, none, z, np.zeros((len(pieces), 0)), True)
+
+
+def _pieces(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Begin and end of all pieces in s, and the element of each: elements, divided where a known course has a kink."""
+    borders = trajectory.times(trajectory.mesh.borders)
+    kinks = [course.kinks for course in trajectory.phase.courses]
+    inner = np.concatenate([np.zeros(0), *kinks])
+    inner = inner[(inner > borders[0]) & (inner < borders[-1])]
+    every = np.unique(np.concatenate([borders, inner]))
+    keep = np.concatenate([[True], np.diff(every) > 1e-9 * (borders[-1] - borders[0])])
+    every = every[keep]
+    every[-1] = borders[-1]
+    pieces = np.column_stack([every[:-1], every[1:]])
+    owner = np.clip(np.searchsorted(borders, pieces.mean(axis=1)) - 1, 0, borders.size - 2)
+    return pieces, owner
+
+
+def _nodes(trajectory: Trajectory) -> np.ndarray:
+    """Places in a piece through which inputs and courses are polynomials."""
+    nx, nz = len(trajectory.phase.states), len(trajectory.phase.algebraics)
+    count = max([2, *(track.nodes.shape[1] for track in trajectory.layout.tracks[nx + nz :])])
+    return (np.arange(count) + 0.5) / count
+
+
+def _course_values(trajectory: Trajectory, pieces: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Inputs and known courses (k, n, m) at places of all pieces, each from its own side of a border."""
+    middle = pieces.mean(axis=1, keepdims=True)
+    span = np.diff(pieces, axis=1)
+    times = pieces[:, :1] + span * places
+    borders = trajectory.times(trajectory.mesh.borders)
+    element = np.clip(np.searchsorted(borders, middle[:, 0]) - 1, 0, borders.size - 2)
+    inside = (times - borders[element][:, None]) / np.diff(borders)[element][:, None]
+    element = np.repeat(element, places.size)
+    inputs = range(
+        len(trajectory.phase.states) + len(trajectory.phase.algebraics), len(trajectory.layout.tracks)
+    )
+    rows = [trajectory.layout.tracks[i].values(trajectory.w, element, inside.ravel()) for i in inputs]
+    shrunk = (middle + (times - middle) * (1 - 1e-9)).ravel()  # keeps to its own side of a jump
+    rows += [course.value(shrunk) for course in trajectory.phase.courses]
+    return np.array(rows).reshape(-1, len(pieces), places.size)
+
+
+def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
+    """Algebraics of the solution just after the begin of each piece, (n, nz)."""
+    nx, nz = len(trajectory.phase.states), len(trajectory.phase.algebraics)
+    times = pieces[:, 0] + 1e-9 * (pieces[:, 1] - pieces[:, 0])
+    return trajectory.signals(times)[nx : nx + nz].T
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """An integrator over a piece, and the algebraics it leaves out."""
+
+    integrator: ca.Function
+    kept: np.ndarray  # numbers of the algebraics that the integrator solves for
+    others: ca.Function  # (place, x, kept z, p) -> all algebraics
+
+    def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
+        """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
+        found = self.integrator(x0=state / sizes, z0=guess[self.kept], p=p)
+        x = np.array(found["xf"]).reshape(state.size, PLACES.size) * sizes[:, None]
+        if not np.all(np.isfinite(x)):
+            raise RuntimeError("not finite")
+        kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size)
+        z = np.array(self.others(PLACES[None, :], x, kept, p))
+        return x.T, z.T
+
+
+def _system(built: Built, trajectory: Trajectory) -> _System:
+    phase, problem = trajectory.phase, trajectory.problem
+    symbols = [s.symbol for s in phase.algebraics]
+    forms = [built.closed.get(a.name) for a in phase.algebraics]
+    given = known([f for f in forms if f is not None], built.read, built.numbers)
+    forms = iter(given)
+    closed = [(i, next(forms)) for i, a in enumerate(phase.algebraics) if a.name in built.closed]
+    kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]
+    everything = [
+        phase.ode,
+        phase.residuals[kept] if kept else ca.SX(0, 1),
+        ca.vertcat(ca.SX(0, 1), *symbols),
+    ]
+    if closed:
+        outputs = ca.vertcat(*everything)
+        _, (outputs,) = ca.substitute_inplace(
+            [symbols[i] for i, _ in closed], [ca.densify(form) for _, form in closed], [outputs], False
+        )
+        sizes = np.cumsum([0, *(e.numel() for e in everything)])
+        everything = [outputs[int(a) : int(b)] for a, b in pairwise(sizes)]
+    place, begin, span = ca.SX.sym("place"), ca.SX.sym("begin"), ca.SX.sym("span")
+    nodes = _nodes(trajectory)
+    inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]
+    values = ca.SX.sym("values", nodes.size * len(inputs))
+    basis = _basis(nodes, place)
+    courses = [ca.dot(basis, values[nodes.size * i : nodes.size * (i + 1)]) for i in range(len(inputs))]
+    old, new = ca.vertcat(problem.time, *inputs), ca.vertcat(begin + place * span, *courses)
+    ode, residuals, algebraics = ca.substitute(everything, [old], [new])
+    nominal = ca.DM([s.nominal for s in phase.states])
+    x = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.states))
+    z = ca.vertcat(ca.SX(0, 1), *(symbols[i] for i in kept))
+    p = ca.vertcat(values, begin, span, problem.numbers)
+    scaled = ca.SX.sym("scaled", x.numel())
+    ode, residuals = ca.substitute([ode * span / nominal, residuals], [x], [scaled * nominal])
+    dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
+    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000, "show_eval_warnings": False}
+    if not kept:
+        del dae["z"], dae["alg"]
+    method = "idas" if kept else "cvodes"
+    integrator = ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options)
+    return _System(
+        integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
+    )
+
+
+def _basis(nodes: np.ndarray, place: ca.SX) -> ca.SX:
+    found = []
+    for j, node in enumerate(nodes):
+        factors = [(place - float(other)) / float(node - other) for other in np.delete(nodes, j)]
+        found.append(ca.SX(1) if not factors else _product(factors))
+    return ca.vertcat(*found)
+
+
+def _product(factors: list[ca.SX]) -> ca.SX:
+    result = factors[0]
+    for factor in factors[1:]:
+        result = result * factor
+    return result

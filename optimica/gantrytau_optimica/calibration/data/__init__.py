@@ -1,0 +1,1 @@
+"""Measured poses, and what is wrong with them."""

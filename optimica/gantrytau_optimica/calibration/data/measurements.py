@@ -1,0 +1,245 @@
+"""Measured poses for calibration: actuator positions, tool positions, orientations, guideways."""
+
+import copy
+import csv
+import re
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.kinematics.rotations import rotations
+from gantrytau_optimica.calibration.data.data_checks import check_data
+from gantrytau_optimica.calibration.data.findings import Finding
+
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_ACTUATOR = re.compile(r"q[1-9]\d*")
+_SEPARATORS = (";", "\t", ",")
+
+
+class Measurements:
+    """Measured poses of a robot, and measured guideways. SI units; the first axis is the pose.
+
+    q: actuator positions (N, n), carts in m first, then angles in rad; r: tool positions (N, 3) in m; R: orientations of
+    the plate (N, 3, 3), world = R @ plate, or unit quaternions (N, 4), scalar first, or None; rails: for each guideway
+    (k, 4) the columns q, x, y, z of points measured along it, k from 2, in any frame, or None. numbers: of the poses in
+    a plan (N,), or None; lines: of the rows in the file that they were read from (N,), or None.
+    Arrays are copied and cannot be written to. Raises ModelError for shapes that do not fit; what is doubtful about the
+    numbers stands in `findings`.
+    """
+
+    def __init__(
+        self, q: Any, r: Any, R: Any = None, rails: Sequence[Any] | None = None, *, numbers: Any = None
+    ):
+        self.q = _numbers("q", q)
+        self.r = _numbers("r", r)
+        if self.q.ndim != 2 or self.r.shape != (len(self.q), 3):
+            raise ModelError(
+                f"Measurements: found q of shape {self.q.shape} and r of shape {self.r.shape}, expected (N, n) and (N, 3), "
+                "one row for each pose"
+            )
+        self.R = None if R is None else _orientations(R, len(self.q))
+        self.rails = None if rails is None else tuple(_rail(k, rail) for k, rail in enumerate(rails))
+        self.numbers = None if numbers is None else np.array(numbers, dtype=int).reshape(len(self.q))
+        self.lines: np.ndarray | None = None
+        for array in (self.q, self.r, self.R, *(self.rails or ())):
+            if array is not None:
+                array.flags.writeable = False
+
+    @classmethod
+    def read(cls, path: str | Path, rails: Sequence[Any] | None = None) -> Self:
+        """Measurements from a CSV file with the columns q1..qn, x, y, z and perhaps qw, qx, qy, qz, in m and rad.
+
+        Columns are known by the names in the first line, in any order. `number` is that of a pose in a plan; rows whose
+        `measured` is 0 are left out; columns with other names are not read. Cells are separated by commas, or by
+        semicolons or tabs: then decimals may have a comma. Empty cells count as NaN. rails: as above, or paths of CSV
+        files with the columns q, x, y, z, one for each guideway.
+        Raises ModelError for columns that are missing and cells that are no numbers, with the line.
+        """
+        columns, lines = _table(Path(path), _needed)
+        if "measured" in columns:
+            chosen = columns["measured"] != 0
+            columns, lines = {name: column[chosen] for name, column in columns.items()}, lines[chosen]
+        joints = sorted(
+            (name for name in columns if _ACTUATOR.fullmatch(name)), key=lambda name: int(name[1:])
+        )
+        q, r = (np.column_stack([columns[name] for name in names]) for names in (joints, _POSITION))
+        R = np.column_stack([columns[name] for name in _QUATERNION]) if "qw" in columns else None
+        read = [_rail_file(Path(r)) if isinstance(r, (str, Path)) else r for r in rails] if rails else None
+        found = cls(q, r, R, read, numbers=_whole(columns.get("number")))
+        found.lines = lines
+        return found
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __repr__(self) -> str:
+        more = "" if self.R is None else " with orientations"
+        more += "" if self.rails is None else f", {len(self.rails)} guideways"
+        return f"<Measurements: {len(self)} poses of {self.q.shape[1]} actuators{more}>"
+
+    @cached_property
+    def finite(self) -> np.ndarray:
+        """Which rows hold numbers only, (N,)."""
+        arrays = [self.q, self.r] if self.R is None else [self.q, self.r, self.R]
+        with np.errstate(invalid="ignore", over="ignore"):
+            if all(np.isfinite(array.sum()) for array in arrays):
+                return np.ones(len(self), dtype=bool)
+        good = np.isfinite(self.q).all(axis=1) & np.isfinite(self.r).all(axis=1)
+        return np.asarray(good if self.R is None else good & np.isfinite(self.R).all(axis=(1, 2)))
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is doubtful in these numbers, whatever the robot: kinds "nan", "duplicates", "stuck", "too few poses",
+        "line", "plane", "millimetres", "rotations", "guideway".
+        """
+        return check_data(self.q, self.r, self.R, self.finite, self.rails)
+
+    def select(self, rows: Any) -> "Measurements":
+        """The measurements of some rows (indices, a slice or a mask), with all guideways."""
+        if isinstance(rows, np.ndarray) and rows.dtype != bool and is_all(rows, len(self)):
+            return self
+        found = copy.copy(self)
+        found.__dict__ = {"q": self.q[rows], "r": self.r[rows], "R": None if self.R is None else self.R[rows]}
+        found.rails = self.rails
+        found.numbers = None if self.numbers is None else self.numbers[rows]
+        found.lines = None if self.lines is None else self.lines[rows]
+        return found
+
+
+def is_all(rows: np.ndarray, count: int) -> bool:
+    """Whether rising rows are all rows, which then need no copy."""
+    return (
+        len(rows) == count
+        and (count == 0 or (rows[0] == 0 and rows[-1] == count - 1))
+        and bool(np.all(np.diff(rows) == 1))
+    )
+
+
+def _numbers(name: str, values: Any) -> np.ndarray:
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ModelError(
+            f"Measurements: found {name} that is no array of numbers ({error}), expected rows of numbers"
+        ) from None
+
+
+def _orientations(R: Any, count: int) -> np.ndarray:
+    found = _numbers("R", R)
+    if found.shape == (count, 4):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return rotations(found / np.linalg.norm(found, axis=1, keepdims=True))
+    if found.shape == (count, 3, 3):
+        return found
+    raise ModelError(
+        f"Measurements: found R of shape {found.shape} for {count} poses, expected ({count}, 3, 3) rotation matrices or "
+        f"({count}, 4) quaternions, scalar first"
+    )
+
+
+def _rail(k: int, rail: Any) -> np.ndarray:
+    found = _numbers(f"rails[{k}]", rail)
+    if found.ndim != 2 or found.shape[1] != 4 or len(found) < 2 or not np.isfinite(found).all():
+        raise ModelError(
+            f"Measurements: found rails[{k}] of shape {found.shape}{'' if np.isfinite(found).all() else ' with NaN'}, "
+            "expected finite (k, 4), the columns q, x, y, z of two points or more"
+        )
+    found = found[np.argsort(found[:, 0], kind="stable")]
+    if np.any(np.diff(found[:, 0]) == 0):
+        raise ModelError(
+            f"Measurements: found rails[{k}] with several points at one q, expected one; average them first"
+        )
+    return found
+
+
+def _needed(names: Sequence[str]) -> str:
+    """What is wrong with the columns of measurements, in words; empty for nothing."""
+    joints = [name for name in names if _ACTUATOR.fullmatch(name)]
+    expected = [f"q{k + 1}" for k in range(max(1, len(joints)))] + list(_POSITION)
+    if any(name in names for name in _QUATERNION):
+        expected += _QUATERNION
+    missing = [name for name in expected if name not in names]
+    if not missing:
+        return ""
+    return (
+        f"found no column {', '.join(missing)}, expected q1,q2,q3,x,y,z, as many q as actuators, and qw,qx,qy,qz if "
+        "orientations were measured; write these names in the first line"
+    )
+
+
+def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns of a CSV file by the names that are read, empty cells NaN, and the line of each row.
+
+    wrong: says what is wrong with the names of columns.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            first = file.readline()
+            separator = next((one for one in _SEPARATORS if one in first), ",")
+            file.seek(0)
+            reader = csv.reader(file, delimiter=separator)
+            rows = [(reader.line_num, row) for row in reader if "".join(row).strip()]
+    except OSError as error:
+        raise ModelError(f"{path}: found no file to read ({error.strerror}), expected a CSV file") from None
+    if not rows:
+        raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
+    header = [name.strip() for name in rows[0][1]]
+    if words := _twice(header) or wrong(header):
+        raise ModelError(f"{path}: found the header {','.join(header)}: {words}")
+    numbers = [_cells(path, line, row, header, separator) for line, row in rows[1:]]
+    table = np.array(numbers, dtype=float).reshape(len(numbers), len(header))
+    return dict(zip(header, table.T, strict=True)), np.array([line for line, _ in rows[1:]], dtype=int)
+
+
+def _twice(header: Sequence[str]) -> str:
+    twice = sorted({name for name in header if name and header.count(name) > 1})
+    return f"found several columns {', '.join(twice)}, expected one of each name" if twice else ""
+
+
+def _cells(path: Path, line: int, row: Sequence[str], header: Sequence[str], separator: str) -> list[float]:
+    """The numbers of a line; of columns that are not read NaN."""
+    if len(row) != len(header):
+        commas = separator == "," and len(row) > len(header)
+        remedy = "; where decimals have commas, separate cells by semicolons" if commas else ""
+        raise ModelError(
+            f"{path}: line {line} has {len(row)} cells, expected {len(header)} as the header{remedy}"
+        )
+    found = []
+    for name, cell in zip(header, row, strict=True):
+        text = cell.strip() if _read(name) else ""
+        try:
+            found.append(float(text if separator == "," else text.replace(",", ".")) if text else np.nan)
+        except ValueError:
+            decimals = "" if separator == "," else ", or a comma"
+            raise ModelError(
+                f"{path}: line {line}, column {name}: found {text!r}, expected a number, with a point{decimals} before "
+                "decimals and nothing between thousands"
+            ) from None
+    return found
+
+
+def _read(name: str) -> bool:
+    """Whether a column of this name is read."""
+    return bool(_ACTUATOR.fullmatch(name)) or name in (*_POSITION, *_QUATERNION, "q", "number", "measured")
+
+
+def _whole(numbers: np.ndarray | None) -> np.ndarray | None:
+    """Numbers of poses, -1 for none."""
+    if numbers is None:
+        return None
+    whole = np.isfinite(numbers) & (numbers == np.round(numbers)) & (np.abs(numbers) < 1e9)
+    return np.where(whole, numbers, -1).astype(int)
+
+
+def _rail_file(path: Path) -> np.ndarray:
+    def wrong(names: Sequence[str]) -> str:
+        missing = [name for name in ("q", *_POSITION) if name not in names]
+        return f"found no column {', '.join(missing)}, expected q,x,y,z of a guideway" if missing else ""
+
+    columns, _ = _table(path, wrong)
+    return np.column_stack([columns[name] for name in ("q", *_POSITION)])

@@ -1,0 +1,1 @@
+"""What to measure: identifiability and the choice of poses."""

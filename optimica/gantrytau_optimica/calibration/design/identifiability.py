@@ -1,0 +1,245 @@
+"""Which parameters measured poses determine, and which follow from others.
+
+    J S = U diag(s) V'      s_i = 0: no pose tells anything in the direction V_i;
+                            s_i < noise / tape: less than a tape measure
+
+J stacks the closure errors of all links of an arm at all poses. Of the directions with s_i = 0 each is written with one
+redundant parameter, the last one that takes part in it, as a combination of it and its dependent ones. Dressler (2012),
+section 5.4 and Table 5.4.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gantrytau import Model, ModelError, StructureError
+from gantrytau_optimica.calibration.fitting.arm_fit import (
+    NOISE,
+    TAPE,
+    checked_poses,
+    half_covariance,
+    scales,
+    triangle,
+)
+from gantrytau_optimica.calibration.rods.arm_poses import pose_rows
+from gantrytau_optimica.calibration.rods.arms import Arm, Orientation, read_arms
+
+NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
+TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out
+
+
+class Poses(NamedTuple):
+    """What was measured: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
+
+    q: np.ndarray
+    r: np.ndarray
+    R: np.ndarray | None
+
+
+@dataclass(frozen=True, eq=False)
+class ArmIdentifiability:
+    """What poses say about the parameters of one arm.
+
+    name: its path; names: of its unknowns; count: how many; rank: directions that the poses determine at all;
+    deficiency: count - rank; redundant: parameters that may be fixed, each with those that take up its change;
+    collinear: directions that are determined worse than by a tape measure, in the same form;
+    singular_values: of J S, descending, (count,), S as in `arm_fit`.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    count: int
+    rank: int
+    deficiency: int
+    redundant: Mapping[str, list[str]]
+    collinear: Mapping[str, list[str]]
+    singular_values: np.ndarray
+    _half: np.ndarray = field(repr=False)  # half of the covariance in the directions that are held
+    _directions: np.ndarray = field(repr=False)  # (count, count), rows as singular_values
+    _held: np.ndarray = field(repr=False)  # which of them are known better than by a tape measure
+
+    def covariance(self, names: Sequence[str]) -> np.ndarray:
+        """Covariance of parameters as these poses determine them, (k, k); names of vectors or of their elements.
+
+        Raises ModelError for unknown names, StructureError for what the data do not hold, with the group it is in.
+        """
+        rows = [k for name in names for k in self._rows(name)]
+        lost = np.abs(self._directions[~self._held][:, rows]).max(axis=0, initial=0.0)
+        for k, share in zip(rows, lost, strict=True):
+            if share > 1e-3:  # 10 um of the centimetre that a tape measure leaves
+                raise StructureError(self._refusal(k))
+        return self._half[rows] @ self._half[rows].T
+
+    def _rows(self, name: str) -> list[int]:
+        found = [k for k, each in enumerate(self.names) if each == name or each.rpartition("[")[0] == name]
+        if not found:
+            raise ModelError(
+                f"{self.name}: there is no unknown {name!r}, expected one of {', '.join(self.names)}"
+            )
+        return found
+
+    def _refusal(self, row: int) -> str:
+        name = self.names[row]
+        groups = [
+            (redundant, group) for redundant, group in (*self.redundant.items(), *self.collinear.items())
+        ]
+        inside = [(r, g) for r, g in groups if name == r or name in g]
+        if inside:
+            redundant, group = inside[0]
+            others = ", ".join([*group, redundant])
+            return f"{name}: these poses determine only a combination of {others}; fix {redundant}, or give a prior for it"
+        fixed = ", ".join(redundant for redundant, _ in groups)
+        return (
+            f"{name}: these poses do not determine it alone, expected {fixed} to be fixed or to have priors"
+        )
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: {self.count} parameters, rank {self.rank}"]
+        lines += [f"  {name} follows from {', '.join(others)}" for name, others in self.redundant.items()]
+        lines += [
+            f"  {name} is known worse than by a tape measure"
+            + (f", with {', '.join(others)}" if others else "")
+            for name, others in self.collinear.items()
+        ]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """What measured poses say about a robot: `arms[i]`; prints itself."""
+
+    arms: tuple[ArmIdentifiability, ...]
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.arms))
+
+
+def identifiability(
+    robot: Model,
+    measurements: Any,
+    orientation: Orientation = "local",
+    *,
+    gains: bool = False,
+    noise: float = NOISE,
+    angle: float = 0.0,
+    tape: float = TAPE,
+) -> Identifiability:
+    """Which parameters of a robot measured poses determine, at the parameters of the model.
+
+    measurements: a record with q, r and R, or (q, r) or (q, r, R); orientation: of turntables, "local", "unit" or "free"
+    as in `arms`; gains: with the gains of turntables; noise, angle: standard deviations of the measured pose per axis, in
+    m and rad; tape: of what is known before, in m. Rows that are not finite, as of poses that a device did not see, count
+    for nothing.
+    Raises ModelError for another robot, or for arrays that do not fit.
+    """
+    check_deviations(noise, angle, tape)
+    poses, _ = finite_poses(measurements)
+    return Identifiability(
+        tuple(_of_arm(arm, poses, (noise, angle), tape) for arm in read_arms(robot, orientation, gains=gains))
+    )
+
+
+def measured_poses(measurements: Any) -> Poses:
+    """The arrays of measurements, a record with q, r and R, or a tuple of them; ModelError for anything else."""
+    if hasattr(measurements, "q") and hasattr(measurements, "r"):
+        return Poses(np.asarray(measurements.q), np.asarray(measurements.r), getattr(measurements, "R", None))
+    if isinstance(measurements, Iterable) and len(items := list(measurements)) in (2, 3):
+        return Poses(np.asarray(items[0]), np.asarray(items[1]), items[2] if len(items) == 3 else None)
+    raise ModelError(
+        f"measurements: found {type(measurements).__name__}, expected Measurements, or (q, r, R)"
+    )
+
+
+def finite_poses(measurements: Any) -> tuple[Poses, np.ndarray]:
+    """The poses of measurements whose numbers are finite, and their rows; ModelError if there are none."""
+    found = measured_poses(measurements)
+    try:
+        q, r = (np.asarray(each, dtype=float) for each in (found.q, found.r))
+        R = None if found.R is None else np.asarray(found.R, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            "measurements: found q, r or R that hold no numbers, expected arrays of them"
+        ) from None
+    arrays = [q, r, *([] if R is None else [R])]
+    if any(each.ndim < 2 or len(each) != len(q) for each in arrays):
+        shapes = ", ".join(str(each.shape) for each in arrays)
+        raise ModelError(
+            f"measurements: found arrays of the shapes {shapes}, expected q (N, n), r (N, 3), R (N, 3, 3)"
+        )
+    rows = np.flatnonzero(
+        np.all([np.isfinite(each).reshape(len(q), -1).all(axis=1) for each in arrays], axis=0)
+    )
+    if rows.size == 0:
+        raise ModelError(
+            f"measurements: found no finite numbers in any of {len(q)} rows, expected poses; give some that were seen"
+        )
+    return Poses(q[rows], r[rows], None if R is None else R[rows]), rows
+
+
+def check_deviations(noise: float, angle: float, tape: float) -> None:
+    """ModelError for standard deviations of measurement and tape that are not above zero, or of angles below it."""
+    for name, value, least in (
+        ("noise", noise, "above 0"),
+        ("tape", tape, "above 0"),
+        ("angle", angle, "0 or more"),
+    ):
+        number = isinstance(value, int | float | np.number) and np.isfinite(value)
+        if not number or value < 0 or (value == 0 and name != "angle"):
+            raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
+
+
+def _of_arm(arm: Arm, poses: Poses, noise: tuple[float, float], tape: float) -> ArmIdentifiability:
+    scale, data = scales(arm), checked_poses(arm, *poses)
+    factor = triangle(arm, *data, scale)[:, :-1]
+    _, s, directions = np.linalg.svd(factor, full_matrices=True)
+    s = np.concatenate([s, np.zeros(arm.count)])[: arm.count]
+    determined, least = s > NOTHING * s[0], noise[0] / tape
+    rank = int(determined.sum())
+    # links of one pose share the error of its measurement
+    spread = triangle(arm, *data, scale, root=pose_rows([arm], *data) * deviations(noise, data[2]))[:, :-1]
+    return ArmIdentifiability(
+        name=arm.name,
+        names=arm.names,
+        count=arm.count,
+        rank=rank,
+        deficiency=arm.count - rank,
+        redundant=dependencies(directions[~determined], scale, arm.names),
+        collinear=dependencies(directions[determined & (s < least)], scale, arm.names),
+        singular_values=s,
+        _half=scale[:, None] * half_covariance(factor, spread, max(least, NOTHING * s[0]))[0],
+        _directions=directions,
+        _held=determined & (s >= least),
+    )
+
+
+def deviations(noise: tuple[float, float], R: np.ndarray | None) -> np.ndarray:
+    """Standard deviations of the coordinates of a measured pose, (3,) in m, or (6,) in m and rad."""
+    return np.repeat(noise, 3)[: 3 if R is None else 6]
+
+
+def dependencies(directions: np.ndarray, scale: np.ndarray, names: tuple[str, ...]) -> dict[str, list[str]]:
+    """Directions (k, p), orthonormal in the scaled unknowns, as k redundant parameters with their dependent ones.
+
+    From the last parameter to the first each that takes part in some direction becomes redundant and leaves the rest,
+    until none is left: the reduced echelon form, but for pivots that are negligible.
+    """
+    left, pivots = directions, []
+    for k in reversed(range(len(names))):
+        if len(left) == 0:
+            break
+        size = np.linalg.norm(left[:, k])
+        if size > TAKES_PART:
+            pivots.append(k)
+            # a basis of what has no component k any more
+            left = np.linalg.qr(np.column_stack([left[:, k] / size, np.eye(len(left))]))[0][:, 1:].T @ left
+    pivots = sorted(pivots)
+    if not pivots:
+        return {}
+    unscaled = directions * scale
+    rows = np.linalg.lstsq(unscaled[:, pivots].T, np.eye(len(pivots)), rcond=None)[0].T @ unscaled
+    return {
+        names[pivot]: [names[k] for k in range(len(names)) if k not in pivots and abs(row[k]) > TAKES_PART]
+        for pivot, row in zip(pivots, rows, strict=True)
+    }

@@ -1,0 +1,166 @@
+"""How sure identified numbers are, from the noise of measured poses.
+
+    e_ik = |y_ik|^2 - L_i^2,    de_ik = 2 y_ik . dT_k + 2 (R_k B_i x y_ik) . dphi_k = u_ik . dT_k + w_ik . dphi_k
+    cov(e_ik, e_jk) = s^2 u_ik . u_jk + a^2 w_ik . w_jk
+    p = -(J'J)^-1 J'e           cov p = (J'J)^-1 J' cov(e) J (J'J)^-1
+
+Links share the noise of a pose, so that numbers of different links vary together. The deviations s of a coordinate and a
+of a turn about an axis are those with which the products of closure errors agree best. For one link alone this is
+4 s^2 L^2 (J'J)^-1, the Cramer-Rao bound of its closure errors.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.rotation_vectors import left_jacobian, told_vector
+from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
+from gantrytau_optimica.calibration.rods.closure import ALONG, PLATE
+
+ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
+MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
+
+
+def link_noise(fits: Sequence[Fit], loss: str) -> list[np.ndarray]:
+    """Standard deviations of a measured coordinate, in m, one for each link of each fit; pooled where they are alike.
+
+    Of a robust fit from the median of the amounts.
+    """
+    found, counts = [], []
+    for fit in fits:
+        distances = fit.distances()
+        share = fit.minimum.rank / distances.shape[1]
+        freedom = max(1.0, len(distances) - share)
+        if loss == "robust":
+            squares = (1.4826 * np.median(np.abs(distances), axis=0)) ** 2
+        else:
+            squares = np.sum(distances**2, axis=0) / freedom
+        found.append(squares)
+        counts.append(np.full(len(squares), freedom))
+    squares, weights = np.concatenate(found), np.concatenate(counts)
+    pooled = float(squares @ weights / weights.sum())
+    # a variance from n errors has the relative deviation sqrt(2 / n)
+    if np.all(np.abs(squares / pooled - 1) < ALIKE * np.sqrt(2 / weights)):
+        found = [np.full(len(one), pooled) for one in found]
+    return [np.sqrt(one) for one in found]
+
+
+def pose_noise(
+    errors: np.ndarray, by_place: np.ndarray, by_turn: np.ndarray, freedom: np.ndarray
+) -> tuple[float, float, np.ndarray]:
+    """Deviations s in m and a in rad of measured poses, and factors (links,) by which links are worse than these say.
+
+    errors: (N, links); by_place, by_turn: u and w, (N, links, 3), w zero where plates do not turn; freedom: of each link,
+    N less its share of the numbers. Factors are 1 unless errors of the model make links differ.
+    """
+    i, j = np.triu_indices(errors.shape[1])
+    share = np.sqrt(freedom / len(errors))
+    squares = np.sum(errors[:, i] * errors[:, j], axis=0) / (share[i] * share[j])
+    design = np.column_stack([np.einsum("nki,nki->k", w[:, i], w[:, j]) for w in (by_place, by_turn)])
+    own = np.maximum(squares[i == j], 1e-300)
+    weight = 1 / np.sqrt(own[i] * own[j] * np.where(i == j, 2.0, 1.0))
+    variances = _not_negative(design * weight[:, None], squares * weight)
+    expected = (design @ variances)[i == j]
+    ratio = own / np.maximum(expected, 1e-300)
+    alike = np.all(np.abs(ratio - 1) < ALIKE * np.sqrt(2 / freedom))
+    s, a = np.sqrt(variances)
+    return float(s), float(a), np.ones(len(own)) if alike else np.sqrt(ratio)
+
+
+def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Least squares for two numbers of which none is below zero."""
+    if design[:, 1].any():
+        found = np.linalg.lstsq(design, right, rcond=None)[0]
+        if (found >= 0).all():
+            return found
+    alone = np.maximum(design.T @ right, 0.0) / np.maximum(np.sum(design**2, axis=0), 1e-300)
+    left = [np.sum((right - alone[k] * design[:, k]) ** 2) for k in (0, 1)]
+    return np.array([alone[0], 0.0]) if left[0] <= left[1] else np.array([0.0, alone[1]])
+
+
+def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
+    """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold."""
+    parts = [(f, k) for f, fit in enumerate(fits) for k in range(len(fit.group.chains))]
+    starts = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
+    middle = np.zeros((starts[-1], starts[-1]))
+    moved = _moved(fits, parts, loss)
+    rows = [_slopes(fits[f], k) for f, k in parts]
+    for a, (f, _) in enumerate(parts):
+        for b, (g, _) in enumerate(parts[: a + 1]):
+            block = (np.einsum("ij,ij->i", moved[a], moved[b])[:, None] * rows[a]).T @ rows[b]
+            middle[starts[f] : starts[f + 1], starts[g] : starts[g + 1]] += block
+            if a != b:
+                middle[starts[g] : starts[g + 1], starts[f] : starts[f + 1]] += block.T
+    outer = np.zeros_like(middle)
+    for f, fit in enumerate(fits):
+        part = slice(starts[f], starts[f + 1])
+        outer[part, part] = _inverse(fit)
+        middle[part, part] += _of_prior(fit)
+    told = np.zeros_like(middle)
+    for f, fit in enumerate(fits):
+        part = slice(starts[f], starts[f + 1])
+        told[part, part] = as_told(fit)
+    return told @ outer @ middle @ outer @ told.T
+
+
+def _moved(fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str) -> list[np.ndarray]:
+    """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
+    turned = []
+    for f, k in parts:
+        chain, p = fits[f].group.chains[k], fits[f].x[fits[f].group.places[k]]
+        y = 2 * chain.vector(p)
+        lever = np.zeros_like(y) if chain.R is None else chain.R @ p[PLATE]
+        turned.append((y, np.cross(lever, y) if chain.R is not None else lever))
+    if loss == "robust" or not any(w.any() for _, w in turned):
+        noises = np.concatenate(link_noise(fits, loss))
+        return [s * np.hstack([u, 0 * w]) for s, (u, w) in zip(noises, turned, strict=True)]
+    errors = np.column_stack(
+        [fits[f].group.chains[k].error(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
+    )
+    freedom = np.array([len(errors) - fits[f].minimum.rank / len(fits[f].group.chains) for f, _ in parts])
+    by_place, by_turn = (np.stack(each, axis=1) for each in zip(*turned, strict=True))
+    s, a, factors = pose_noise(errors, by_place, by_turn, np.maximum(freedom, 1.0))
+    return [c * np.hstack([s * u, a * w]) for c, (u, w) in zip(factors, turned, strict=True)]
+
+
+def _slopes(fit: Fit, k: int) -> np.ndarray:
+    """Weighted slopes (N, free) of a link."""
+    J = fit.group.slopes(fit.x, k)
+    return J if fit.weights is None else J * (fit.weights**2)[:, None]
+
+
+def _inverse(fit: Fit) -> np.ndarray:
+    """(J'J)^-1 in the directions that were moved."""
+    minimum = fit.minimum
+    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None]
+    return held.T @ held
+
+
+def _of_prior(fit: Fit) -> np.ndarray:
+    """What the rows of the prior, the last of the slopes, add to the middle."""
+    count = len(fit.group.prior)
+    rows = fit.minimum.slopes[len(fit.minimum.slopes) - count :]
+    freedom = max(1, fit.count - fit.minimum.rank)
+    return rows.T @ rows * (fit.minimum.cost / freedom)
+
+
+def as_told(fit: Fit) -> np.ndarray:
+    """Derivatives of the numbers that are reported by those that were moved, (n, n).
+
+    The same, but for turns of measured guideways, before a rotation that was given: what is reported is the rotation
+    vector W of both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
+    """
+    whole = np.eye(len(fit.x))
+    for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
+        if chain.points is not None:
+            p, turn = fit.x[places], places[ALONG]
+            W = told_vector(chain.frame(p))
+            whole[np.ix_(turn, turn)] = np.linalg.solve(left_jacobian(W), left_jacobian(p[ALONG]))
+    return whole[np.ix_(fit.group.free, fit.group.free)]
+
+
+def undetermined(fit: Fit) -> tuple[str, ...]:
+    """Names of the numbers that take part in directions that data do not hold."""
+    lost = fit.minimum.directions[fit.minimum.rank :] @ as_told(fit).T
+    part = np.abs(lost).max(axis=0, initial=0.0)
+    return tuple(n for n, share in zip(fit.free_names, part, strict=True) if share > MOVED)

@@ -1,0 +1,123 @@
+"""The links of each model brought to their minima."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.truncated_fit import (
+    Fit,
+    Prior,
+    fit_group,
+    fit_robust,
+    not_held,
+    with_prior,
+)
+from gantrytau_optimica.calibration.judging.plausibility import thinned
+from gantrytau_optimica.calibration.rods.error_models import (
+    Link,
+    grouped,
+    needs_rails,
+    on_rail,
+    own_directions,
+    parallel,
+    started_linear,
+)
+from gantrytau_optimica.calibration.rods.groups import Group
+
+ANOTHER_FRAME = (
+    0.005  # rad, between nominal guideways and identified ones, from which on the frame is another
+)
+
+
+def fit_model(
+    model: object,
+    links: list[Link],
+    data: Measurements,
+    start: str,
+    prior: Mapping[str, Any] | None,
+    loss: str,
+    nominal: Mapping[str, float],
+) -> list[Fit]:
+    """The fits of a model of Table 5.2, of groups of links that share numbers; start, prior, loss as in `calibrate`.
+
+    nominal: values by name, about which a prior holds numbers, if not about those they start with.
+    """
+    expected = Prior(prior, nominal)
+    if needs_rails(model):
+        return _fit_rails(model, links, data, expected, loss)
+    if model == 3:
+        links = [own_directions(link) for link in links]
+    if model == "parallel":
+        return _fit_parallel(links, start, expected, loss)
+    return _fit_groups(with_prior(grouped(links), expected), loss)
+
+
+def _fit_groups(groups: Sequence[Group], loss: str) -> list[Fit]:
+    return fit_robust(groups) if loss == "robust" else [fit_group(group) for group in groups]
+
+
+def _fit_parallel(links: list[Link], start: str, prior: Prior, loss: str) -> list[Fit]:
+    """One direction for all guideways: the nominal one, unless it is unknown or that of another frame."""
+    common = _fit_groups(with_prior(grouped(parallel(links, True)), prior), loss)
+    found = common[0].values
+    identified = np.array([found[f"direction[{k}]"] for k in range(3)])
+    nominal = np.mean([link.start[4:7] for link in links], axis=0)
+    cosine = identified @ nominal / np.linalg.norm(identified) / np.linalg.norm(nominal)
+    if start == "linear" or np.arccos(np.clip(cosine, -1, 1)) > ANOTHER_FRAME:
+        return common
+    return _fit_groups(with_prior(grouped(parallel(links, False)), prior), loss)
+
+
+def _fit_rails(model: object, links: list[Link], data: Measurements, prior: Prior, loss: str) -> list[Fit]:
+    """Models 2, 4 and 5: first where straight guideways lie, then how the measured ones do."""
+    assert data.rails is not None
+    single = [link for link in links if link.chain.R is None]
+    if not single:  # models 4 and 5 turn guideways as model 2 finds them
+        single = started_linear([_without_plate(arm, links) for arm in range(len(data.rails))])
+    fits = [fit_group(group) for group in grouped(single)]
+    single = [_at(link, fit) for link, fit in zip(single, fits, strict=True)]
+    placed = [_placed(k, data.rails[k.arm], not_held(fit)) for k, fit in zip(single, fits, strict=True)]
+    if model == 2:
+        return _fit_groups(with_prior([fit.group.started(fit.x) for fit in placed], prior), loss)
+    whole: list[Link] = []
+    for link in links:
+        own = own_directions(link)
+        if model == 4 or link.arm == 1:
+            fit = placed[link.arm]
+            turned = fit.group.chains[0].frame(fit.x[fit.group.places[0]])
+            started = _at(own, fit_group(grouped([own])[0]))
+            whole += on_rail(started, data.rails[link.arm], turned)
+        else:
+            whole.append(own)
+    return _fit_groups(with_prior(grouped(whole), prior), loss)
+
+
+def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
+    """The measured guideway where a link has it; how it is rolled is tried with some of the poses.
+
+    truncated: as of the straight guideway.
+    """
+    few = thinned(len(link.chain.q))
+    trials = on_rail(_with_poses(link, few), rail)
+    fits = [fit_group(grouped([trial])[0], smallest=truncated) for trial in trials]
+    best = int(np.argmin([f.minimum.cost if np.isfinite(f.minimum.cost) else np.inf for f in fits]))
+    if len(few) == len(link.chain.q):
+        return fits[best]
+    return fit_group(grouped([on_rail(link, rail)[best]])[0].started(fits[best].x))
+
+
+def _with_poses(link: Link, rows: np.ndarray) -> Link:
+    return replace(link, chain=link.chain.at(rows))
+
+
+def _without_plate(arm: int, links: Sequence[Link]) -> Link:
+    link = next(link for link in links if link.arm == arm)
+    names = (f"arms[{arm}].length", *(f"arms[{arm}].offset[{k}]" for k in range(3)), *link.names[4:7])
+    return Link(arm, replace(link.chain, name=f"arms[{arm}]", R=None), names, link.start[:7], link.free[:7])
+
+
+def _at(link: Link, fit: Fit) -> Link:
+    return replace(link, start=np.array([fit.values[name] for name in link.names]))

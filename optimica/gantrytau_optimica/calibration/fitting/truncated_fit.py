@@ -1,0 +1,208 @@
+"""Groups of links brought to their minima: truncation of what data do not hold, priors, robust weights."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.errors import did_you_mean
+from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum, gauss_newton
+from gantrytau_optimica.calibration.rods.groups import Group, Problem, Taped, minimise, problem
+
+TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
+CLEARLY = 10.0  # times better than TAPE, from which on its pull would be negligible
+FAR = 0.5  # m, from the start values; fits that data do not hold may run off further
+NOISES, SETTLED = 10, 0.01  # rounds of estimating the noise with a tape measure, until it changes by less
+ROUNDS = 60  # of reweighting
+HUBER, TUKEY = 1.345, 4.685  # of the standard deviation, 95 % efficient for normal noise (Huber, 1981)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A group at its minimum. smallest: singular value below which directions were left alone; weights (N,) or None."""
+
+    group: Group
+    minimum: Minimum
+    smallest: float
+    weights: np.ndarray | None = None
+
+    @property
+    def x(self) -> np.ndarray:
+        """The numbers of the group."""
+        return self.minimum.x
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All numbers by name."""
+        return dict(zip(self.group.names, self.x.tolist(), strict=True))
+
+    @property
+    def free_names(self) -> tuple[str, ...]:
+        """Names of the identified numbers."""
+        return tuple(n for n, free in zip(self.group.names, self.group.free, strict=True) if free)
+
+    @property
+    def count(self) -> int:
+        """Closure errors that were used."""
+        return sum(len(c.q) for c in self.group.chains)
+
+    def distances(self) -> np.ndarray:
+        """Closure errors as differences of lengths, about e / 2L, (N, chains) in m."""
+        lengths = np.array([self.x[places[0]] for places in self.group.places])
+        return self.group.errors(self.x) / (2 * lengths)
+
+
+def fit_group(
+    group: Group,
+    weights: np.ndarray | None = None,
+    *,
+    begin: np.ndarray | None = None,
+    smallest: float | None = None,
+) -> Fit:
+    """The minimum of a group; what data hold worse than TAPE stays near the start values.
+
+    weights: of the poses, (N,), or None; begin: where the search begins, instead of the start values; smallest: singular
+    value below which directions are known not to be held.
+
+    Where data do not hold everything, closure errors curve so much along what they do not hold that steps without it end
+    in wrong places. So all numbers are first held by a tape measure, which has one minimum; what is held is decided there,
+    and moves on without the tape.
+    """
+    x = group.x if begin is None else begin
+    found = problem(group, None if weights is None else [weights] * len(group.chains))
+    if smallest is None:
+        minimum = minimise(found, x)
+        for _ in range(2 if group.prior else 0):  # its weight follows from the noise that is left without it
+            found = replace(found, noise=_noise(minimum, group))
+            minimum = minimise(found, x)
+        noise = _noise(minimum, group)
+        near = np.abs(minimum.x - x).max(initial=0.0) < FAR
+        if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * noise / TAPE:
+            return Fit(group, minimum, 0.0, weights)
+    else:
+        noise = smallest * TAPE
+    found, x, limit = _by_tape(found, noise, smallest)
+    _, singular, directions = np.linalg.svd(found.slopes(x)[:, group.free], full_matrices=False)
+    held = int((singular > max(limit, RELATIVE * singular.max(initial=0.0))).sum())
+    minimum = minimise(found, x, directions=directions, movable=held)
+    return Fit(group, minimum, limit, weights)
+
+
+def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Problem, np.ndarray, float]:
+    """The problem, its numbers where a TAPE holds all about the start values, and `smallest`; from a guess of the noise,
+    which is found anew from what is left.
+    """
+    group, rounds = found.group, 0
+    while True:
+        limit = noise / TAPE if smallest is None else smallest
+        tape = Taped(replace(found, noise=noise), limit)
+        minimum = gauss_newton(tape.errors, tape.slopes, group.x, group.free)
+        left, J = tape.problem.errors(minimum.x), tape.problem.slopes(minimum.x)[:, group.free]
+        squares = np.linalg.svd(J, compute_uv=False) ** 2
+        told = float(np.sum(squares / np.maximum(squares + limit**2, 1e-300)))  # how many numbers data tell
+        before, noise = noise, float(np.sqrt(left @ left / max(1.0, _count(group) - told)))
+        rounds += 1
+        if smallest is not None or abs(noise - before) <= SETTLED * before or rounds == NOISES:
+            return tape.problem, minimum.x, limit
+
+
+def not_held(fit: Fit) -> float:
+    """The singular value below which directions of a like group are held worse than TAPE."""
+    return _noise(fit.minimum, fit.group) / TAPE
+
+
+def _noise(minimum: Minimum, group: Group) -> float:
+    """Standard deviation of a closure error, m2."""
+    return float(np.sqrt(minimum.cost / max(1, _count(group) - minimum.rank)))
+
+
+def _count(group: Group) -> int:
+    return sum(len(c.q) for c in group.chains)
+
+
+def fit_robust(groups: Sequence[Group]) -> list[Fit]:
+    """All groups with one weight for each pose: Huber's until it settles, then Tukey's, which drops gross errors."""
+    fits = [fit_group(group) for group in groups]
+    weights = np.ones(len(groups[0].chains[0].q))
+    for tukey in (False, True):
+        for _ in range(ROUNDS):
+            size = relative_size(fits)
+            if tukey:
+                square = np.where(size < TUKEY, (1 - (size / TUKEY) ** 2) ** 2, 0.0)
+            else:
+                square = np.minimum(1.0, HUBER / np.maximum(size, 1e-12))
+            old, weights = weights, np.sqrt(square)
+            fits = [fit_group(g, weights, begin=f.x) for g, f in zip(groups, fits, strict=True)]
+            if np.abs(weights - old).max() < 1e-6:
+                break
+    return fits
+
+
+def relative_size(fits: Sequence[Fit]) -> np.ndarray:
+    """The largest closure error of each pose in robust standard deviations of its link, (N,)."""
+    distances = np.abs(np.hstack([fit.distances() for fit in fits]))
+    scale = 1.4826 * np.median(distances, axis=0)
+    return (distances / np.maximum(scale, 1e-12)).max(axis=1)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is expected of numbers: given, as in `calibrate`; nominal: values by name, about which deviations hold them."""
+
+    given: Mapping[str, Any] | None
+    nominal: Mapping[str, float]
+
+
+def with_prior(groups: Sequence[Group], expected: Prior) -> list[Group]:
+    """The groups with deviations of numbers about what is expected of them.
+
+    given: by name of a number, of a vector, or of the last part of these for all links: a deviation, or (value,
+    deviation). Raises ModelError for names that are not identified and deviations that are not above 0.
+    """
+    prior = expected.given
+    if prior is None:
+        return list(groups)
+    if not isinstance(prior, Mapping):
+        raise ModelError(
+            f"calibrate: found prior={prior!r}, expected a dict as {{'arms[1].links[0].plate_offset': 0.001}}, deviations "
+            "in m by name"
+        )
+    known = {n for g in groups for n, free in zip(g.names, g.free, strict=True) if free}
+    found = [dict(g.prior) for g in groups]
+    for name, given in prior.items():
+        matches = [n for n in known if _is_called(n, name)]
+        if not matches:
+            raise ModelError(
+                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, sorted(known))}"
+            )
+        value, deviation = given if isinstance(given, tuple) else (None, given)
+        for group, mine in zip(groups, found, strict=True):
+            for i, n in enumerate(group.names):
+                if n in matches:
+                    k = int(n[-2]) if n.endswith("]") else 0
+                    mine[i] = (
+                        expected.nominal.get(n, group.x[i]) if value is None else _element(value, k),
+                        _positive(name, deviation, k),
+                    )
+    return [replace(g, prior=mine) for g, mine in zip(groups, found, strict=True)]
+
+
+def _is_called(element: str, name: str) -> bool:
+    vector = element.rsplit("[", 1)[0] if element.endswith("]") else element
+    return name in (element, vector, vector.rsplit(".", 1)[-1])
+
+
+def _element(value: Any, k: int) -> float:
+    array = np.atleast_1d(np.asarray(value, dtype=float))
+    return float(array[k] if array.size > 1 else array[0])
+
+
+def _positive(name: str, deviation: Any, k: int) -> float:
+    found = _element(deviation, k)
+    if not found > 0:
+        raise ModelError(
+            f"calibrate: found the deviation {found:g} for '{name}' in prior, expected one above 0"
+        )
+    return found

@@ -1,0 +1,1 @@
+"""What to make of measurements and of what a fit leaves."""

@@ -1,0 +1,156 @@
+"""Rows that close worse than noise explains, seen by a fit without them.
+
+    e_k = e + J_k dp      var e_k = s^2 (1 - h_k) of poses that were fitted, s^2 (1 + h_k) of others, h_k = J_k C J_k'
+
+C is the covariance of the numbers in units of s^2; what data do not hold is known by tape measure. Without h a pose that
+was not fitted, far from those that were, would look like an outlier. Few poses hardly show what noise is: the limit
+widens as Student's distribution does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.truncated_fit import Fit, fit_group, not_held
+from gantrytau_optimica.calibration.judging.plausibility import BETTER, NEAR, Misses
+from gantrytau_optimica.calibration.rods.forward import BLOCK, RodLink
+from gantrytau_optimica.calibration.rods.guideway_points import between
+from gantrytau_optimica.calibration.rods.named_parameters import arm_of, rod_links
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.calibration.calibration import Calibration
+
+CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
+OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
+CHANCE = 1e-6  # that noise of few poses exceeds the limit
+MANY = 2000  # poses, from which on h is negligible
+KEPT = 0.7  # of the poses that must be left: what is bad for so many is the model
+LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """rows: those that close too badly; misses: how links identified without them close; typical: robust standard
+    deviation of the closure errors of the others, of the worst link, m.
+    """
+
+    rows: np.ndarray
+    misses: Misses
+    typical: float
+
+
+def limit(freedom: float) -> float:
+    """How many robust standard deviations noise does not reach, where `freedom` errors showed it."""
+    from scipy.special import stdtrit
+
+    return max(OUTLIER, float(stdtrit(max(1.0, freedom), 1.0 - CHANCE)))
+
+
+def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.ndarray, float]:
+    """The largest of the errors (links, N) of each pose in robust deviations of its link, (N,), and the worst deviation.
+
+    spread: what the deviations are to be multiplied with, (links, N).
+    """
+    sizes = np.abs(errors) / spread
+    # of many rows some thousand tell their median well enough
+    scales = 1.4826 * np.median(sizes[:, :: max(1, sizes.shape[1] // 5000)], axis=1)
+    return (sizes / np.maximum(scales, 1e-12)[:, None]).max(axis=0), float(scales.max())
+
+
+def suspicion(found: "Calibration") -> Suspicion:
+    """Of a calibration of linear guideways: rows fitted and held out."""
+    mask = np.zeros(len(found.measurements), dtype=bool)
+    mask[found.rows] = mask[found.held_out] = True
+    used = np.flatnonzero(mask)
+    fits, bad = list(found.fits), used[:0]
+    sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    # among many poses a mistake in a few is seen without nominal values
+    if (len(used) < MANY or (sizes > OUTLIER).any()) and (coarse := far_rows(found, used)).size:
+        fits = [fit_group(fit.group, 1.0 - np.isin(found.rows, coarse)) for fit in fits]
+        sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    freedom = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
+    for _ in range(CLEANINGS):
+        fresh = used[sizes > limit(freedom)]
+        if np.array_equal(fresh, bad):
+            break
+        bad = fresh
+        weights = 1.0 - np.isin(found.rows, bad)
+        if weights.sum() < KEPT * len(weights):
+            break
+        fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
+        sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    links = rod_links(fits, found.measurements.rails)
+
+    def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        return np.abs(_distances(links, q, r, R)).max(axis=0)
+
+    return Suspicion(bad, misses, typical)
+
+
+def far_rows(found: "Calibration", used: np.ndarray) -> np.ndarray:
+    """Rows that nominal values miss by far more than the others; none where they miss most, or nothing is known."""
+    if found.nominal is None:
+        return used[:0]
+    data = found.measurements.select(used)
+    missed = found.nominal(data.q, data.r, data.R)
+    usual = float(np.median(missed))
+    far = used[missed > max(NEAR, BETTER * usual)]
+    return far if usual < NEAR and len(far) < (1 - KEPT) * len(used) else used[:0]
+
+
+def relative_distances(
+    fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray, fitted: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The largest closure error of each of some rows in robust standard deviations of its link, (rows,), and the worst."""
+    links = rod_links(fits, measurements.rails)
+    whole = measurements.select(rows)
+    parts = []
+    for first in range(0, len(rows), BLOCK):
+        part = slice(first, first + BLOCK)
+        parts.append(
+            _distances(links, whole.q[part], whole.r[part], None if whole.R is None else whole.R[part])
+        )
+    spread = _spread(fits, whole, np.isin(rows, fitted)) if len(rows) < MANY else 1.0
+    return standardised(np.concatenate(parts, axis=1), spread)
+
+
+def _distances(links: Sequence[RodLink], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+    """How far links are from their lengths, (links, rows) in m."""
+    q, r = np.ascontiguousarray(q.T), np.ascontiguousarray(r.T)
+    found = np.empty((len(links), r.shape[1]))
+    for k, link in enumerate(links):
+        y = r - link.guideway.across(q[link.arm])
+        if R is not None and link.on_plate.any():
+            y += (R @ link.on_plate).T
+        found[k] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2) - link.length
+    return found
+
+
+def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.ndarray:
+    """sqrt(1 -+ h) of the links, in their order, (links, N)."""
+    found = []
+    for fit in fits:
+        group, minimum = fit.group, fit.minimum
+        chains = []
+        for chain in group.chains:
+            q = data.q[:, arm_of(chain.name)]
+            rails = data.rails if chain.points is not None else None
+            points = None if rails is None else between(rails[arm_of(chain.name)], q)
+            R = None if chain.R is None else data.R
+            chains.append(replace(chain, q=q, r=data.r, R=R, points=points))
+        here = replace(group, chains=tuple(chains))
+        used = fitted.copy()
+        if fit.weights is not None:
+            used[fitted] = fit.weights > 0
+        held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None]
+        lost = minimum.directions[minimum.rank :] / not_held(fit) if fit.minimum.cost > 0 else held[:0]
+        for k, chain in enumerate(chains):
+            J = here.slopes(fit.x, k)
+            own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
+            h = own.sum(axis=1)
+            spread = np.where(used, np.maximum(1.0 - h, LEAST), 1.0 + h + other.sum(axis=1))
+            found.append((chain.name, np.sqrt(spread)))
+    return np.array([spread for _, spread in sorted(found, key=lambda pair: pair[0])])

@@ -1,0 +1,260 @@
+"""What to make of measurements: refused before a fit, or judged after it."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.judging.plausibility import (
+    NEAR,
+    Fitting,
+    compare,
+    explained_rows,
+    miss,
+    misses_of,
+    swapped_carts,
+    thinned,
+)
+from gantrytau_optimica.calibration.judging.slips import slip, smooth_functions
+from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
+from gantrytau_optimica.calibration.rods.error_models import Link, moved
+from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
+
+HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
+LEFT_OUT = ("nan", "duplicates", "stuck")
+STILL = 1e-4  # m, over which a cart must move to be calibrated
+MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
+EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
+LOOKED_AT = 2000  # poses, in which a slip is looked for
+
+
+def usable_rows(findings: Sequence[Finding], measurements: Measurements) -> np.ndarray:
+    """The rows that take part; CalibrationError for what cannot be used at all."""
+    good = np.ones(len(measurements), dtype=bool)
+    for finding in findings:
+        if finding.kind in HOPELESS:
+            raise CalibrationError(
+                f"Measurements: {finding.message}", kind=finding.kind, rows=finding.rows, findings=findings
+            )
+        if finding.kind in LEFT_OUT:
+            good[finding.rows] = False
+    return np.flatnonzero(good)
+
+
+def check_carts(geometry: Geometry, measurements: Measurements, rows: np.ndarray) -> None:
+    """CalibrationError for a cart that stands still."""
+    for k in range(len(geometry.arms)):
+        q = measurements.q[rows, k]
+        if len(rows) and q.max() - q.min() < STILL:
+            raise CalibrationError(
+                f"Measurements: found q{k + 1} at {q[0]:.6g} m in {rows_in_words(rows)}, expected a cart that moves; its "
+                "guideway cannot be identified from these; look at that column, or measure other poses",
+                kind="constant",
+                rows=rows,
+            )
+
+
+def check_count(parameters: int, rows: np.ndarray, findings: Sequence[Finding]) -> None:
+    """CalibrationError for fewer fitted rows than a link has parameters and one more."""
+    needed = parameters + 1
+    if len(rows) < needed:
+        raise CalibrationError(
+            f"Measurements: found {len(rows)} poses to fit {parameters} parameters of each link, expected {needed} at the "
+            "least; measure more poses, or give holdout=None",
+            kind="too few poses",
+            rows=rows,
+            findings=findings,
+        )
+
+
+def in_frame(
+    geometry: Geometry, links: list[Link], data: Measurements, rows: np.ndarray
+) -> tuple[list[Link], list[Finding]]:
+    """Links whose start fits the frame of the measurements; CalibrationError for another robot."""
+    if miss(misses_of(links), data.q, data.r, data.R) < NEAR:
+        return links, []
+    fitting = compare(links, data.q, data.r, data.R)
+    if fitting.left > NEAR / 10:
+        raise CalibrationError(
+            f"Measurements: found no links of constant length that fit {rows_in_words(rows)} (they miss it by "
+            f"{fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, of a robot with "
+            "linear guideways",
+            kind="another robot",
+            rows=rows,
+        )
+    if fitting.off > NEAR and (swapped := swapped_carts(links, fitting.off, data.q, data.r, data.R)):
+        words, off = swapped
+        raise CalibrationError(
+            f"Measurements: found {words} in {rows_in_words(rows)} (guideways lie {fitting.off:.3g} m off those of "
+            f"{geometry.name} however the frame is placed, {off:.3g} m with that undone); correct the columns of the "
+            "measurements",
+            kind="swapped columns" if "column" in words else "sign",
+            rows=rows,
+        )
+    if fitting.off > NEAR:
+        raise CalibrationError(
+            f"Measurements: found guideways that lie {fitting.off:.3g} m off those of {geometry.name} however the "
+            f"frame is placed, in {rows_in_words(rows)}, expected {NEAR:g} m at most; these are measurements of another "
+            "robot, or its nominal values are wrong: start='linear' needs none",
+            kind="another robot",
+            rows=rows,
+        )
+    return moved(links, fitting.turn, fitting.shift), [in_words(fitting, rows)]
+
+
+def in_words(fitting: Fitting, rows: np.ndarray) -> Finding:
+    """The finding that the frame is another."""
+    angle = np.degrees(np.arccos(np.clip((np.trace(fitting.turn) - 1) / 2, -1.0, 1.0)))
+    x, y, z = fitting.shift
+    words = (
+        f"the frame of {rows_in_words(rows)} is another than that of the nominal values (turned by {angle:.3g} degrees, "
+        f"its origin is at {x:.4g}, {y:.4g}, {z:.4g} m, links miss their lengths by {fitting.miss:.3g} m); identified in "
+        "the frame measured, from nominal values moved there"
+    )
+    return Finding("frame", rows, words)
+
+
+def judged(found: Calibration) -> list[Finding]:
+    """What is doubtful after a fit: rows with mistakes, outliers, slips, and numbers that data do not hold.
+
+    CalibrationError for rows whose columns are swapped or in mm, unless a robust loss left them without weight, and for
+    measurements that no parameters explain.
+    """
+    seen = found.suspicion
+    findings = _mistaken(found, seen)
+    others = np.setdiff1d(seen.rows, np.concatenate([seen.rows[:0], *(f.rows for f in findings)]))
+    if others.size:
+        one = len(others) == 1
+        advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
+        if found.loss == "robust":
+            advice = (
+                f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of .error"
+            )
+        words = (
+            f"{rows_in_words(others, len(found.measurements))} {agreeing(others, 'close')} worse than {OUTLIER:g} standard "
+            f"deviations; {advice}"
+        )
+        findings.append(Finding("outliers", others, words))
+    findings += _slipped(found)
+    return [*findings, *_misfit(found, seen, findings), *_far(found), *_in_doubt(found)]
+
+
+def _far(found: Calibration) -> Iterator[Finding]:
+    """Lengths and joints on the plate that data hold, and that are not where they nominally are."""
+    if found.nominal is None:
+        return
+    far = []
+    for link in (link for arm in found.geometry.arms for link in arm.links):
+        for what, value in (("length", link.length), ("plate_offset", link.plate_offset)):
+            name = f"{link.name}.{what}"
+            if name in found.parameters and not found.undetermined_part(name):
+                off = float(np.linalg.norm(found.parameters[name] - value))
+                far += [f"{name} by {off:.3g} m"] if off > NEAR else []
+    if far:
+        words = (
+            f"identified numbers are off their nominal values, {', '.join(far)}; expected {NEAR:g} m at most; look at units "
+            "and columns of the measurements, and at those values"
+        )
+        yield Finding("far", found.rows, words)
+
+
+def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Iterator[Finding]:
+    if seen.typical < MISFIT:
+        return
+    rows = np.union1d(found.rows, found.held_out)
+    where = rows_in_words(rows, len(found.measurements))
+    words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {where} with the best parameters"
+    remedy = (
+        "q, r and R of the same pose in each row; look at order, units and signs of columns, or take loss='robust' where "
+        "many rows are wrong, or a device that errs by less"
+    )
+    if seen.typical > REFUSED:
+        raise CalibrationError(
+            f"Measurements: found that {words}, expected {remedy}",
+            kind="misfit",
+            rows=rows,
+            findings=findings,
+        )
+    yield Finding("misfit", rows, f"{words}; expected {remedy}")
+
+
+def _slipped(found: Calibration) -> Iterator[Finding]:
+    few = thinned(len(found.rows), LOOKED_AT)
+    for column, errors, jacobian, slopes in found.systems(few):
+        data = found.measurements.select(found.rows[few])
+        seen = slip(errors, jacobian, slopes, smooth_functions(data.r))
+        if seen is None:
+            continue
+        first = found.rows[few[seen.first]]
+        last = found.rows[few[seen.last]] if seen.last < len(few) else len(found.measurements)
+        rows = np.union1d(found.rows, found.held_out)
+        rows = rows[(rows >= first) & (rows < last)]
+        cart = column < len(found.geometry.arms)
+        size = f"{seen.size * 1e3:+.3g} mm" if cart else f"{seen.size * 1e3:+.3g} mrad"
+        where = rows_in_words(rows, len(found.measurements))
+        words = (
+            f"q{column + 1} is off by {size} in {where}, beside the other rows; the encoder slipped or was "
+            "referenced anew, or the robot or the device was moved; calibrate the parts apart, or measure again"
+        )
+        yield Finding("slip", rows, words)
+
+
+def _in_doubt(found: Calibration) -> Iterator[Finding]:
+    lost = found.held_out[~np.isfinite(found.errors)]
+    if lost.size:
+        left = f"{agreeing(lost, 'they are')} left out of .error"
+        words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; {left}"
+        yield Finding("no pose", lost, words)
+    if not found.success:
+        words = "the fit did not converge; its numbers are those of the last step; measure more poses, or give a prior"
+        yield Finding("not converged", found.rows, words)
+    if found.undetermined:
+        advice = (
+            "turn the plate more" if found.plate_turns else "measure more poses, spread over the workspace"
+        )
+        names = ", ".join(_whole_vectors(found.undetermined))
+        words = (
+            f"data do not hold {names} (rank {found.rank} of {len(found.names)}); they stay near their start values; "
+            f"{advice}, or give a prior"
+        )
+        yield Finding("undetermined", found.rows, words)
+
+
+def _whole_vectors(names: Sequence[str]) -> list[str]:
+    """Names of numbers, the three of a vector by its name."""
+    found = []
+    for name in names:
+        vector = name.rpartition("[")[0]
+        whole = name.endswith("]") and all(f"{vector}[{k}]" in names for k in range(3))
+        found.append(vector if whole else name)
+    return list(dict.fromkeys(found))
+
+
+def _mistaken(found: Calibration, seen: Suspicion) -> list[Finding]:
+    data, rows = found.measurements, seen.rows
+    if not rows.size or seen.typical > EXPLAINED:
+        return []
+    R = None if data.R is None else data.R[rows]
+    limit = max(EXPLAINED, OUTLIER * seen.typical)
+    findings = [
+        Finding(
+            mistake.kind,
+            rows[places],
+            f"{mistake.words} in {rows_in_words(rows[places])}; correct {'this row' if len(places) == 1 else 'these rows'}",
+        )
+        for mistake, places in explained_rows(
+            found.geometry, seen.misses, limit, data.q[rows], data.r[rows], R
+        )
+    ]
+    if findings and found.loss != "robust":
+        words = "; ".join(f.message for f in findings)
+        bad = np.sort(np.concatenate([f.rows for f in findings]))
+        raise CalibrationError(
+            f"Measurements: found {words}, or take loss='robust'",
+            kind=findings[0].kind,
+            rows=bad,
+            findings=findings,
+        )
+    return findings

@@ -1,0 +1,1 @@
+"""Guideways and error maps, looked at by themselves."""

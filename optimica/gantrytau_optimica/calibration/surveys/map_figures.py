@@ -1,0 +1,88 @@
+"""Figures of errors over the workspace: Dressler (2012), Figure 4.7, and maps of error vectors."""
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau_optimica.calibration.surveys.guideway_figures import MICRO, panels_of, saved
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gantrytau_optimica.calibration.surveys.error_maps import ErrorMap
+    from gantrytau_optimica.calibration.surveys.orientation_errors import Causes, OrientationErrors
+
+ARROW = 0.15  # the longest arrow by the width of what is drawn
+MOST_LAYERS = 12
+
+
+def draw_orientation(
+    found: "OrientationErrors", causes: "Causes | None", file: str | os.PathLike[str] | None
+) -> "Figure":
+    """Turns about x, y and z in 0.001 deg over the poses, sorted along the guideways."""
+    figure, panels = panels_of(3, file)
+    order = np.argsort(found.r @ found.along, kind="stable")
+    parts = {"measured": found.turns - found.turns.mean(axis=0)}
+    if causes is not None:
+        parts |= {"by links and joints": causes.links, "by guideways": causes.guideways}
+    for axis, name, k in zip(panels, "xyz", range(3), strict=True):
+        for label, part in parts.items():
+            style = "." if label == "measured" else "-"
+            axis.plot(1e3 * np.degrees(part[order, k]), style, markersize=3, linewidth=0.8, label=label)
+        axis.set_ylabel(f"about {name} [0.001°]")
+    panels[0].legend(fontsize="small")
+    panels[-1].set_xlabel("pose, in the order along the guideways")
+    return saved(figure, file)
+
+
+def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[str] | None) -> "Figure":
+    """Errors as coloured arrows on a plane; each panel holds the poses of one layer along the third axis."""
+    if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set("xyz"):
+        raise ModelError(f"plot: found axes={axes!r}, expected two of x, y and z, such as 'yz'")
+    if not 1 <= layers <= MOST_LAYERS:
+        raise ModelError(f"plot: found layers={layers!r}, expected 1 to {MOST_LAYERS}")
+    first, second = ("xyz".index(a) for a in axes)
+    third = 3 - first - second
+    figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.6 + 3.8 * layers, 4.4))
+    borders = np.linspace(found.r[:, third].min(), found.r[:, third].max(), layers + 1)
+    layer = np.clip(np.searchsorted(borders, found.r[:, third], side="right") - 1, 0, layers - 1)
+    width = max(np.ptp(found.r[:, first]), np.ptp(found.r[:, second]), 1e-9)
+    scale = found.size.max() / (ARROW * width) or 1.0
+    drawn = []
+    for k, axis in enumerate(panels):
+        rows = layer == k
+        arrows = axis.quiver(
+            found.r[rows, first], found.r[rows, second], found.errors[rows, first], found.errors[rows, second],
+            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.005,
+            clim=(0.0, MICRO * found.size.max()),
+        )  # fmt: skip
+        drawn.append(arrows)
+        axis.set_aspect("equal")
+        # one window for all, which leaves room for arrows
+        axis.set_xlim(found.r[:, first].min() - ARROW * width, found.r[:, first].max() + ARROW * width)
+        axis.set_ylim(found.r[:, second].min() - ARROW * width, found.r[:, second].max() + ARROW * width)
+        axis.set_xlabel(f"{axes[0]} [m]")
+        if layers > 1:
+            axis.set_title(
+                f"{'xyz'[third]} from {borders[k]:.2f} to {borders[k + 1]:.2f} m", fontsize="small"
+            )
+    panels[0].set_ylabel(f"{axes[1]} [m]")
+    figure.colorbar(drawn[0], ax=panels, label="error [µm]")
+    return saved(figure, file)
+
+
+def draw_sizes(found: "ErrorMap", file: str | os.PathLike[str] | None) -> "Figure":
+    """Histograms of lengths and of components along the principal axes."""
+    figure, (left, right) = panels_of(1, file, 2)
+    left.hist(MICRO * found.size, bins="auto")
+    left.axvline(MICRO * found.mean, color="k", linewidth=0.8, label=f"mean {MICRO * found.mean:.0f} µm")
+    left.set_xlabel("length of the error [µm]")
+    left.set_ylabel("poses")
+    left.legend(fontsize="small")
+    for k, components in enumerate((found.errors @ found.axes).T):
+        right.hist(MICRO * components, bins="auto", histtype="step", label=f"axis {k + 1}")
+    right.set_xlabel("component along a principal axis [µm]")
+    right.legend(fontsize="small")
+    return saved(figure, file)

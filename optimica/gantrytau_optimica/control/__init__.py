@@ -1,0 +1,1 @@
+"""A problem as an optimal-control problem in states, algebraics and inputs."""

@@ -1,0 +1,330 @@
+"""From a problem in the model's symbols to a control problem in states, algebraics and inputs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae, ModelError
+from gantrytau.compiler.system import System
+from gantrytau.flattening.flat_model import FlatVariable
+from gantrytau.language.symbols import split_derivative, time
+from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
+from gantrytau_optimica.control.control_problem import (
+    ControlProblem,
+    Course,
+    FreeNumber,
+    Limit,
+    Phase,
+    Pieces,
+    PointValue,
+    Signal,
+)
+from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess, typical_size
+from gantrytau_optimica.control.limits import check_symbols, limit_rows, signal_limits, with_limits
+from gantrytau_optimica.problem.model_words import algebraic_words
+from gantrytau_optimica.problem.optimization import Point
+from gantrytau_optimica.problem.reading import Constraint, ReadProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """The control problem, and what leads back from it to the model's names."""
+
+    read: ReadProblem
+    problem: ControlProblem
+    system: System
+    numbers: Mapping[str, float]  # parameters that are neither free nor held
+    points: tuple[Point, ...]
+    constraints: tuple[Constraint, ...]
+    closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
+
+    def expressed(self, names: Sequence[str]) -> ca.SX:
+        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.
+
+        Raises ModelError for derivatives that the problem does not hold.
+        """
+        found = self.system.resolve([self.read.dae.expression(name) for name in names])
+        column = ca.vertcat(ca.SX(0, 1), *known(found, self.read, self.numbers))
+        problem = self.problem
+        own = [problem.time, problem.numbers, *(s.symbol for s in problem.signals)]
+        own += [c.symbol for phase in problem.phases for c in phase.courses]
+        inside = {e.element_hash() for e in ca.vertcat(*own).elements()}
+        for leaf in ca.symvar(column):
+            if leaf.element_hash() not in inside:
+                raise ModelError(
+                    f"{problem.name}: {', '.join(names[:3])} needs {leaf.name()}, which is not part of the problem; mention "
+                    "it there, in a constraint or an equation"
+                )
+        return column
+
+
+def build(
+    read: ReadProblem,
+    guess: Mapping[str, Any],
+    held: Sequence[str] = (),
+    controls: Mapping[str, Pieces] | None = None,
+) -> Built:
+    """Bring a problem into the form that is transcribed.
+
+    held: scalar parameters that stay symbols; controls: how inputs are made, by scalar name. Raises ModelError where
+    it cannot be brought into that form.
+    """
+    dae = read.dae
+    system = dae.system("lifted")
+    chosen = _free_numbers(dae, guess, held)
+    open_names = {n.name for n in chosen}
+    numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in open_names}
+    conditions = (start_conditions(dae), link_conditions(read))
+    points = (*read.points, *(p for more, _ in conditions for p in more))
+    constraints = (*read.constraints, *(c for _, more in conditions for c in more))
+    limits = (*constraints, *_declared_limits(dae))
+
+    def resolve(expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        return known(system.express([ca.SX(e) for e in expressions]), read, numbers)
+
+    rows = resolve([e for c in limits for e in (c.expression, c.lower, c.upper)])
+    values = resolve([p.expression for p in points])
+    times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
+    objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
+    ode, residuals = known([system.ode, system.residuals], read, numbers)
+    split = _Split(read, system, ode, residuals, dict(controls or {}))
+    phases = []
+    for k, stage in enumerate(read.phases):
+        integrand, start_time, final_time = resolve([stage.integrand, stage.start_time, stage.final_time])
+        mine = [i for i, p in enumerate(points) if read.phase_of(p.expression, f"`{p.symbol}`") == k]
+        phase = replace(
+            split.phase(k),
+            start_time=start_time,
+            final_time=final_time,
+            integrand=integrand,
+            points=tuple(PointValue(points[i].symbol, values[i], times[i]) for i in mine),
+        )
+        _check_courses(read, k, phase)
+        phases.append(with_targets(read, k, phase, targets, objective))
+    integrated = [t.symbol for t in read.targets if t.integrated]
+    if integrated:
+        objective = ca.substitute(objective, ca.vertcat(*integrated), ca.SX.zeros(len(integrated), 1))
+    draft = ControlProblem(read.name, time, tuple(phases), chosen, objective, ())
+    found = iter(rows)
+    sorted_rows = [
+        row for c in limits for row in limit_rows(c, next(found), next(found), next(found), read.name)
+    ]
+    draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
+    check_symbols(draft, read.name)
+    names = [a.name for a in system.algebraics if a.closed is not None]
+    forms = known([a.closed for a in system.algebraics if a.closed is not None], read, {})
+    built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
+    return replace(built, problem=_with_sizes(with_guesses(built, guess)))
+
+
+def _check_courses(read: ReadProblem, number: int, phase: Phase) -> None:
+    """ModelError for samples of inputs that do not cover the phase or have gaps."""
+    if not (phase.states and phase.start_time.is_constant() and phase.final_time.is_constant()):
+        return  # without states nothing is needed between the samples; free times are refused where they are read
+    for name, course in read.courses.items():
+        if not isinstance(course, ca.SX) and (len(read.phases) == 1 or read.phases[number].owns(name)):
+            what = f"{read.name}, input {name}"
+            course[0].require(what, float(phase.start_time), float(phase.final_time), between=True)
+
+
+def _in_order(draft: ControlProblem) -> list[Limit]:
+    """Ends after starts, of phases whose times are free and could change places."""
+    found = []
+    low = ca.DM([n.min if np.isfinite(n.min) else -1e20 for n in draft.free])
+    high = ca.DM([n.max if np.isfinite(n.max) else 1e20 for n in draft.free])
+    for phase in draft.phases:
+        length = phase.final_time - phase.start_time
+        slope = ca.jacobian(length, draft.numbers)
+        if length.is_constant() or not slope.is_constant():
+            continue
+        offset = float(ca.substitute(length, draft.numbers, ca.DM.zeros(len(draft.free))))
+        slope = ca.DM(slope)
+        least = offset + float(ca.sum2(ca.fmin(slope * low.T, slope * high.T)))
+        if least <= 0:
+            start, stop = horizon(draft, phase)
+            name = f"the end of {phase.name or draft.name} comes after its start"
+            found.append(Limit(length, 1e-6 * (stop - start), np.inf, name))
+    return found
+
+
+def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
+    """The control problem with first guesses along its free and held numbers as they are."""
+    guesses = first_guesses(built, guess)
+    return _changed(built.problem, lambda phase, signal: replace(signal, guess=guesses[signal.name]))
+
+
+def _with_sizes(draft: ControlProblem) -> ControlProblem:
+    bounds = {name: ends for phase in draft.phases for name, ends in signal_limits(phase, draft.name).items()}
+    return _changed(
+        draft, lambda phase, signal: replace(signal, nominal=typical_size(draft, signal, bounds[signal.name]))
+    )
+
+
+def _changed(draft: ControlProblem, change: Callable[[Phase, Signal], Signal]) -> ControlProblem:
+    """The problem with every signal changed."""
+    phases = []
+    for phase in draft.phases:
+        parts = (
+            tuple(change(phase, s) for s in part) for part in (phase.states, phase.algebraics, phase.inputs)
+        )
+        states, algebraics, inputs = parts
+        phases.append(replace(phase, states=states, algebraics=algebraics, inputs=inputs))
+    return replace(draft, phases=tuple(phases))
+
+
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """The system of equations split by phases."""
+
+    read: ReadProblem
+    system: System
+    ode: ca.SX
+    residuals: ca.SX
+    controls: dict[str, Pieces]
+
+    def phase(self, number: int) -> Phase:
+        """The dynamics of one phase; its times, costs and points are still missing."""
+        system, words = self.system, algebraic_words(self.read.dae)
+        nominal = {n: x for v in self.read.dae.flat.variables for n, x in _nominals(v, self.read.dae)}
+        states = [k for k, name in enumerate(system.states) if self._owner(name) == number]
+        algebraics = [k for k, a in enumerate(system.algebraics) if self._owner(a.name) == number]
+        inputs, courses = [], []
+        for name, symbol in zip(system.inputs, system.u.elements(), strict=True):
+            if self._owner(name) != number:
+                continue
+            course = self.read.courses.get(name)
+            if course is None:
+                pieces = self.controls.get(name, Pieces())
+                inputs.append(_signal(name, symbol, nominal.get(name, np.nan), pieces))
+            elif not isinstance(course, ca.SX):
+                samples, column = course
+                courses.append(
+                    Course(
+                        name,
+                        symbol,
+                        partial(samples.at, column=column),
+                        samples.jumps(column),
+                        samples.kinks(),
+                    )
+                )
+        return Phase(
+            name=self.read.phases[number].name,
+            start_time=ca.SX(0),
+            final_time=ca.SX(1),
+            states=tuple(
+                _signal(system.states[k], system.x[k], nominal.get(system.states[k], np.nan)) for k in states
+            ),
+            algebraics=tuple(
+                replace(_signal(a.name, a.symbol), min=a.min, words=words.get(a.name, ("", a.name))[1])
+                for a in (system.algebraics[k] for k in algebraics)
+            ),
+            inputs=tuple(inputs),
+            courses=tuple(courses),
+            ode=self.ode[states] if states else ca.SX(0, 1),
+            residuals=self.residuals[algebraics] if algebraics else ca.SX(0, 1),
+            residual_names=tuple(
+                words.get(a.name, (f"the equation of {a.name}", ""))[0]
+                for a in (system.algebraics[k] for k in algebraics)
+            ),
+            integrand=ca.SX(0),
+        )
+
+    def _owner(self, name: str) -> int:
+        """Number of the phase of a variable, a derivative, or the square root in one."""
+        if len(self.read.phases) == 1:
+            return 0
+        while (bare := name.removeprefix("sqrt(").removeprefix("der(")) != name:
+            name = bare
+        return next(k for k, phase in enumerate(self.read.phases) if phase.owns(name))
+
+
+def _signal(name: str, symbol: ca.SX, nominal: float = np.nan, pieces: Pieces | None = None) -> Signal:
+    return Signal(name, symbol, -np.inf, np.inf, nominal, np.zeros_like, pieces=pieces or Pieces())
+
+
+def _nominals(variable: FlatVariable, dae: Dae) -> list[tuple[str, float]]:
+    """Declared typical sizes by scalar name."""
+    if variable.nominal is None:
+        return []
+    numbers = (abs(float(dae.table.number(x)[0])) for x in variable.nominal)
+    return [(n, x) for n, x in zip(variable.elements, numbers, strict=True) if x > 0]
+
+
+def known(expressions: list[ca.SX], read: ReadProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
+    """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
+    old = [read.dae.table.symbols[n] for n in numbers]
+    new = [ca.SX(x) for x in numbers.values()]
+    expressions = _with_courses(expressions, read)
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
+
+
+def _with_courses(expressions: list[ca.SX], read: ReadProblem) -> list[ca.SX]:
+    """Inputs and their derivatives replaced by courses that are expressions of time."""
+    courses = {name: course for name, course in read.courses.items() if isinstance(course, ca.SX)}
+    if not courses or not expressions:
+        return expressions
+    old, new = [], []
+    for leaf in ca.symvar(ca.vertcat(*(ca.vec(ca.densify(e)) for e in expressions))):
+        base, order = split_derivative(leaf.name())
+        if base in courses:
+            value = courses[base]
+            for _ in range(order):
+                value = ca.jacobian(value, time)
+            old.append(leaf)
+            new.append(ca.densify(value))
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
+
+
+def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tuple[FreeNumber, ...]:
+    """Numbers that the optimiser chooses, and parameters that are held for one solve."""
+    table = dae.table
+    found = []
+    for parameter in dae.flat.parameters:
+        for k, name in enumerate(parameter.elements):
+            if parameter.free and name in table.independent:
+                low, high = _range(parameter, k, dae, held)
+                start = number_guess(name, guess, table.values[name])
+                found.append(FreeNumber(name, table.symbols[name], low, high, start))
+            elif name in held:
+                if name not in table.independent:
+                    raise ModelError(
+                        f"parameters: {name} follows from others or shapes the equations, expected one that can "
+                        "change; change what it follows from, or build a new problem for each value"
+                    )
+                value = table.values[name]
+                found.append(FreeNumber(name, table.symbols[name], value, value, value, held=True))
+    return tuple(found)
+
+
+def _declared_limits(dae: Dae) -> list[Constraint]:
+    """Min and max of every variable of the model, eliminated ones included."""
+    found = []
+    for variable in dae.flat.variables:
+        if variable.min is None and variable.max is None:
+            continue
+        for k, (name, symbol) in enumerate(zip(variable.elements, variable.symbol.elements(), strict=True)):
+            low = variable.min[k] if variable.min is not None else ca.SX(-ca.inf)
+            high = variable.max[k] if variable.max is not None else ca.SX(ca.inf)
+            found.append(Constraint(symbol, low, high, f"limits of {name}"))
+    return found
+
+
+def _range(parameter: FlatVariable, k: int, dae: Dae, held: Sequence[str]) -> tuple[float, float]:
+    for limit in (parameter.min, parameter.max):
+        leaves = (
+            {leaf.name() for leaf in ca.symvar(dae.table.reduce(limit[k]))} if limit is not None else set()
+        )
+        for name in leaves & set(held):
+            raise ModelError(
+                f"{parameter.name}: its limits depend on {name}, which is to change, expected numbers; write the limit in "
+                "constraints()"
+            )
+    low = -np.inf if parameter.min is None else float(dae.table.number(parameter.min[k])[0])
+    high = np.inf if parameter.max is None else float(dae.table.number(parameter.max[k])[0])
+    if not low <= high:
+        raise ModelError(f"{parameter.name}: limits {low:g} and {high:g} cross; make min the smaller")
+    return low, high

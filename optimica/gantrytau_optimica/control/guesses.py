@@ -1,0 +1,329 @@
+"""First guesses: what the caller gives, else a straight line between given ends, else the start values."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae, ModelError, Result
+from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
+from gantrytau_optimica.problem.optimization import Point
+from gantrytau_optimica.problem.reading import Constraint
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.answers.optimum import Optimum
+    from gantrytau_optimica.control.build import Built
+
+Guess = Callable[[np.ndarray], np.ndarray]
+RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
+
+
+def first_guesses(built: "Built", given: Mapping[str, Any]) -> dict[str, Guess]:
+    """A function of shares of the horizon (n,) for every signal of the control problem, by name."""
+    dae, problem = built.read.dae, built.problem
+    horizons = [horizon(problem, phase) for phase in problem.phases]
+    ends = _ends(dae, built.points, built.constraints, {n.name: n.guess for n in problem.free})
+    found: dict[str, Guess] = {}
+    for phase, span in zip(problem.phases, horizons, strict=True):
+        own = _given(dae, given, span)
+        symbols: dict[str, Guess] = {}
+        for signal in phase.states:
+            key = signal.symbol.name()
+            symbols[key] = found[signal.name] = own.get(key) or _from_ends(dae, key, ends, span[1] - span[0])
+        for signal in phase.inputs:
+            key = signal.symbol.name()
+            symbols[key] = found[signal.name] = own.get(key) or _constant(dae.start.get(key, 0.0))
+        for course in phase.courses:
+            symbols[course.symbol.name()] = _course(course, span)
+        found.update(_algebraics(built, phase, symbols, own, span))
+    return found
+
+
+def with_algebraics(built: "Built", problem: ControlProblem) -> ControlProblem:
+    """The problem with algebraics guessed anew from the guesses of its other signals, where these give them outright."""
+    built = replace(built, problem=problem)
+    phases = []
+    for phase in problem.phases:
+        span = horizon(problem, phase)
+        symbols = {s.symbol.name(): s.guess for s in (*phase.states, *phase.inputs)}
+        symbols |= {c.symbol.name(): _course(c, span) for c in phase.courses}
+        own = {a.symbol.name(): a.guess for a in phase.algebraics if a.name not in built.closed}
+        found = _algebraics(built, phase, symbols, own, span)
+        phases.append(
+            replace(phase, algebraics=tuple(replace(a, guess=found[a.name]) for a in phase.algebraics))
+        )
+    return replace(problem, phases=tuple(phases))
+
+
+def horizon(problem: ControlProblem, phase: Phase) -> tuple[float, float]:
+    """Start and end of a phase in s by the guesses of the free numbers. Raises ModelError if they are not in order."""
+    evaluate = ca.Function("horizon", [problem.numbers], [phase.start_time, phase.final_time])
+    start, stop = (float(x) for x in evaluate(ca.DM([n.guess for n in problem.free])))
+    if not start < stop:
+        where = f"{problem.name}.{phase.name}" if phase.name else problem.name
+        raise ModelError(
+            f"{where}: start_time {start:g} s and final_time {stop:g} s, expected the first to be the smaller"
+        )
+    return start, stop
+
+
+def _course(course: Course, span: tuple[float, float]) -> Guess:
+    return lambda share: course.value(span[0] + np.asarray(share) * (span[1] - span[0]))
+
+
+def number_guess(name: str, guess: Mapping[str, Any], otherwise: float) -> float:
+    """The guess of a free number; ModelError if it is none."""
+    if name not in guess:
+        return otherwise
+    try:
+        value = float(np.asarray(guess[name], dtype=float).item())
+    except (TypeError, ValueError):
+        raise ModelError(f"guess {name}: found {guess[name]!r}, expected a number") from None
+    if not np.isfinite(value):
+        raise ModelError(f"guess {name}: found {value}, expected a finite number")
+    return value
+
+
+def _constant(value: float) -> Guess:
+    return lambda fraction: np.full(np.shape(fraction), value)
+
+
+def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> dict[str, Guess]:
+    """The caller's guesses by symbol of the reduced equations."""
+    found: dict[str, Guess] = {}
+    span = horizon[1] - horizon[0]
+    for name, value in given.items():
+        elements = dae.expand(name)
+        if elements[0] in dae.table.symbols:
+            continue
+        for k, element in enumerate(elements):
+            target = derivative_symbol(dae, element)
+            if target is None:
+                continue
+            symbol, factor, offset = target
+            found[symbol] = _one(name, value, k, len(elements), factor, offset, horizon[0], span)
+    return found
+
+
+def _one(
+    name: str, value: Any, k: int, size: int, factor: float, offset: float, start: float, span: float
+) -> Guess:
+    function: Any = value
+
+    def guess(fraction: np.ndarray) -> np.ndarray:
+        try:
+            if isinstance(value, Stretched):
+                raw = value.at(fraction)[:, None]
+            elif callable(value):
+                raw = np.array(
+                    [np.ravel(function(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float
+                )
+            else:
+                raw = np.tile(np.ravel(np.asarray(value, dtype=float)), (np.size(fraction), 1))
+        except Exception as error:  # of a function that is not ours
+            raise ModelError(
+                f"guess {name}: {type(error).__name__}: {error}; expected a number, an array or a function of time"
+            ) from error
+        if raw.shape[1] != size:
+            raise ModelError(f"guess {name}: found {raw.shape[1]} values, expected {size}")
+        if not np.all(np.isfinite(raw)):
+            raise ModelError(f"guess {name}: found values that are not finite")
+        return (raw[:, k] - offset) / factor
+
+    return guess
+
+
+class Stretched(ABC):
+    """A signal of another solution, given over shares of its own horizon."""
+
+    @abstractmethod
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        """Values at shares (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretched(Stretched):
+    """Straight lines between samples."""
+
+    share: np.ndarray
+    values: np.ndarray
+
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        return np.interp(np.atleast_1d(fraction), self.share, self.values)
+
+
+def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[str, Any]:
+    """Guesses from another solution by name: signals, their time stretched onto the new horizon, and free numbers.
+
+    component: path of the component that the solution is of. What the solution does not have keeps its default guess;
+    ModelError if it has no variable of the model at all.
+    """
+    before = f"{component}." if component else ""
+    times: dict[str, np.ndarray] = {}
+    for name in dae.variables:
+        own = name[len(before) :]
+        if name.startswith(before) and own in source:
+            times[name] = _times(source, own)
+    if not times:
+        what = f"none of the variables of {component}" if component else "no variable of the problem"
+        raise ModelError(
+            f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the "
+            "same model, or write guess={'component': solution} with the component that it is of"
+        )
+    found: dict[str, Any] = {
+        n: _Stretched((t - t[0]) / (t[-1] - t[0]), np.asarray(source[n[len(before) :]]))
+        for n, t in times.items()
+    }
+    numbers = {before + n: x for n, x in getattr(source, "free", {}).items()}
+    return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
+
+
+def _times(source: "Result | Optimum", name: str) -> np.ndarray:
+    """The times of a variable, in an optimum those of its phase."""
+    return np.asarray(source.time if isinstance(source, Result) else source.time_of(name))
+
+
+def _ends(
+    dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint], chosen: Mapping[str, float]
+) -> dict[str, dict[str, float]]:
+    """Values given at the start and at the end, by symbol; `chosen`: free and held numbers."""
+    meaning = {
+        s.element_hash(): (p.time, e)
+        for p in points
+        if isinstance(p.time, str)
+        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
+        if e.is_symbolic()
+    }
+    found: dict[str, dict[str, float]] = {}
+    for constraint in constraints:
+        known = meaning.get(constraint.expression.element_hash())
+        value = _number(dae, constraint.lower, chosen)
+        if known is None or value is None or value != _number(dae, constraint.upper, chosen):
+            continue
+        which, leaf = known
+        target = derivative_symbol(dae, leaf.name())
+        if target is not None:
+            symbol, factor, offset = target
+            found.setdefault(symbol, {})[which] = (value - offset) / factor
+    return found
+
+
+def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None:
+    """The value of an expression of parameters, or None if others occur in it."""
+    if bound.is_constant():
+        return float(bound)
+    bound = dae.table.reduce(bound)
+    leaves = ca.symvar(bound)
+    if any(leaf.name() not in dae.table.values for leaf in leaves):
+        return None
+    numbers = {**dae.table.values, **chosen}
+    return float(
+        ca.evalf(ca.substitute(bound, ca.vertcat(*leaves), ca.DM([numbers[s.name()] for s in leaves])))
+    )
+
+
+def _from_ends(dae: Dae, symbol: str, ends: Mapping[str, Mapping[str, float]], span: float) -> Guess:
+    base, order = split_derivative(symbol)
+    own, below = ends.get(symbol, {}), ends.get(derivative_name(base, order - 1), {}) if order else {}
+    if order and len(below) == 2:  # the speed of a motion between two given positions
+        distance = below["final"] - below["initial"]
+        rest = own.get("initial") == 0.0 and own.get("final") == 0.0
+        return (lambda f: distance / span * trapezoid(f)[1]) if rest else _constant(distance / span)
+    if len(own) == 2:
+        a, b = own["initial"], own["final"]
+        speed = ends.get(derivative_name(base, order + 1), {})
+        rest = speed.get("initial") == 0.0 and speed.get("final") == 0.0
+        return lambda f: a + (b - a) * (trapezoid(f)[0] if rest else np.asarray(f))
+    return _constant(own.get("initial", dae.start.get(symbol, 0.0)))
+
+
+def trapezoid(fraction: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Way and speed of a motion from 0 to 1 in unit time with trapezoidal speed."""
+    f = np.asarray(fraction, dtype=float)
+    top = 1 / (1 - RAMP)
+    left = np.minimum(f, 1 - f)
+    half = np.where(left < RAMP, top * left**2 / (2 * RAMP), top * (left - RAMP / 2))
+    return np.where(f < 0.5, half, 1 - half), top * np.minimum(left / RAMP, 1.0)
+
+
+LEAST_ROOT = (
+    0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
+)
+
+
+def _algebraics(
+    built: "Built",
+    phase: Phase,
+    symbols: Mapping[str, Guess],
+    own: Mapping[str, Guess],
+    span: tuple[float, float],
+) -> dict[str, Guess]:
+    """Algebraics from their closed forms along the guess of the rest, where they have one, one after another."""
+    dae, free = built.read.dae, built.problem.free
+    old = ca.vertcat(*(dae.table.symbols[n] for n in built.numbers), built.problem.numbers)
+    values = ca.DM([*built.numbers.values(), *(n.guess for n in free)])
+    leaves = [s.symbol for s in (*phase.states, *phase.inputs, *phase.courses)]
+    signals = [symbols[s.name()] for s in leaves]
+    found: dict[str, Guess] = {}
+    for algebraic in phase.algebraics:
+        closed = built.closed.get(algebraic.name)
+        if algebraic.symbol.name() in own:
+            guess = own[algebraic.symbol.name()]
+        elif closed is None:
+            guess = _constant(dae.start.get(algebraic.name, 1.0))
+        else:
+            closed = ca.substitute(closed, old, values) if old.numel() else closed
+            function = ca.Function(
+                "closed", [built.problem.time, ca.vertcat(ca.SX(0, 1), *leaves)], [ca.densify(closed)]
+            )
+            guess = _Closed(function, tuple(signals), span, root=algebraic.min == 0.0)
+        found[algebraic.name] = guess
+        leaves.append(algebraic.symbol)
+        signals.append(guess)
+    return found
+
+
+class _Closed:
+    """A closed form evaluated along the guess; remembers its last answer, which later ones ask for again."""
+
+    def __init__(self, function: ca.Function, signals: tuple[Guess, ...], horizon, root: bool):
+        self.function, self.signals, self.horizon, self.root = function, signals, horizon, root
+        self.last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def __call__(self, fraction: np.ndarray) -> np.ndarray:
+        fraction = np.atleast_1d(fraction)
+        if self.last is not None and np.array_equal(self.last[0], fraction):
+            return self.last[1]
+        start, stop = self.horizon
+        columns = np.array([signal(fraction) for signal in self.signals]).reshape(-1, fraction.size)
+        found = np.array(self.function(start + (stop - start) * fraction[None, :], columns)).ravel()
+        found = np.where(np.isfinite(found), found, 1.0)
+        if self.root:
+            found = np.maximum(found, LEAST_ROOT * (np.max(found) or 1.0))
+        self.last = (fraction, found)
+        return found
+
+
+def typical_size(problem: ControlProblem, signal: Signal, bounds: tuple[float, float]) -> float:
+    """A typical magnitude: declared, else from limits, else from the guess."""
+    if np.isfinite(signal.nominal):
+        return signal.nominal
+    finite = [abs(b) for b in bounds if np.isfinite(b) and b != 0.0]
+    size = max(finite) if finite else float(np.max(np.abs(signal.guess(np.linspace(0.0, 1.0, 11)))))
+    algebraic = {a.name for phase in problem.phases for a in phase.algebraics}
+    least = 1e-6 if signal.name in algebraic else 1e-14  # what rounding leaves of a zero is no size
+    return size if least < size < 1e15 else 1.0
+
+
+def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:
+    """(symbol, factor, offset) with name = factor * symbol + offset, or None for a constant."""
+    base, order = split_derivative(name)
+    alias = dae.reduced.aliases.get(base)
+    if alias is None or alias.root is None:
+        return None
+    offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
+    return derivative_name(alias.root, alias.order + order), alias.factor, offset

@@ -1,0 +1,1 @@
+"""The language of optimisation problems, read and checked."""

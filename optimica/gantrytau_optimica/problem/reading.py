@@ -1,0 +1,351 @@
+"""Reads an optimisation problem: the model translated, objective and constraints in its symbols."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import Dae, ModelError, Parameter
+from gantrytau.compiler.translation import names, translate_flat
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.flatten import write_out
+from gantrytau.flattening.instantiation import Instance, Placed, instantiate
+from gantrytau.flattening.unit_checking import check_units
+from gantrytau.language.functions import Between
+from gantrytau.language.symbols import split_derivative, writing
+from gantrytau.simulation.signals import read_signals
+from gantrytau_optimica.problem.checking import (
+    check_constraints,
+    check_objective,
+    check_spelling,
+    check_times,
+)
+from gantrytau_optimica.problem.model_words import relation_text, told
+from gantrytau_optimica.problem.optimization import Free, Link, Optimization, Point, Target, initial, reading
+from gantrytau_optimica.problem.problem_units import check_problem_units
+from gantrytau_optimica.problem.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """lower <= expression <= upper for one scalar, in the model's symbols.
+
+    name: as it was written; place: where it was written; lower and upper of an equation are the same object.
+    """
+
+    expression: ca.SX
+    lower: ca.SX
+    upper: ca.SX
+    name: str
+    place: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadPhase:
+    """A phase in the model's symbols; `name` is its path, "" where there is only one."""
+
+    name: str
+    integrand: ca.SX
+    start_time: ca.SX  # a number or an expression of free numbers
+    final_time: ca.SX
+
+    def owns(self, name: str) -> bool:
+        """Whether a variable belongs to this phase."""
+        return not self.name or name.startswith(f"{self.name}.")
+
+
+@dataclass(frozen=True, eq=False)
+class ReadLink:
+    """The paths of two phases of which the second begins where the first ends, and what jumps, with its path."""
+
+    first: str
+    second: str
+    jump: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ReadProblem:
+    """A problem in the model's symbols. courses: inputs that the optimiser does not choose, by scalar name."""
+
+    name: str
+    dae: Dae
+    objective: ca.SX
+    phases: tuple[ReadPhase, ...]
+    constraints: tuple[Constraint, ...]
+    links: tuple[ReadLink, ...]
+    points: tuple[Point, ...]
+    targets: tuple[Target, ...]
+    courses: Mapping[str, ca.SX | tuple[Samples, int]]
+
+    def phase_of(self, expression: ca.SX, what: str) -> int:
+        """Number of the phase whose variables an expression holds. Raises ModelError if they are of several."""
+        if len(self.phases) == 1:
+            return 0
+        names = [split_derivative(leaf.name())[0] for leaf in ca.symvar(expression)]
+        found = {k for n in names for k, phase in enumerate(self.phases) if phase.owns(n)}
+        if len(found) != 1:
+            words = (
+                "belongs to no phase"
+                if not found
+                else "joins " + " and ".join(self.phases[k].name for k in sorted(found))
+            )
+            raise ModelError(f"{self.name}: {what} {words}, expected variables of one phase")
+        return found.pop()
+
+
+def read_problem(
+    problem: Optimization | type[Optimization], change: Callable[[FlatModel], FlatModel] | None = None
+) -> ReadProblem:
+    """Read a problem class or instance. Raises ModelError with the place of what is written wrongly.
+
+    change: applied to the model once it is written out, before it is translated.
+    """
+    if isinstance(problem, type) and issubclass(problem, Optimization):
+        problem = problem()
+    if not isinstance(problem, Optimization):
+        raise ModelError(
+            f"optimize: found {problem!r}, expected a subclass of Optimization or an instance of it"
+        )
+    instance = instantiate(problem)
+    root = instance.root
+    name = type(root).__name__
+    flat = write_out(instance) if change is None else change(write_out(instance))
+    known = set(flat.derivatives)
+    stages = _stages(name, instance)
+    for _, one in stages:
+        check_spelling(type(one))
+    with writing(instance.symbols), reading() as asked:
+        objective = sum(
+            (_scalar(_place(name, path, "objective"), one.objective) for path, one in stages), ca.SX(0)
+        )
+        found = [c for path, one in stages for c in _constraints(_place(name, path, "constraints"), one)]
+        flat, starts = _free_starts(flat, instance)
+        phases = tuple(_phase(name, path, one) for path, one in (stages[1:] or stages))
+        if stages[1:] and not _scalar(f"{name}.integrand", root.integrand).is_zero():
+            raise ModelError(
+                f"{name}.integrand: found an integrand beside phases, expected none; write it in the phases"
+            )
+    constraints = [*(c for c in found if isinstance(c, Constraint)), *starts]
+    mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
+    check_units(flat)
+    derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
+    times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
+    check_constraints(constraints, asked.targets)
+    check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
+    dae = translate_flat(flat, given=_given(stages, flat), find=mentioned)
+    links = [_link(name, instance, phases, c) for c in found if isinstance(c, Link)]
+    read = ReadProblem(
+        name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
+        _courses(name, stages, dae),
+    )  # fmt: skip
+    read = check_objective(read)
+    check_times(read)
+    return read
+
+
+def _link(name: str, instance: Instance, phases: Sequence[ReadPhase], link: Link) -> ReadLink:
+    """A link by paths. Raises ModelError for phases of another problem."""
+    paths = [instance.paths.get(id(one)) for one in (link.first, link.second)]
+    known = [phase.name for phase in phases]
+    for path, one in zip(paths, (link.first, link.second), strict=True):
+        if path is None or path not in known or path == "":
+            raise ModelError(
+                f"{name}: link: found {type(one).__name__}, which is no phase of this problem, expected two of "
+                f"{', '.join(known) if known != [''] else 'its phases (there are none)'}; write self.name of the phase"
+            )
+    first, second = (str(path) for path in paths)
+    return ReadLink(first, second, tuple(f"{second}.{n}" for n in link.jump))
+
+
+def _place(name: str, path: str, which: str) -> str:
+    return ".".join(part for part in (name, path, which) if part)
+
+
+def _stages(name: str, instance: Instance) -> list[tuple[str, Any]]:
+    """The problem itself and its phases, with their paths."""
+    inner = [(path, c) for path, c in instance.components if isinstance(c, Optimization) and path]
+    for path, _ in inner:
+        around = [p for p, _ in inner if path.startswith(f"{p}.")]
+        if around or "." in path:
+            raise ModelError(
+                f"{name}: the phase {path} lies inside of {around[0] if around else path.rsplit('.', 1)[0]}, expected "
+                "phases as components of the problem itself; move it there"
+            )
+    if inner:
+        lost = [
+            q.name
+            for q in instance.quantities
+            if _varies(q) and not any(q.name.startswith(f"{p}.") for p, _ in inner)
+        ]
+        if lost:
+            raise ModelError(
+                f"{name}: {lost[0]} belongs to no phase, expected variables in phases only; declare it in one"
+            )
+    return [("", instance.root), *inner]
+
+
+def _varies(placed: Placed) -> bool:
+    return not isinstance(placed.declaration, Parameter)
+
+
+def _phase(name: str, path: str, one: Any) -> ReadPhase:
+    integrand = _scalar(_place(name, path, "integrand"), one.integrand)
+    times = [_time(_place(name, path, which), getattr(one, which)) for which in ("start_time", "final_time")]
+    return ReadPhase(path, integrand, *times)
+
+
+def _given(stages: list[tuple[str, Any]], flat: FlatModel) -> tuple[str, ...]:
+    """What stays known in all phases; () if no phase says."""
+    if not any(names(one.given) for _, one in stages):
+        return ()
+    found = []
+    for path, one in stages:
+        own = [f"{path}.{n}" if path else n for n in names(one.given)]
+        if path and not own:  # its declared inputs, as where no `given` is
+            own = [n for n in flat.inputs if n.startswith(f"{path}.")]
+        found += own
+    return tuple(found)
+
+
+def _courses(name: str, stages: list[tuple[str, Any]], dae: Dae) -> dict[str, ca.SX | tuple[Samples, int]]:
+    """Known courses of inputs, as expressions of time or columns of samples."""
+    found: dict[str, ca.SX | tuple[Samples, int]] = {}
+    for path, one in stages:
+        if not isinstance(one.inputs, Mapping):
+            raise ModelError(
+                f"{_place(name, path, 'inputs')}: found {one.inputs!r}, expected {{name: course}}"
+            )
+        for given, value in one.inputs.items():
+            full = f"{path}.{given}" if path else given
+            elements = dae.expand(full)
+            for element in elements:
+                if element not in dae.inputs:
+                    raise ModelError(
+                        f"{name}: {element} is no input here, expected one of {', '.join(dae.inputs)}; take it out of "
+                        "`inputs`, or name it in `given`"
+                    )
+            if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
+                value = told(f"{name}, input {full}", partial(Samples, *value))
+            if isinstance(value, Samples):
+                if value.values.shape[1] != len(elements):
+                    raise ModelError(
+                        f"input {full}: found {value.values.shape[1]} columns, expected {len(elements)}"
+                    )
+                found.update((e, (value, k)) for k, e in enumerate(elements))
+            else:
+                found.update(
+                    {n: s for n, s in read_signals({full: value}, dae.expand).items() if isinstance(s, ca.SX)}
+                )
+    return found
+
+
+def _scalar(place: str, evaluate: Callable[[], Any]) -> ca.SX:
+    value = told(place, evaluate)
+    try:
+        value = ca.densify(ca.SX(value))
+    except NotImplementedError:
+        raise ModelError(
+            f"{place}: found {value!r}, expected a number or an expression; return it from the method"
+        ) from None
+    if value.numel() != 1:
+        raise ModelError(f"{place}: found shape {value.shape}, expected one number; sum it up or weigh it")
+    return value
+
+
+def _time(place: str, value: Any) -> ca.SX:
+    try:
+        time = ca.densify(ca.SX(value))
+    except NotImplementedError:
+        raise ModelError(f"{place}: found {value!r}, expected a number in s or Free(...)") from None
+    if time.numel() != 1:
+        raise ModelError(f"{place}: found shape {time.shape}, expected one number")
+    return time
+
+
+def _constraints(where: str, problem: Any) -> list[Constraint | Link]:
+    found: list[Constraint | Link] = []
+    statements = told(where, problem.constraints)
+    if not isinstance(statements, Iterable) or isinstance(statements, (ca.SX, str)):
+        raise ModelError(f"{where}: found {statements!r}, expected constraints; give each out with `yield`")
+    where = where.removesuffix(".constraints")
+    generator = iter(statements)
+    end, number = object(), 0
+    while True:
+        number += 1
+        place = f"{where}, constraint {number}"
+        statement = told(place, lambda: next(generator, end))
+        if statement is end:
+            return found
+        found += [statement] if isinstance(statement, Link) else _constraint(place, statement)
+
+
+def _constraint(place: str, statement: Any) -> list[Constraint]:
+    if isinstance(statement, Between):
+        expression = ca.densify(ca.SX(statement.expression))
+        limits = [_limit(place, bound, expression) for bound in (statement.lower, statement.upper)]
+        rows = zip(expression.elements(), *(limit.elements() for limit in limits), strict=True)
+        return [Constraint(e, low, high, f"{low} <= {e} <= {high}", place) for e, low, high in rows]
+    if isinstance(statement, (bool, ca.DM)) or (isinstance(statement, ca.SX) and statement.is_constant()):
+        raise ModelError(
+            f"{place}: found {statement}, expected a constraint; both sides were compared at once because there is "
+            "no symbol of the model among them: name variables of the model, join lists with casadi.vertcat(*list)"
+        )
+    if not isinstance(statement, ca.SX):
+        raise ModelError(
+            f"{place}: found {statement!r}, expected a constraint; write `a == b`, `a <= b` or between(a, x, b) "
+            "with symbols of the model, one by one or joined by casadi.vertcat(*list)"
+        )
+    found: list[Constraint] = []
+    for element in ca.densify(statement).elements():
+        equal = element.is_op(ca.OP_EQ)
+        if element.is_constant() and float(element) != 0.0:
+            continue
+        if not (equal or element.is_op(ca.OP_LE) or element.is_op(ca.OP_LT)):
+            raise ModelError(
+                f"{place}: found `{str(element)[:80]}`, expected `a == b`, `a <= b` or between(a, x, b)"
+            )
+        left, right = element.dep(0), element.dep(1)
+        text = relation_text(left, right, "==" if equal else "<=")
+        infinity = ca.SX(ca.inf)
+        if left.is_constant():
+            found.append(Constraint(right, left, left if equal else infinity, text, place))
+        else:
+            found.append(Constraint(left, right if equal else -infinity, right, text, place))
+    return found
+
+
+def _limit(place: str, bound: Any, expression: ca.SX) -> ca.SX:
+    bound = told(
+        place, lambda: ca.densify(ca.SX(ca.DM(bound) if isinstance(bound, (list, tuple)) else bound))
+    )
+    if bound.numel() == 1:
+        return ca.repmat(bound, *expression.shape)
+    if bound.shape != expression.shape:
+        raise ModelError(
+            f"{place}: a limit has shape {bound.shape}, the expression {expression.shape}; make them equal"
+        )
+    return bound
+
+
+def _free_starts(flat: FlatModel, instance: Instance) -> tuple[FlatModel, list[Constraint]]:
+    """Starts given as `Start(Free(...))` or `Fixed(Free(...))`: not fixed, within the limits of the Free."""
+    found: list[Constraint] = []
+    released: set[str] = set()
+    for placed in instance.quantities:
+        leaf = placed.attributes.get("start")
+        if leaf is None or not isinstance(leaf.value, Free) or leaf.value.name:
+            continue
+        released.add(placed.name)
+        limits = [ca.SX(x) for x in (leaf.value.min, leaf.value.max) if x is not None]
+        if not limits:
+            continue
+        low = -ca.SX.inf() if leaf.value.min is None else ca.SX(leaf.value.min)
+        high = ca.SX.inf() if leaf.value.max is None else ca.SX(leaf.value.max)
+        point = initial(placed.symbol)
+        name = f"limits of the start of {placed.name}"
+        found += [Constraint(e, low, high, name) for e in point.elements()]
+    variables = tuple(replace(v, fixed=False) if v.name in released else v for v in flat.variables)
+    return replace(flat, variables=variables), found

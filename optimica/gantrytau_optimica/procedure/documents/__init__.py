@@ -1,0 +1,1 @@
+"""A plan for who carries it out: files, page, pictures, robot program."""

@@ -1,0 +1,196 @@
+"""The page of a plan: what a technician needs, the verdict first."""
+
+from base64 import b64encode
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gantrytau_optimica.procedure.documents.rapid import OPERATOR
+from gantrytau_optimica.procedure.fleet import WIDER
+from gantrytau_optimica.procedure.pose_choice import CRITERION
+from gantrytau_optimica.procedure.verdict import um
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
+
+USUAL = 20  # robots that are drawn
+DOUBT = 0.05  # of 95 % confidence
+STYLE = """
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
+table { border-collapse: collapse; font-size: .9rem; margin: .5rem 0 1.5rem; }
+th, td { text-align: right; padding: .15rem .8rem .15rem 0; border-bottom: 1px solid #8886; }
+th:first-child, td:first-child { text-align: left; white-space: nowrap; }
+.verdict { border-left: .5rem solid #3a3; padding: .2rem 1rem; background: #3a32; }
+.bad { border-color: #c33; background: #c332; }
+.passed { opacity: .6; } img { max-width: 100%; background: white; }
+"""
+
+
+def command(plan: "CalibrationPlan", folder: str | Path = ".") -> str:
+    """What is given on the command line once the poses of a plan in a folder are measured."""
+    prior = plan.settings.get("prior") or {}
+    words = " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
+    return f"gantrytau calibrate {Path(folder) / 'measurements.csv'}{words}"
+
+
+def drawn(plan: "CalibrationPlan") -> str:
+    """What so many simulated robots say of the safety of all others."""
+    robots = int(plan.settings["robots"])
+    share = 1 - DOUBT ** (1 / robots)
+    words = (
+        f"none of {robots} robots drawn with the tape error, and none of as many with {WIDER:g} times these errors, breaks "
+        f"a limit on the way; {robots} alone would say with 95 % confidence that no more than {share:.0%} of all do; a "
+        "robot farther from its nominal values may"
+    )
+    return words if robots >= USUAL else f"{words}; {USUAL} or more robots say more"
+
+
+def html_page(
+    plan: "CalibrationPlan",
+    picture: Path | None,
+    program: str,
+    *,
+    folder: str | Path = ".",
+    trigger: str = OPERATOR,
+) -> str:
+    """The page, complete in itself; picture: a PNG file that goes into it; folder: where it is to stand."""
+    title = f"Calibration plan of {plan.robot_name}"
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        _verdict(plan),
+        "<h2>What to do</h2>",
+        _steps(plan, program, folder, trigger),
+        "<h2>The cell</h2>",
+        _image(picture),
+        "<h2>In numbers</h2>",
+        _facts(plan),
+        "<h2>Simulated calibrations</h2>",
+        _trials(plan),
+        "<h2>Poses</h2>",
+        _poses(plan),
+    ]
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style>"
+    )
+    body = "\n".join(parts)
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
+
+
+def _verdict(plan: "CalibrationPlan") -> str:
+    said = "".join(f"<p>{escape(reason)}</p>" for reason in plan.verdict.reasons)
+    word = "Good: go ahead" if plan.verdict.good else "Not good enough yet"
+    return f'<div class="verdict{"" if plan.verdict.good else " bad"}"><h2>{word}</h2>{said}</div>'
+
+
+def _steps(plan: "CalibrationPlan", program: str, folder: str | Path, trigger: str) -> str:
+    count, header = int(plan.measured.sum()), ",".join(f"q{k + 1}" for k in range(plan.q.shape[1]))
+    turned = ",qw,qx,qy,qz" if plan.kind != "three links" else ""
+    place = ", ".join(f"{x:.3g}" for x in np.asarray(plan.settings["device_r"], dtype=float))
+    home = ", ".join(_joint(plan, k, x) for k, x in enumerate(plan.q[0]))
+    waits = (
+        "It stops at {} poses, says which, and waits until Done is pressed on the pendant."
+        if trigger == OPERATOR
+        else "It stops at {} poses, says which, and goes on by itself after a time."
+    ).format(count)
+    steps = [
+        f"Put the {plan.settings['device']} at ({place}) m in the axes of the robot base. A few centimetres do not "
+        "matter, the "
+        "measurements may stay in its own axes.",
+        f"Jog the robot to home by hand: {home}. The way there is yours; all others were checked.",
+        f"Load {program} and run it slowly, with a hand on the stop. {waits} Do not change the order or the kind of move: "
+        f"only these ways were checked. Safe means: {drawn(plan)}.",
+        f"Save measurements-template.csv as measurements.csv and fill in x, y, z{turned} as measured, in m"
+        f"{_target(plan)}; q stands there as commanded (m and rad). Leave empty what was not seen. A file of your own needs "
+        f"the header {header},x,y,z{turned}.",
+        "Run: " + command(plan, folder),
+    ]
+    return "<ol>" + "".join(f"<li>{escape(step)}</li>" for step in steps) + "</ol>"
+
+
+def _target(plan: "CalibrationPlan") -> str:
+    """Which point x, y, z is: devices that find orientations know where the tool is, a tracker only its target."""
+    if plan.settings["device"] == "LaserTracker":
+        return ", of the target (the reflector), which is the tool of the robot that is found"
+    return ", of the tool frame, which the device finds from its target"
+
+
+def _joint(plan: "CalibrationPlan", k: int, value: float) -> str:
+    name = plan.joints[k]
+    return f"{name} = {value * 1e3:.1f} mm" if k < plan.carts else f"{name} = {np.degrees(value):.2f} deg"
+
+
+def _image(picture: Path | None) -> str:
+    if picture is None:
+        return "<p>No picture: the plan was loaded without its robot.</p>"
+    data = b64encode(picture.read_bytes()).decode()
+    return f'<img alt="workspace, obstacles, poses and ways from three sides" src="data:image/png;base64,{data}">'
+
+
+def _facts(plan: "CalibrationPlan") -> str:
+    asked, found = plan.settings, plan.prediction
+    rows = [
+        ["robot", f"{plan.robot_name}, {plan.kind}"],
+        ["wanted error of the tool", um(asked["wanted"])],
+        ["tape measure", f"{um(asked['tape'])} standard deviation of joints and lengths"],
+        ["workspace", str(plan.workspace)],
+        ["noise of the device", f"{um(found.noise)} per axis" + _angle(found.noise_angle)],
+        [
+            "expected error by noise",
+            f"{um(found.error)} in the mean, {um(float(found.position.max()))} at the worst place",
+        ],
+        ["condition number", f"{found.condition:.4g}"],
+        ["observability index", f"{found.observability:.4g}"],
+        ["criterion", CRITERION],
+        ["worst simulated robot", f"{um(plan.verdict.error)} after calibration"],
+        ["checked", f"the nominal robot, and {drawn(plan)}"],
+        ["not reached and replaced", _lost(plan)],
+    ]
+    body = "".join(
+        f"<tr><td>{escape(a)}</td><td style='text-align:left'>{escape(b)}</td></tr>" for a, b in rows
+    )
+    return f"<table>{body}</table>"
+
+
+def _lost(plan: "CalibrationPlan") -> str:
+    return "; ".join("(" + ", ".join(f"{x:.3f}" for x in r) + ") m" for r in plan.lost) or "none"
+
+
+def _angle(angle: float) -> str:
+    return f", {np.degrees(angle) * 1e3:.3g} mdeg" if angle else ""
+
+
+def _trials(plan: "CalibrationPlan") -> str:
+    trials = plan.trials
+    head = "<tr><th>robot</th><th>before</th><th>after, mean</th><th>after, largest</th><th>not seen</th><th></th></tr>"
+    rows = ""
+    for k in range(len(trials)):
+        cells = [
+            str(k + 1),
+            um(trials.before[k]),
+            um(trials.after[k]),
+            um(trials.largest[k]),
+            f"{trials.unseen[k]:.0f}",
+        ]
+        rows += "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in (*cells, trials.notes[k])) + "</tr>"
+    return (
+        "<p>Errors of the tool over the workspace, robots laid over each other best. With 25 readings of each pose averaged "
+        f"the worst robot has {um(trials.averaged)}.</p><table>{head}{rows}</table>"
+    )
+
+
+def _poses(plan: "CalibrationPlan") -> str:
+    names = [f"{name} [{'mm' if k < plan.carts else 'deg'}]" for k, name in enumerate(plan.joints)]
+    heads = ["number", *names, "x [m]", "y [m]", "z [m]", ""]
+    rows = "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in heads) + "</tr>"
+    rows_of_plan = zip(plan.numbers, plan.q, plan.r, plan.measured, strict=True)
+    for k, (number, q, r, measured) in enumerate(rows_of_plan):
+        joints = [f"{x * 1e3:.4f}" if i < plan.carts else f"{np.degrees(x):.5f}" for i, x in enumerate(q)]
+        word = "measure" if measured else "home" if k in (0, len(plan.q) - 1) else "pass"
+        cells = [str(number), *joints, *(f"{x:.3f}" for x in r), word]
+        style = "" if measured else ' class="passed"'
+        rows += f"<tr{style}>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
+    return f"<table>{rows}</table>"

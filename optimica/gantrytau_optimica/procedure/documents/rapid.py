@@ -1,0 +1,183 @@
+"""A plan as a robot program in RAPID (ABB): joint targets, moves in joint coordinates, a trigger for the device.
+
+At each pose to be measured it waits for who measures (TPReadFK), or for a time after a word or a pulse.
+
+Lengths in mm and angles in degrees. Numbers of RAPID are single precision: 0.1 um of a metre. Lines have 80 ASCII
+characters at most, names 32.
+"""
+
+import re
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau_optimica.procedure.pose_choice import CRITERION
+from gantrytau_optimica.procedure.verdict import um
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
+
+WIDTH = 80
+AXES = 6  # of robax and of extax
+OPERATOR, WORDS = "operator", "TPWrite"  # triggers that are no digital outputs
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+RESERVED = {
+    "module", "endmodule", "proc", "endproc", "const", "pers", "var", "local", "task", "func", "endfunc", "trap",
+    "endtrap", "if", "then", "else", "endif", "for", "from", "to", "step", "do", "endfor", "while", "endwhile", "test",
+    "case", "default", "return", "true", "false", "not", "and", "or", "xor", "div", "mod", "with", "goto", "raise",
+    "retry", "error", "undo", "exit",
+}  # fmt: skip
+
+
+def rapid_program(
+    plan: "CalibrationPlan",
+    name: str,
+    *,
+    speed: float,
+    settle: float,
+    measure: float,
+    carts: Literal["robax", "extax"],
+    trigger: str,
+    tool: str,
+) -> str:
+    """See `CalibrationPlan.program`."""
+    check_program(
+        name=name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
+    )
+    lines = [f"MODULE {name}", *_comments(plan, carts, trigger)]
+    lines += [
+        f"  CONST speeddata speedCalibration:=[{_number(speed * 1e3, 3)},20,{_number(speed * 1e3, 3)},20];"
+    ]
+    lines += ["  VAR num keyCalibration;"] if trigger == OPERATOR else []
+    labels = [_label(plan, k) for k in range(len(plan.q))]
+    for label in dict.fromkeys(labels):
+        lines += _target(label, plan.q[labels.index(label)], plan.carts, carts)
+    lines += ["", f"  PROC {_procedure(name)}()"]
+    count, done = int(plan.measured.sum()), 0
+    for label, measured in zip(labels, plan.measured, strict=True):
+        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {tool};")
+        if measured:
+            done += 1
+            lines += _trigger(trigger, f"{label}, {done} of {count}", settle, measure)
+    lines += ["  ENDPROC", "ENDMODULE", ""]
+    return "\n".join(lines)
+
+
+def check_program(
+    *,
+    name: str = "Calibration",
+    speed: float = 0.1,
+    settle: float = 1.0,
+    measure: float = 2.0,
+    carts: str = "robax",
+    trigger: str = OPERATOR,
+    tool: str = "tool0",
+) -> None:
+    """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
+    if carts not in ("robax", "extax"):
+        raise ModelError(
+            f"program: found carts={carts!r}, expected 'robax' or 'extax', the axes of a joint target that move"
+        )
+    names = [
+        ("name", name),
+        ("tool", tool),
+        *([] if trigger in (OPERATOR, WORDS) else [("trigger", trigger)]),
+    ]
+    for what, word in names:
+        _check_name(what, word)
+    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
+        if not (np.isfinite(value) and value >= least):
+            unit = "m/s above 0" if what == "speed" else "s, not negative"
+            raise ModelError(f"program: found {what}={value!r}, expected a number in {unit}")
+
+
+def _procedure(name: str) -> str:
+    return f"Run{name}"[:32]
+
+
+def _check_name(what: str, word: str) -> None:
+    if not NAME.fullmatch(word) or word.lower() in RESERVED:
+        raise ModelError(
+            f"program: found {what}={word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
+            "characters at most, no reserved word"
+        )
+
+
+def _label(plan: "CalibrationPlan", row: int) -> str:
+    """Name of the target of a row of the program, by its number in poses.csv of the whole plan."""
+    number = int(plan.numbers[row])
+    if number == 1 or row == len(plan.q) - 1:
+        return "pHome"
+    return f"p{number:03d}" if plan.measured[row] else f"via{number:03d}"
+
+
+def _target(label: str, q: np.ndarray, count: int, carts: str) -> list[str]:
+    values = [_number(x * 1e3, 4) for x in q[:count]] + [_number(np.degrees(x), 5) for x in q[count:]]
+    unused = ["0"] * AXES if carts == "extax" else ["9E9"] * AXES
+    moving = values + ["0" if carts == "robax" else "9E9"] * (AXES - len(values))
+    robax, extax = (moving, unused) if carts == "robax" else (unused, moving)
+    return [f"  CONST jointtarget {label}:=", f"    [[{','.join(robax)}],", f"     [{','.join(extax)}]];"]
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _trigger(trigger: str, words: str, settle: float, measure: float) -> list[str]:
+    rest = f"    WaitTime \\InPos, {_number(settle, 3)};"
+    if trigger == OPERATOR:
+        return [
+            rest,
+            f'    TPReadFK keyCalibration, "Measure {words}", stEmpty, stEmpty,',
+            '      stEmpty, stEmpty, "Done";',
+        ]
+    pulse = [] if trigger == WORDS else [f"    PulseDO \\PLength:=0.2, {trigger};"]
+    return [
+        rest,
+        f'    TPWrite "Measure {words}";',
+        *pulse,
+        f"    WaitTime {_number(measure, 3)};",
+    ]
+
+
+def _comments(plan: "CalibrationPlan", carts: str, trigger: str) -> list[str]:
+    unused = "unused robax 0, extax 9E9" if carts == "robax" else "carts are external axes, unused extax 9E9"
+    said = [
+        f"Calibration of {plan.robot_name}: {int(plan.measured.sum())} poses to measure, "
+        f"{int((~plan.measured).sum())} only passed (home at begin and end).",
+        f"Joint targets: carts in mm, turntables in degrees; {unused}. Moves are linear in these axes and were checked "
+        "on all of their way; do not change order, targets or kind of move. p041 is row 41 of poses.csv of the whole plan.",
+        "The first move goes home from wherever the robot stands; that way was not checked: jog the robot to pHome by hand "
+        "before the start, and after each stop begin there again.",
+        _waiting(trigger),
+        f"Expected error of the tool by noise after calibration with all {len(plan.prediction.rows)} poses of the plan "
+        f"{um(plan.prediction.error)}; of the worst simulated robot {um(plan.verdict.error)}, wanted "
+        f"{um(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
+        f"Poses: {CRITERION}.",
+        f"Nominal parameters in m ({plan.kind}):",
+        *_parameters(plan),
+    ]
+    return [line for words in said for line in _wrapped(words)] + [""]
+
+
+def _waiting(trigger: str) -> str:
+    if trigger == OPERATOR:
+        return "At each pose to measure it waits until Done is pressed on the pendant."
+    pulse = "" if trigger == WORDS else f", pulses {trigger}"
+    return f"At each pose to measure it says so on the pendant{pulse}, and goes on by itself after a time."
+
+
+def _parameters(plan: "CalibrationPlan") -> Sequence[str]:
+    return [
+        f"{name} = " + ", ".join(_number(float(x), 7) for x in np.atleast_1d(value))
+        for name, value in plan.parameters.items()
+    ]
+
+
+def _wrapped(words: str) -> list[str]:
+    plain = words.encode("ascii", "replace").decode()
+    return textwrap.wrap(plain, WIDTH, initial_indent="  ! ", subsequent_indent="  !   ")

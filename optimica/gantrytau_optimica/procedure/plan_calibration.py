@@ -1,0 +1,278 @@
+"""`plan_calibration`: the automated procedure of Dressler (2012), section 5.6, from a tape measure to a verdict."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau import Model, ModelError
+from gantrytau.kinematics import Limits
+from gantrytau_optimica.calibration.data.data_checks import FEWEST
+from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, Cell
+from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_candidates
+from gantrytau_optimica.procedure.documents.files import check_folder
+from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
+from gantrytau_optimica.procedure.pose_choice import Choice, choose, judge
+from gantrytau_optimica.procedure.stages import Progress, Stages, digest
+from gantrytau_optimica.procedure.trials import (
+    AVERAGED,
+    Trial,
+    Trials,
+    check_device,
+    collected,
+    prior_of,
+    simulated,
+    with_obstacles,
+)
+from gantrytau_optimica.procedure.verdict import Verdict, decide
+from gantrytau_optimica.procedure.ways.known_ways import KnownWays
+from gantrytau_optimica.procedure.ways.ordering import Order, ordered
+from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
+
+LARGEST_TAPE = 0.1  # m; what is larger was written in mm
+LARGEST_WANTED = 0.1
+
+
+def plan_calibration(
+    robot: Model,
+    limits: Limits,
+    device: Device,
+    *,
+    poses: int = 40,
+    wanted: float = 200e-6,
+    tape: float = 0.005,
+    robots: int = 20,
+    seed: int = 0,
+    spacing: float | None = None,
+    margin: float = 0.002,
+    home: Any = None,
+    folder: str | Path | None = None,
+    progress: Progress | None = None,
+) -> CalibrationPlan:
+    """Plan the calibration of a robot that is known to the tape measure only.
+
+        box = Box((0.2, 2.0, -2.5), (0.5, 2.6, -1.2))
+        limits = Limits(strokes=(0.0, 2.0), obstacles=box, link_radius=0.02, clearance=0.02)
+        tracker = LaserTracker((4.0, 3.0, 0.0))
+        plan = plan_calibration(GantryTau(prototypes.L1), limits, tracker, wanted=50e-6, folder="cell")
+        print(plan)
+        plan.write("cell")
+
+    robot: with the parameters that were measured by tape, any Gantry-Tau; limits: strokes, ball joints, obstacles, links
+    and plate as bodies, margins; device: where it stands and what it sees. poses: how many to measure; wanted: error of
+    the tool, m, that calibration must reach in the mean over the workspace; tape: standard deviation of joints and
+    lengths, m; robots: how many with such errors are calibrated in simulation; they must be safe, and as many with twice
+    these errors; seed: of all that is drawn; spacing: of the grid of the workspace, m, None refines it until it has
+    settled; margin: m (and rad) by which poses keep more than the limits ask, so that there are ways between them; home: q
+    (n,) where the program begins and ends, None for the start of the model. folder: keeps finished stages there, so that
+    the same call goes on after an interruption; stages whose questions changed are done anew. progress: called with
+    (stage, done, of). Raises ModelError for what does not fit, where nothing is visible or safe, or home is in a collision.
+    """
+    _check_numbers(wanted=wanted, tape=tape, margin=margin, robots=robots)
+    _check_kinds(limits, device)
+    path = None if folder is None else Path(folder)
+    if path is not None:
+        check_folder("plan_calibration.folder", path)
+        path.mkdir(exist_ok=True)
+    fleet = build_fleet(robot, limits, tape=tape, robots=robots, seed=seed)
+    _check_poses(fleet, poses)
+    device = with_obstacles(device, limits.obstacles)
+    check_device(fleet, device)
+    start = _home(fleet, home)
+    check_home(fleet, start)
+    asked = dict(
+        poses=poses,
+        wanted=wanted,
+        tape=tape,
+        robots=robots,
+        seed=seed,
+        margin=margin,
+        spacing=spacing,
+        home=start,
+    )
+    return _Procedure(fleet, limits, device, asked, Stages(path, progress)).plan()
+
+
+class _Procedure:
+    """The stages, each with what it depends on."""
+
+    def __init__(self, fleet: Fleet, limits: Limits, device: Device, asked: dict[str, Any], stages: Stages):
+        self.fleet, self.limits, self.device, self.asked, self.stages = fleet, limits, device, asked, stages
+        strict = _stricter(limits, asked["margin"])
+        self.strict = fleet.with_limits(strict)
+        place = fleet.nominal.linked.home
+        geometry = [arm.values for arm in fleet.arms]
+        self.robot_key = digest(fleet.kind, geometry, place.q, place.r, place.R, fleet.nominal.strokes)
+
+    def plan(self) -> CalibrationPlan:
+        places = self._workspace()
+        candidates, of_candidates = self._candidates(places)
+        choice, order, of_order = self._ways(candidates, of_candidates)
+        trials, of_trials = self._trials(candidates, order, of_order)
+        verdict = self._verdict(places, candidates, choice, trials, of_trials)
+        r, R = self.fleet.nominal.pose(order.q)
+        kinematics = self.fleet.nominal.kinematics
+        hidden = np.setdiff1d(candidates.safe, candidates.usable)
+        return CalibrationPlan(
+            robot_name=kinematics.dae.name,
+            kind=self.fleet.kind,
+            joints=tuple(kinematics.joints),
+            carts=len(self.fleet.nominal.linked.geometry.offset),
+            parameters={n: arm.values[n] for arm in self.fleet.arms for n in arm.free},
+            settings=self.asked
+            | {
+                "prior": prior_of(self.fleet, self.asked["tape"]),
+                "device": type(self.device).__name__,
+                "device_r": self.device.r,
+            },
+            workspace=places,
+            q=order.q,
+            r=r,
+            R=R,
+            measured=order.measured,
+            prediction=choice,
+            trials=trials,
+            verdict=verdict,
+            lost=candidates.r[order.lost],
+            unseen=candidates.r[hidden],
+            cell=Cell(self.fleet, self.limits, self.device, candidates),
+        )
+
+    def _workspace(self) -> SettledWorkspace:
+        spacing = self.asked["spacing"]
+        key = digest(self.robot_key, self.limits, self.device, spacing)
+        self.workspace_key = key
+        return self.stages.of(
+            "workspace",
+            SettledWorkspace,
+            key,
+            lambda: settled_workspace(self.fleet, self.limits, self.device, spacing),
+        )
+
+    def _candidates(self, places: SettledWorkspace) -> tuple[Candidates, str]:
+        asked = [self.asked[name] for name in ("tape", "robots", "seed", "margin")]
+        key = digest(self.workspace_key, asked)
+        return self.stages.of(
+            "candidates",
+            Candidates,
+            key,
+            lambda: find_candidates(self.strict, places, self.device, self.asked["seed"]),
+        ), key
+
+    def _ways(self, candidates: Candidates, key: str) -> tuple[Choice, Order, str]:
+        n, tape, seed, home = (self.asked[name] for name in ("poses", "tape", "seed", "home"))
+        known, key = KnownWays(self.stages, key), digest(key, n)
+        at = (self.fleet, candidates, self.device)
+        choice = self.stages.of(
+            "choice", Choice, key, lambda: choose(*at, candidates.usable, n, tape=tape, seed=seed)
+        )
+        key = digest(key, home)
+        order = self.stages.of(
+            "ways",
+            Order,
+            key,
+            lambda: ordered(*at, choice, home=home, poses=n, tape=tape, seed=seed, check=known),
+        )
+        if not np.array_equal(np.sort(order.rows), choice.rows):
+            choice = judge(*at, np.sort(order.rows), tape=tape)
+        return choice, order, key
+
+    def _trials(self, candidates: Candidates, order: Order, key: str) -> tuple[Trials, str]:
+        q, seed = order.q[order.measured], self.asked["seed"]
+        count, found = self.asked["robots"], []
+        key = digest(key, q)
+
+        def trial(number: int, readings: int) -> Trial:
+            return simulated(
+                self.fleet,
+                candidates,
+                self.device,
+                q,
+                number,
+                seed=seed,
+                tape=self.asked["tape"],
+                readings=readings,
+            )
+
+        self.stages.progress("trials", 0, count)
+        for number in range(count):
+            found.append(
+                self.stages.of(
+                    f"trial_{number:03d}",
+                    Trial,
+                    digest(key, number),
+                    lambda k=number: trial(k, 1),
+                    tell=False,
+                )
+            )
+            self.stages.progress("trials", number + 1, count)
+        worst = int(np.argmax([each.after if np.isfinite(each.after) else -1.0 for each in found]))
+        averaged = self.stages.of(
+            "averaged", Trial, digest(key, worst, "averaged"), lambda: trial(worst, AVERAGED), tell=False
+        )
+        return collected(found, averaged), key
+
+    def _verdict(
+        self, places: SettledWorkspace, candidates: Candidates, choice: Choice, trials: Trials, key: str
+    ) -> Verdict:
+        asked = {name: self.asked[name] for name in ("poses", "wanted", "tape", "seed")}
+        at = (self.fleet, self.device, places, candidates, choice, trials)
+        return self.stages.of("verdict", Verdict, digest(key, asked), lambda: decide(*at, **asked))
+
+
+def _stricter(limits: Limits, margin: float) -> Limits:
+    return replace(limits, clearance=limits.clearance + margin, angle_margin=limits.angle_margin + margin)
+
+
+def _home(fleet: Fleet, home: Any) -> np.ndarray:
+    joints = fleet.nominal.kinematics.joints
+    found = np.asarray(fleet.nominal.linked.home.q if home is None else home, dtype=float)
+    if found.shape != (len(joints),) or not np.isfinite(found).all():
+        raise ModelError(
+            f"plan_calibration.home: found {home!r}, expected {len(joints)} finite numbers in m and rad, for "
+            f"{', '.join(joints)}"
+        )
+    return commanded(found[None])[0]
+
+
+def _check_numbers(*, wanted: Any, tape: Any, margin: Any, robots: Any) -> None:
+    for name, value, most in (("wanted", wanted, LARGEST_WANTED), ("tape", tape, LARGEST_TAPE)):
+        if not (isinstance(value, (int, float)) and 0 < value <= most):
+            raise ModelError(
+                f"plan_calibration.{name}: found {value!r}, expected a length in m above 0 and up to {most:g}; write 5 "
+                "mm as 0.005, 200 um as 200e-6"
+            )
+    if not (isinstance(margin, (int, float)) and 0 < margin < LARGEST_TAPE):
+        raise ModelError(
+            f"plan_calibration.margin: found {margin!r}, expected a length in m above 0 and below {LARGEST_TAPE:g}; "
+            "without one no way can be shown to be clear"
+        )
+    if not (isinstance(robots, int) and robots >= 1):
+        raise ModelError(
+            f"plan_calibration.robots: found {robots!r}, expected a whole number from 1; 20 are usual"
+        )
+
+
+def _check_kinds(limits: Any, device: Any) -> None:
+    if not isinstance(limits, Limits):
+        raise ModelError(
+            f"plan_calibration.limits: found {type(limits).__name__}, expected gantrytau.kinematics.Limits(strokes=..., ...)"
+        )
+    if not isinstance(device, Device):
+        raise ModelError(
+            f"plan_calibration.device: found {type(device).__name__}, expected a device such as LaserTracker((4.0, 3.0, "
+            "0.0))"
+        )
+
+
+def _check_poses(fleet: Fleet, poses: Any) -> None:
+    """As many as calibrate() takes to fit all poses."""
+    unknowns = {"three links": 7, "six links": 10, "turntables": max(arm.count for arm in fleet.arms) // 3}
+    needed = max(FEWEST, unknowns[fleet.kind] + 1)
+    if not (isinstance(poses, int) and poses >= needed):
+        raise ModelError(
+            f"plan_calibration.poses: found {poses!r}, expected a whole number from {needed} for a robot with "
+            f"{fleet.kind}; 40 are usual"
+        )

@@ -1,0 +1,1 @@
+"""Answers that hold: better meshes, and several first guesses."""

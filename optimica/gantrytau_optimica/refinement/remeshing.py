@@ -1,0 +1,144 @@
+"""A better mesh from a solution: borders at the switches, which the optimiser may move, and finer where it errs."""
+
+import casadi as ca
+import numpy as np
+
+from gantrytau_optimica.answers.playback.playback import limits_of, range_of
+from gantrytau_optimica.answers.playback.replay import PLACES, Replayed
+from gantrytau_optimica.answers.playback.switching import sides, switches
+from gantrytau_optimica.control.limits import signal_limits
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.trajectory import Trajectory
+
+ORDER = 5  # of the error that an element adds, with three points
+MOST_PARTS = 4
+NEAR = 0.02  # of an element: borders that are closer to a switch give way to it
+ROUGH = (
+    1.0  # times the root of the accuracy: jumps of ramps, by the range of an input, that are smoothed away
+)
+PROVEN = 800  # elements, from which on a mesh is not divided only to prove itself
+LEAST = 5e-4  # of the horizon: shorter elements hardly move the objective, and the solver crawls
+SAME = 1e-4  # of the horizon: switches that are closer count as one
+
+
+def better_mesh(
+    played: Replayed, accuracy: float, movable: bool, roughness: bool, structure: bool = True
+) -> Mesh:
+    """The next mesh for `accuracy`, relative to sizes of states and ranges of limits.
+
+    movable: whether borders at jumps of inputs may move; roughness: whether to divide where ramps fit a curved input
+    badly; structure: whether switches become borders.
+    """
+    trajectory = played.trajectory
+    borders = trajectory.mesh.borders
+    changes = switches(trajectory) if structure else []
+    knots = _apart(np.array([s.share for s in changes]))
+    parts = _parts(played, accuracy)
+    if roughness:
+        rough = _rough(trajectory) > ROUGH * np.sqrt(accuracy)
+        joined = any("between" in (s.before, s.after) for s in changes)
+        parts = np.maximum(parts, np.where(rough | (joined & _at_junctions(trajectory)), 2, 1))
+    every = _with_knots(borders, parts, knots)
+    same = every.size == borders.size and np.allclose(every, borders, atol=1e-9)
+    if same and trajectory.mesh.elements < PROVEN:  # only a finer mesh shows that this one was fine enough
+        every = _with_knots(borders, np.where(_open(trajectory), 2, 1), knots)
+    jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
+    jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
+    return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
+
+
+def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Borders with elements divided, and with knots, to which borders close by give way."""
+    kept = _divided(borders, parts)[1:-1]
+    for knot in knots:
+        element = int(np.clip(np.searchsorted(borders, knot) - 1, 0, borders.size - 2))
+        near = max(LEAST, NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2]))
+        kept = kept[np.abs(kept - knot) > near]
+    return np.unique(np.concatenate([[0.0, 1.0], kept, knots]))
+
+
+def _at_junctions(trajectory: Trajectory) -> np.ndarray:
+    """Elements at a limit beside one that is not, or at an end of the horizon: the input may leave it inside, (n,)."""
+    free = _open(trajectory)
+    if not np.any(free) and trajectory.mesh.elements > 2:
+        return np.zeros(free.size, bool)
+    beside = np.append(free[1:], True) | np.insert(free[:-1], 0, True)
+    return ~free & beside & (trajectory.mesh.widths > 4 * LEAST)
+
+
+def _open(trajectory: Trajectory) -> np.ndarray:
+    """Elements in which an input is nowhere at a limit: there it may be curved, (n,)."""
+    phase = trajectory.phase
+    limits = signal_limits(phase, trajectory.problem.name)
+    found = np.full(trajectory.mesh.elements, not phase.inputs)
+    first = len(phase.states) + len(phase.algebraics)
+    for number, signal in enumerate(phase.inputs, first):
+        ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
+        found |= np.any(sides(ends, *limits[signal.name]) == 0, axis=1)
+    return found
+
+
+def _apart(knots: np.ndarray) -> np.ndarray:
+    """Switches inside of the horizon, those that are too close to each other as one."""
+    knots = np.sort(knots[(knots > SAME) & (knots < 1 - SAME)])
+    if knots.size == 0:
+        return knots
+    groups = np.split(knots, np.flatnonzero(np.diff(knots) > SAME) + 1)
+    return np.array([group.mean() for group in groups])
+
+
+def _parts(played: Replayed, accuracy: float) -> np.ndarray:
+    """Into how many parts every element is divided, by its own error and by limits passed between its points."""
+    trajectory = played.trajectory
+    n = trajectory.mesh.elements
+    sizes = np.array([s.nominal for s in trajectory.phase.states])
+    times = trajectory.times(trajectory.mesh.borders)
+    owner = np.clip(np.searchsorted(times, played.pieces.mean(axis=1)) - 1, 0, n - 1)
+    local = np.nan_to_num(np.max(np.abs(played.local) / sizes, axis=1, initial=0.0), nan=1.0)
+    error = np.zeros(n)
+    np.maximum.at(error, owner, local)
+    wanted = accuracy / np.sqrt(n)
+    passed = np.zeros(n)
+    np.maximum.at(passed, owner, _passed(played))
+    ratio = np.maximum(error / wanted, passed / accuracy)
+    parts = np.ceil(np.maximum(ratio, 1.0) ** (1 / (ORDER + 1)))
+    parts = np.clip(np.where(ratio > 1, np.maximum(parts, 2), 1), 1, MOST_PARTS).astype(int)
+    # what errs may move into a neighbour, once it costs nothing there
+    beside = np.maximum(np.append(parts[1:], 1), np.insert(parts[:-1], 0, 1))
+    return np.maximum(parts, np.minimum(beside, 2))
+
+
+def _passed(played: Replayed) -> np.ndarray:
+    """By how much limits are passed in every piece, relative to their range."""
+    limits = limits_of(played.trajectory.phase)
+    if not limits:
+        return np.zeros(len(played.pieces))
+    rows = played.values(ca.vertcat(*(limit.expression for limit in limits)))
+    worst = np.zeros(rows.shape[1])
+    for limit, row in zip(limits, rows, strict=True):
+        amount = np.maximum(limit.lower - row, row - limit.upper) / range_of(limit, row)
+        worst = np.maximum(worst, np.nan_to_num(amount, nan=0.0))
+    return worst.reshape(-1, PLACES.size).max(axis=1)
+
+
+def _rough(trajectory: Trajectory) -> np.ndarray:
+    """How much inputs jump at the borders of an element where neither side is at a limit or a switch, by their range."""
+    found = np.zeros(trajectory.mesh.elements)
+    moving = np.zeros(trajectory.mesh.elements + 1, bool)
+    moving[list(trajectory.mesh.moving)] = True
+    first = len(trajectory.phase.states) + len(trajectory.phase.algebraics)
+    for number, signal in enumerate(trajectory.phase.inputs, first):
+        if signal.pieces.kind != "ramps":
+            continue
+        ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
+        jump = np.abs(ends[1:, 0] - ends[:-1, 1]) / max(float(np.ptp(ends)), 1e-12)
+        jump = np.where(moving[1:-1], 0.0, jump)
+        found[1:] = np.maximum(found[1:], jump)
+        found[:-1] = np.maximum(found[:-1], jump)
+    return found
+
+
+def _divided(borders: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Borders with every element divided into equal parts."""
+    inner = [np.linspace(a, b, k + 1)[:-1] for a, b, k in zip(borders[:-1], borders[1:], parts, strict=True)]
+    return np.concatenate([*inner, [1.0]])

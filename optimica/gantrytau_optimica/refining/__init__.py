@@ -1,1 +1,0 @@
-"""Answers that hold: played back, refined, and searched from several first guesses."""

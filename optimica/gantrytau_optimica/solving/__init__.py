@@ -1,0 +1,1 @@
+"""How a nonlinear program is solved."""

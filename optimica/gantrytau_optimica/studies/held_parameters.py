@@ -1,0 +1,88 @@
+"""An optimum with more parameters held as unknowns of its program, carried over instead of being solved again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gantrytau import SolveError
+from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.build import Built, build
+from gantrytau_optimica.control.control_problem import Signal
+from gantrytau_optimica.solving.ipopt import Policy, Solution, Solver
+from gantrytau_optimica.studies.kkt import stationarity
+from gantrytau_optimica.transcription.program import Program, transcribe
+
+SAME = 1e-6  # relative: within it two objectives are those of one solution
+STATIONARY = 1e-6  # gradient of the Lagrangian relative to its terms, a hundred times Ipopt's tolerance
+
+
+def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
+    """The same optimum with more parameters held, at the values they have."""
+    old, program = optimum.built, optimum.program
+    values = dict(
+        zip((n.name for n in program.problem.free), optimum.solution.w[program.places.free], strict=True)
+    )
+    held = [n.name for n in program.problem.free if n.held]
+    pieces = {s.name: s.pieces for phase in program.problem.phases for s in phase.inputs}
+    built = _same_sizes(build(old.read, {}, [*held, *missing], pieces), old, values)
+    layouts = program.places.layouts
+    located = np.array([n.guess for n in built.problem.free])
+    borders = [layout.placed(optimum.solution.w).borders for layout in layouts]
+    new = transcribe(
+        built.problem, [layout.mesh for layout in layouts], layouts[0].scheme, (located, borders)
+    )
+    w = np.concatenate([located, optimum.solution.w[len(values) :]])
+    solution = _carried(program, new, optimum.solution, w)
+    if solution is None:  # limits in which the parameters occur are rows of their own now
+        solution = Solver(new, Policy()).solve(new, w)
+    found = replace(optimum, built=built, program=new, solution=solution)
+    if not found.success or abs(found.objective - optimum.objective) > SAME * max(
+        1.0, abs(optimum.objective)
+    ):
+        raise SolveError(
+            f"{optimum.name}: with {', '.join(missing)} held it {found.status}, objective {found.objective:.8g} instead of "
+            f"{optimum.objective:.8g}; name them in prepare(parameters=[...]) and solve there",
+            optimum=found,
+        )
+    return found
+
+
+def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
+    """The control problem with values of its numbers, and guesses and typical sizes, as another one has them."""
+    known = {s.name: s for s in old.problem.signals}
+
+    def sized(part: tuple[Signal, ...]) -> tuple[Signal, ...]:
+        return tuple(replace(s, nominal=known[s.name].nominal, guess=known[s.name].guess) for s in part)
+
+    phases = tuple(
+        replace(p, states=sized(p.states), algebraics=sized(p.algebraics), inputs=sized(p.inputs))
+        for p in built.problem.phases
+    )
+    numbers = []
+    for number in built.problem.free:
+        value = float(values.get(number.name, number.guess))
+        ends = {"min": value, "max": value} if number.held else {}
+        numbers.append(replace(number, guess=value, **ends))
+    return replace(built, problem=replace(built.problem, phases=phases, free=tuple(numbers)))
+
+
+def _carried(old: Program, new: Program, solution: Solution, w: np.ndarray) -> Solution | None:
+    """A solution carried over to a program with more numbers, if its rows are the same."""
+    count = len(old.problem.free)
+    same = [(g.kind, g.name, g.phase) for g in old.groups] == [(g.kind, g.name, g.phase) for g in new.groups]
+    if not same or old.assembled.rows != new.assembled.rows or w.size != new.places.size:
+        return None
+    place = {n.name: k for k, n in enumerate(old.problem.free)}
+    numbers = [
+        solution.bound_multipliers[place[n.name]] if n.name in place else 0.0 for n in new.problem.free
+    ]
+    objective, constraints = new.assembled.nlp(w / new.places.scale, [])
+    found = replace(
+        solution,
+        w=w,
+        bound_multipliers=np.concatenate([numbers, solution.bound_multipliers[count:]]),
+        constraints=np.array(constraints).ravel(),
+        objective=float(objective),
+    )
+    return found if stationarity(new, found) < STATIONARY else None
