@@ -6,21 +6,21 @@ import pytest
 
 TESTS = Path(__file__).parent
 LONGEST = (  # twenty seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
-    "fmu/test_compiling.py",
-    "test_notebooks.py",
-    "fmu/test_singular_poses.py",
-    "models/test_tracking.py",
-    "models/test_f1.py",
+    "fmu/building/test_compiling.py",
+    "notebooks/test_notebooks.py",
+    "fmu/runtime/test_singular_poses.py",
+    "models/control/test_tracking.py",
+    "models/mechanisms/test_f1.py",
     "fmu/test_clients.py",
-    "models/test_six_link.py",
-    "models/test_stewart.py",
-    "fmu/test_parameters.py",
-    "mechanics/test_crossing_assemblies.py",
-    "cli/test_simulate.py",
-    "models/test_four_bar.py",
-    "fmu/test_fuzz.py",
-    "test_simulation.py",
-    "mechanics/test_loops.py",
+    "models/mechanisms/test_six_link.py",
+    "models/mechanisms/test_stewart.py",
+    "fmu/runtime/test_parameters.py",
+    "mechanics/multibody/test_crossing_assemblies.py",
+    "commands/test_simulate.py",
+    "models/mechanisms/test_four_bar.py",
+    "fmu/runtime/test_fuzz.py",
+    "simulation/test_simulation.py",
+    "mechanics/multibody/test_loops.py",
 )
 
 

@@ -9,8 +9,8 @@ from scipy.optimize import least_squares
 from gantrytau_models import F1GantryTau, GantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
-from tests.calibration import f1_data
-from tests.calibration.synthetic import GRID, NOISE, disturbed, grid, inverse, nominal, three_links
+from tests.optimica.calibration import f1_data
+from tests.optimica.calibration.synthetic import GRID, NOISE, disturbed, grid, inverse, nominal, three_links
 
 POSES = 100_000
 SEEDS = 50

@@ -15,8 +15,8 @@ from gantrytau.mechanics.filters import LowPass
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_fmu import export_fmu
 from gantrytau_models import FourBar, GantryTau, Pendulum, SixLinkGantryTau, prototypes
-from tests.fmu.raw_calls import OK, Instance, Kind, Library
-from tests.sampled_models import Held
+from tests.fmu.runtime.raw_calls import OK, Instance, Kind, Library
+from tests.simulation.sampled_models import Held
 
 MODELS: dict[str, Any] = {
     "three-link": lambda: GantryTau(prototypes.L1),

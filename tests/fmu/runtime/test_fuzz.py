@@ -1,0 +1,48 @@
+"""Random calls, right and wrong, of both versions under sanitizers; see c/fuzz.c for what must hold after each.
+
+A few seconds with fixed seeds; GANTRYTAU_FUZZ_SECONDS=60 goes on with new seeds, and with all models, for a minute.
+"""
+
+import itertools
+import os
+import time
+
+import pytest
+
+from tests.fmu.runtime.robust_models import MAKERS, SANITIZERS, compiler, driver, has_sanitizers, run
+
+SECONDS = float(os.environ.get("GANTRYTAU_FUZZ_SECONDS", "0"))
+FEW = ("pendulum", "sledge", "parallelogram", "root", "lags")
+CALLS = 15_000
+
+
+def program(model):
+    compiler()  # or skip
+    # absurd parameters bring a step to its limit of 20 thousand: too long for quick runs, and with sanitizers for the
+    # largest model
+    options = ("-O1",) if SECONDS and model != "six_link" else ("-O1", "-DGT_MOST_STEPS=1000")
+    return driver(model, "fuzz", *options, *(SANITIZERS if has_sanitizers() else ()))
+
+
+def fuzz(model, seed):
+    done = run([program(model), str(seed), str(CALLS)])
+    assert done.returncode == 0, f"{model}, seed {seed}: {done.stderr}"
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("model", FEW)
+@pytest.mark.skipif(SECONDS > 0, reason="the long run does more")
+def test_random_calls(model):
+    fuzz(model, 1)
+
+
+@pytest.mark.skipif(not SECONDS, reason="GANTRYTAU_FUZZ_SECONDS is not set")
+def test_random_calls_for_long():
+    for model in MAKERS:
+        program(model)
+    end = time.monotonic() + SECONDS
+    for seed in itertools.count(int(time.time())):
+        for model in MAKERS:
+            fuzz(model, seed)
+            if time.monotonic() > end:
+                return

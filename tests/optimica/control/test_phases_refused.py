@@ -1,0 +1,123 @@
+"""What cannot be a phase or a link."""
+
+from typing import Any
+
+import pytest
+
+from gantrytau import Input, Model, ModelError, Real
+from gantrytau_optimica import final, link, optimize
+from tests.optimica.control.test_phases import Ball, First, Leg, ThereAndBack
+
+
+def message(problem) -> str:
+    with pytest.raises(ModelError) as caught:
+        optimize(problem)
+    return str(caught.value)
+
+
+def changed(**members):
+    return type("Wrong", (ThereAndBack,), members)
+
+
+class Nested(First):
+    """A phase within a phase."""
+
+    inner = Leg()
+
+
+class Held(Model):
+    """A model that holds a phase."""
+
+    inner = Leg()
+
+
+class Outside(ThereAndBack):
+    """A variable that belongs to no phase."""
+
+    load = Real(unit="N", description="load")
+
+    def equations(self):
+        yield self.load == 1
+
+
+class Other(Leg):
+    """A phase with another model."""
+
+    mass = Ball()
+
+
+class Chosen(ThereAndBack):
+    """An input that belongs to no phase."""
+
+    hand = Input(unit="m", description="hand")
+
+
+NO_PHASE: Any = 3
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        (
+            changed(out=Nested()),
+            "Wrong: the phase out.inner lies inside of out, expected phases as components",
+        ),
+        (
+            changed(held=Held()),
+            "Wrong: the phase held.inner lies inside of held, expected phases as components",
+        ),
+        (Outside, "Outside: load belongs to no phase, expected variables in phases only; declare it in one"),
+        (Chosen, "Chosen: hand belongs to no phase"),
+        (
+            changed(integrand=lambda self: self.out.mass.u**2),
+            "Wrong.integrand: found an integrand beside phases, expected none; write it in the phases",
+        ),
+        (
+            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.y"])]),
+            "back.mass.y",
+        ),
+        (
+            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.u"])]),
+            "Wrong: link, jump: back.mass.u is no state of the phase, expected one of back.mass.x, back.mass.v",
+        ),
+        (
+            changed(constraints=lambda self: [link(self.out, self.back, jump="mass.v")]),
+            "link: found jump='mass.v', expected a list of names; write ['mass.v']",
+        ),
+        (
+            changed(constraints=lambda self: [link(self.out.mass, self.back)]),
+            "expected two phases: components that are Optimizations",
+        ),
+        (
+            changed(constraints=lambda self: [link(self.out, NO_PHASE)]),
+            "link: found 3, expected two phases",
+        ),
+        (
+            changed(constraints=lambda self: [self.out.mass.x <= self.back.mass.x]),
+            "joins signals of several phases over their whole paths, expected values at one time",
+        ),
+        (
+            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.x) == 0]),
+            "joins out and back, expected variables of one phase",
+        ),
+        (
+            changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]),
+            "link(out, back) finds no out.mass.h, expected the same variables in both phases",
+        ),
+        (
+            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.z) == 0]),
+            "Mass has no 'z'",
+        ),
+    ],
+)
+def test_what_cannot_be_a_phase(problem, words):
+    assert words in message(problem)
+
+
+def test_a_link_of_the_problem_itself():
+    assert "link" in message(changed(constraints=lambda self: [link(self, self.back)]))
+
+
+def test_a_link_of_a_phase_of_another_problem():
+    other = ThereAndBack()
+    assert "link" in message(changed(constraints=lambda self: [link(self.out, other.back)]))

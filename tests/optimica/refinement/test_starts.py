@@ -1,0 +1,212 @@
+"""`starts=`: several first guesses, and the branches to which they lead."""
+
+import numpy as np
+import pytest
+
+from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der
+from gantrytau_optimica import Free, Optimization, final, optimize
+from tests.optimica.control.test_controls import Effort, best_pieces
+from tests.optimica.control.test_phases import ThereAndBack
+from tests.optimica.problems import FastestMass
+
+
+class Point(Model):
+    """A point in the plane, moved by its velocity."""
+
+    r = Real(2, unit="m", start=0.0, fixed=True, description="place")
+    v = Input(2, unit="m/s", min=-3.0, max=3.0, description="velocity")
+
+    def equations(self):
+        yield der(self.r) == self.v
+
+
+class Around(Optimization):
+    """2 m in 1 s around a disc with least effort: the square of the length of a string around it."""
+
+    point = Point()
+    height = Parameter(0.2, unit="m", description="centre of the disc above the straight line")
+    radius = Parameter(0.5, unit="m", description="of the disc")
+    meter = Parameter(1.0, unit="m", description="one metre")
+
+    def integrand(self):
+        return (self.point.v[0] ** 2 + self.point.v[1] ** 2) / self.meter**2
+
+    def constraints(self):
+        x, y = self.point.r[0], self.point.r[1]
+        yield final(self.point.r) == [2, 0]
+        yield (x - self.meter) ** 2 + (y - self.height) ** 2 >= self.radius**2
+
+
+def string(below: bool, height=0.2, radius=0.5) -> float:
+    """Length of a string from (0, 0) to (2, 0) around a disc at (1, height): two tangents and an arc."""
+    away = np.hypot(1.0, height)
+    towards = np.arctan2(height, 1.0)  # direction of the centre above the straight line
+    tangent = np.arcsin(radius / away) - (towards if below else -towards)
+    return float(2 * np.sqrt(away**2 - radius**2) + 2 * tangent * radius)
+
+
+@pytest.fixture(scope="module")
+def around():
+    return optimize(Around, elements=20, starts=10)
+
+
+def test_both_ways_around_a_disc_are_found(around):
+    assert string(True) == pytest.approx(np.sqrt(4.37925), abs=1e-3)
+    branches = around.search.branches
+    assert len(branches) == 2
+    # a mesh of 20 may cut the corners of the arc a little
+    assert branches[0].objective == pytest.approx(string(True) ** 2, rel=1e-3)
+    assert branches[1].objective == pytest.approx(string(False) ** 2, rel=1e-3)
+    assert around.objective == pytest.approx(branches[0].objective, rel=1e-6)
+    sides = [branch.optimum.signal("point.r[1]")(0.5) for branch in branches]
+    assert sides[0] == pytest.approx(-0.3, abs=1e-3)
+    assert sides[1] == pytest.approx(0.7, abs=1e-3)
+
+
+def test_branches_and_failures_add_up(around):
+    search = around.search
+    assert search.starts == 10
+    assert sum(branch.count for branch in search.branches) + search.failures == 10
+    assert [b.objective for b in search.branches] == sorted(b.objective for b in search.branches)
+    text = around.report()
+    assert f"10 first guesses led to 2 branches, {search.failures} to no solution:" in text
+    for branch in search.branches:
+        times = "once" if branch.count == 1 else f"{branch.count} times"
+        assert f"objective {branch.objective:.8g}, found {times}" in text
+
+
+def test_a_search_is_reproducible(around):
+    again = optimize(Around, elements=20, starts=10)
+    assert again.objective == around.objective
+    assert [(b.objective, b.count) for b in again.search.branches] == [
+        (b.objective, b.count) for b in around.search.branches
+    ]
+
+
+def test_a_search_leaves_a_worse_guess():
+    above = {"point.r": lambda t: [2 * t, 3 * t * (1 - t)], "point.v": lambda t: [2.0, 3 - 6 * t]}
+    alone = optimize(Around, elements=20, guess=above)
+    assert alone.objective == pytest.approx(string(False) ** 2, rel=1e-3)
+    assert alone.search is None
+    searched = optimize(Around, elements=20, guess=above, starts=20)
+    assert searched.objective == pytest.approx(string(True) ** 2, rel=1e-3)
+    assert sum(b.count for b in searched.search.branches) + searched.search.failures == 20
+
+
+def test_a_search_on_a_coarser_mesh_ends_on_the_mesh_asked_for():
+    optimum = optimize(Around, elements=40, starts=8)
+    assert optimum.breaks.size == 39
+    assert optimum.objective == pytest.approx(string(True) ** 2, rel=5e-4)
+    assert optimum.search.branches[0].optimum.breaks.size == 19
+
+
+def test_a_search_may_be_refined():
+    optimum = optimize(Around, elements=20, starts=4, refine=1e-5)
+    assert optimum.refinement.reached
+    assert optimum.search.starts == 4
+    assert optimum.objective == pytest.approx(string(True) ** 2, rel=2e-5)
+    assert "4 first guesses led to" in optimum.report()
+
+
+class Flat(Model):
+    """The point with coordinates of their own."""
+
+    x = Real(unit="m", start=0.0, fixed=True, description="along")
+    y = Real(unit="m", start=0.0, fixed=True, description="across")
+    vx = Input(unit="m/s", min=-3.0, max=3.0, description="along")
+    vy = Input(unit="m/s", min=-3.0, max=3.0, description="across")
+
+    def equations(self):
+        yield der(self.x) == self.vx
+        yield der(self.y) == self.vy
+
+
+class AroundByCoordinates(Around):
+    """The same disc, no vector."""
+
+    point = Flat()
+
+    def integrand(self):
+        return (self.point.vx**2 + self.point.vy**2) / self.meter**2
+
+    def constraints(self):
+        yield final(self.point.x) == 2 * self.meter
+        yield final(self.point.y) == 0
+        yield (self.point.x - self.meter) ** 2 + (self.point.y - self.height) ** 2 >= self.radius**2
+
+
+def test_the_search_does_not_depend_on_how_coordinates_are_named():
+    branches = optimize(AroundByCoordinates, elements=20, starts=10).search.branches
+    assert len(branches) == 2
+
+
+def test_several_minima_of_a_static_problem():
+    class Waves(Optimization):
+        """x^4 - 8 x^2 + x has minima near -2.03 and 1.97."""
+
+        x = Free(1.9, min=-3.0, max=3.0, description="where")
+
+        def objective(self):
+            return self.x**4 - 8 * self.x**2 + self.x
+
+    roots = np.sort(np.roots([4, 0, -16, 1]).real)
+    values = np.polyval([1, 0, -8, 1, 0], roots[[0, 2]])
+    optimum = optimize(Waves, starts=10)
+    assert optimum.objective == pytest.approx(values[0], abs=1e-7)
+    assert [b.objective for b in optimum.search.branches] == pytest.approx(list(values), abs=1e-7)
+    assert optimize(Waves).objective == pytest.approx(values[1], abs=1e-7)
+
+
+def test_one_minimum_is_one_branch():
+    optimum = optimize(FastestMass, elements=10, starts=5)
+    assert len(optimum.search.branches) == 1
+    assert optimum.search.branches[0].count + optimum.search.failures == 5
+    assert optimum.final_time == pytest.approx(2.0, abs=1e-6)
+
+
+def test_where_no_guess_leads_to_a_solution_the_first_is_reported():
+    class Hasty(FastestMass):
+        final_time = 1.9
+
+        def objective(self):
+            return 0.0
+
+    with pytest.raises(SolveError, match="no solution"):
+        optimize(Hasty, elements=10, starts=3)
+
+
+@pytest.mark.parametrize("starts", [0, -1, 1.5, "many", True, None, [3]])
+def test_numbers_of_guesses_that_cannot_be(starts):
+    with pytest.raises(ModelError, match=r"starts=.*: expected a whole number of at least 1"):
+        optimize(FastestMass, starts=starts)
+
+
+def test_a_search_in_phases():
+    optimum = optimize(ThereAndBack, elements=10, starts=4)
+    assert optimum.objective == pytest.approx(4.0, abs=1e-6)
+    assert sum(b.count for b in optimum.search.branches) + optimum.search.failures == 4
+
+
+def test_the_answer_is_no_worse_than_its_best_branch():
+    optimum = optimize(FastestMass, elements=6, lengths="free", starts=3)
+    assert optimum.objective <= optimum.search.branches[0].objective + 1e-6
+
+
+COARSE = "prepared._coarse halves the elements but not the groups of elements that make a piece"
+
+
+def test_branches_keep_the_pieces_of_the_caller():
+    # eight pieces in either case; 40 elements carry them exactly, and so do 20
+    controls = {"mass.u": dict(kind="constant", elements=5)}
+    optimum = optimize(Effort, elements=40, starts=2, controls=controls)
+    assert optimum.objective == pytest.approx(best_pieces(np.full(8, 1 / 8))[0], abs=1e-8)
+    assert optimum.search.branches[0].objective == pytest.approx(optimum.objective, abs=1e-8)
+
+
+def test_a_limit_on_steps_is_that_of_the_mesh_asked_for():
+    # steps of 12 / 40 are needed; pieces of twice the length would need twice as much
+    controls = {"mass.u": dict(kind="constant", max_step=0.35)}
+    alone = optimize(Effort, elements=40, controls=controls)
+    assert optimize(Effort, elements=40, controls=controls, starts=2).objective == pytest.approx(
+        alone.objective
+    )

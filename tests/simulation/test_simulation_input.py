@@ -1,0 +1,100 @@
+"""What wrong inputs, parameters and policies of a simulation get."""
+
+import math
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import gantrytau.simulation.integration
+from gantrytau import Input, Model, ModelError, Real, SolveError, der, simulate, sin
+from gantrytau_models import GantryTau, prototypes
+from tests.simulation.test_simulation import Circuit, Oscillator
+
+
+@pytest.mark.parametrize(
+    ("inputs", "words"),
+    [
+        ({"g": 1.0}, "has no variable or parameter 'g'"),
+        ({"x": 1.0}, "x is not an input of Oscillator (inputs: f)"),
+        ({"f": [1.0, 2.0]}, "input f: found 2 values, expected 1"),
+        ({"f": math.nan}, "expected finite numbers"),
+        ({"f": "strong"}, "expected a number, a function of time, or (times, values)"),
+        ({"f": ([0.0, 1.0], [0.0, math.nan])}, "sample 1 is not finite"),
+        ({"f": ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0])}, "rise strictly"),
+        ({"f": ([0.0], [0.0])}, "at least two"),
+        ({"f": ([0.0, 0.5], [0.0, 1.0])}, "samples cover 0 to 0.5 s, expected 0 to 1 s"),
+        ({"f": ([0.0, 1.0], [[0.0, 1.0], [1.0, 2.0]])}, "expected (2,) and (2, 1)"),
+        ({"f": math.sin}, "input f: the function of time does not work on a symbol"),
+        ({"f": lambda t: 1.0 if t > 1 else 2.0}, "write it with gantrytau.sin, exp, if_else"),
+        ({"f": lambda t: [t, t]}, "input f: found 2 values, expected 1"),
+        ({"f": lambda: 1.0}, "input f: the function of time"),
+        (3.0, "inputs: found 3.0, expected"),
+    ],
+)
+def test_wrong_inputs(inputs, words):
+    with pytest.raises(ModelError) as caught:
+        simulate(Oscillator(), stop=1.0, inputs=inputs)
+    assert words in str(caught.value)
+
+
+def test_an_input_without_a_value():
+    with pytest.raises(ModelError, match=r"input source has no value; give inputs=\{'source': ...\}"):
+        simulate(Circuit(), stop=1.0)
+
+
+def test_samples_cannot_be_differentiated():
+    class Differentiator(Model):
+        u = Input(unit="m", description="position")
+        v = Real(unit="m/s", description="its rate")
+
+        def equations(self):
+            yield self.v == der(self.u)
+
+    found = simulate(Differentiator(), stop=1.0, inputs={"u": lambda t: t**2})
+    np.testing.assert_allclose(found["v"], 2 * found.time, atol=1e-12)
+    with pytest.raises(
+        ModelError, match="input u is differentiated 1 times by the model, which samples do not allow"
+    ):
+        simulate(Differentiator(), stop=1.0, inputs={"u": ([0.0, 1.0], [0.0, 1.0])})
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        (dict(stop=-1.0), "expected start < stop"),
+        (dict(stop=math.nan), "expected start < stop"),
+        (dict(stop="late"), "expected start < stop"),
+        (dict(stop=1.0, tolerance=0.0), "tolerance=0.0, expected a number between 0 and 1"),
+        (dict(stop=1.0, points=1), "points=1, expected a whole number of at least 2"),
+        (dict(stop=1.0, points=10.5), "points=10.5"),
+        (dict(stop=1.0, parameters={"k": 1.0}), "has no parameter 'k'"),
+        (dict(stop=1.0, parameters={"c": [1.0, 2.0]}), "c: value has shape (2,), expected ()"),
+        (dict(stop=1.0, parameters={"c": math.inf}), "expected a finite number"),
+        (dict(stop=1.0, parameters={"c": "stiff"}), "c: found 'stiff', expected"),
+        (dict(stop=1.0, outputs="x"), "write ['x']"),
+    ],
+)
+def test_wrong_policy(keywords, words):
+    with pytest.raises(ModelError) as caught:
+        simulate(Oscillator(), **keywords)
+    assert words in str(caught.value)
+
+
+def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed(monkeypatch):
+    class Begun(gantrytau.simulation.integration.Progress):
+        def __enter__(self):
+            threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
+            return super().__enter__()
+
+    monkeypatch.setattr(gantrytau.simulation.integration, "Progress", Begun)
+    with pytest.raises(SolveError, match=r"simulation interrupted at t = ") as raised:
+        simulate(
+            GantryTau(prototypes.L1),
+            stop=3000.0,
+            inputs={"carts[0].f": lambda t: 300 * sin(20 * t)},
+            points=20001,
+        )
+    assert 0 < raised.value.time < 3000.0
+    assert np.isfinite(raised.value.result["tool.r"]).all()
