@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau.interruption import heeding_interrupts, uninterrupted
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 
 ASKED = "DM_from_array"  # by which CasADi asks for an argument
 

@@ -5,17 +5,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gantrytau.errors import ModelError
-from gantrytau.results.files import replacing
+from gantrytau.results.series import Series
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gantrytau.results.result import Result
-
 _FEW = 12  # lines that one figure still shows distinctly
 
 
-def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] | None) -> "Figure":
+def draw(result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | None) -> "Figure":
     """The figure of the named variables of a result over time, saved to `file` if one is named."""
     import matplotlib.pyplot as plt
 
@@ -39,11 +38,18 @@ def draw(result: "Result", names: tuple[str, ...], file: str | os.PathLike[str] 
     axes[-1, 0].set_xlabel("time [s]")
     if result.title:
         figure.suptitle(result.title)
+    return finished(figure, file)
+
+
+def finished(figure: "Figure", file: str | os.PathLike[str] | None) -> "Figure":
+    """The figure, saved to `file` if one is named; where there is no window for it, it belongs to its caller alone."""
+    import matplotlib.pyplot as plt
+
     if file is not None:
         with replacing(file) as partial:
             figure.savefig(partial, dpi=150)
     if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)  # there is no window: the figure belongs to its caller alone
+        plt.close(figure)
     return figure
 
 
@@ -69,7 +75,7 @@ def has_windows(backend: str) -> bool:
     return backend.lower() in {*interactive, "widget", "ipympl", "module://ipympl.backend_nbagg"}
 
 
-def _lines(result: "Result", names: tuple[str, ...]) -> list[str]:
+def _lines(result: Series, names: tuple[str, ...]) -> list[str]:
     """The scalars that the names stand for."""
     if not names:
         names = result.names
@@ -85,7 +91,7 @@ def _lines(result: "Result", names: tuple[str, ...]) -> list[str]:
     return list(dict.fromkeys(lines))
 
 
-def _label(result: "Result", members: list[str], unit: str) -> str:
+def _label(result: Series, members: list[str], unit: str) -> str:
     """The name if there is one line only, and the unit unless it is one."""
     name = members[0] if len(members) == 1 else ""
     return " ".join(filter(None, [name, f"[{unit}]" if unit else ""]))

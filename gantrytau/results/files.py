@@ -3,23 +3,21 @@
 import csv
 import importlib
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau.errors import GantryTauError, ModelError, did_you_mean
-from gantrytau.interruption import uninterrupted
+from gantrytau.results.series import Series
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     import xarray
 
-    from gantrytau.results.result import Result
 
-
-def save(result: "Result", path: str | os.PathLike[str]) -> Path:
+def save(result: Series, path: str | os.PathLike[str]) -> Path:
     """Write a result in the format that the suffix of `path` names; see `Result.save`."""
     path = Path(path)
     writer = _WRITERS.get(path.suffix.lower())
@@ -33,22 +31,7 @@ def save(result: "Result", path: str | os.PathLike[str]) -> Path:
     return path
 
 
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A name beside `path` to write to; it takes the place of `path` at the end, or vanishes on an error; Ctrl-C waits."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise ModelError(f"{path}: the folder '{path.parent}' does not exist; create it, or name another one")
-    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        with uninterrupted():
-            yield partial
-            os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def dataset(result: "Result") -> "xarray.Dataset":
+def dataset(result: Series) -> "xarray.Dataset":
     """A result as xarray's Dataset: coordinate `time`, vectors and matrices whole, units as attributes."""
     xarray = _extra("xarray")
     elements = {str(element) for names in result.arrays.values() for element in names.flat}
@@ -64,13 +47,13 @@ def dataset(result: "Result") -> "xarray.Dataset":
     return xarray.Dataset(variables, coords={"time": time}, attrs={"title": result.title})
 
 
-def _attributes(result: "Result", name: str) -> dict[str, str]:
+def _attributes(result: Series, name: str) -> dict[str, str]:
     """The CF attributes of a variable, without empty ones."""
     attributes = {"units": result.unit(name), "long_name": result.description(name)}
     return {key: text for key, text in attributes.items() if text}
 
 
-def _write_csv(result: "Result", path: Path) -> None:
+def _write_csv(result: Series, path: Path) -> None:
     names = ("time", *result.names)
     units = [result.unit(name) for name in names]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -79,13 +62,13 @@ def _write_csv(result: "Result", path: Path) -> None:
         writer.writerows(np.column_stack([result[name] for name in names]).tolist())
 
 
-def _write_netcdf(result: "Result", path: Path) -> None:
+def _write_netcdf(result: Series, path: Path) -> None:
     _extra("h5netcdf")
     _extra("h5py")
     dataset(result).to_netcdf(path, engine="h5netcdf")
 
 
-def _write_parquet(result: "Result", path: Path) -> None:
+def _write_parquet(result: Series, path: Path) -> None:
     arrow, parquet = _extra("pyarrow"), _extra("pyarrow.parquet")
     names = ("time", *result.names)
     fields = [arrow.field(name, arrow.float64(), metadata=_attributes(result, name)) for name in names]
@@ -93,7 +76,7 @@ def _write_parquet(result: "Result", path: Path) -> None:
     parquet.write_table(arrow.table([result[name] for name in names], schema=schema), path)
 
 
-def _write_dymola(result: "Result", path: Path) -> None:
+def _write_dymola(result: Series, path: Path) -> None:
     """Dymola's trajectory 1.1, transposed ("binTrans"), as a MATLAB file of version 4.
 
     name, description: one column of letters for each variable, the abscissa Time first.
@@ -128,7 +111,7 @@ def _write_dymola(result: "Result", path: Path) -> None:
     savemat(path, content, format="4", appendmat=False)
 
 
-def _dymola_text(result: "Result", name: str) -> str:
+def _dymola_text(result: Series, name: str) -> str:
     """The description of a variable with its unit in brackets, as Dymola writes it."""
     unit = result.unit(name)
     return f"{result.description(name)} [{unit}]".strip() if unit else result.description(name)
@@ -151,7 +134,7 @@ def _extra(module: str) -> Any:
         ) from error
 
 
-_WRITERS: dict[str, Callable[["Result", Path], None]] = {
+_WRITERS: dict[str, Callable[[Series, Path], None]] = {
     ".csv": _write_csv,
     ".nc": _write_netcdf,
     ".parquet": _write_parquet,

@@ -1,142 +1,20 @@
-"""What a simulation or an optimisation found: every variable of the model by name, over time."""
+"""What a simulation or an optimisation found: every variable of the model by name, over time, drawn and saved."""
 
 import os
-import re
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.results.figures import draw
+from gantrytau.results.files import dataset, save
+from gantrytau.results.series import Series
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-Values = NDArray[np.float64]
 
-# 'tool.r[2]', 'R[0,1]', 'der(tool.r[2])': text before the index, the index, closing brackets behind it
-_ELEMENT = re.compile(r"(.*[^\[])\[(\d+(?:, ?\d+)*)\](\)*)")
-
-
-class Result:
-    """The variables of a model at the output times of a simulation or an optimum; it cannot be changed.
-
-    time: output times, (times,) in s, not decreasing.
-    values: scalar name -> its values, (times,) or one number for a constant. Any mapping will do, also one
-        that computes an entry when it is asked for; each is asked for once, and only if it is wanted.
-    units, descriptions: scalar or vector name -> text; a name left out has none.
-    title: what was computed, for figures and files.
-    aliases: further name -> the name in `values` that it equals; a minus sign before it says the negative.
-
-    Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
-    matrix `R`, (times, 3, 3). `time` is a name, too.
-    """
-
-    def __init__(
-        self,
-        time: ArrayLike,
-        values: Mapping[str, Any],
-        *,
-        units: Mapping[str, str] | None = None,
-        descriptions: Mapping[str, str] | None = None,
-        title: str = "",
-        aliases: Mapping[str, str] | None = None,
-    ):
-        self._time = np.array(time, dtype=float)
-        if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
-            raise ModelError(
-                f"{title or 'Result'}: time has shape {self._time.shape} or decreases; "
-                "expected a vector of output times in s that never decreases"
-            )
-        self._time.flags.writeable = False
-        self._values = values
-        self._units = dict(units or {})
-        self._descriptions = dict(descriptions or {})
-        self._title = title
-        self._aliases = dict(aliases or {})
-        self._names = (*(name for name in values if name != "time"), *self._aliases)
-        self._scalars = frozenset(self._names)
-        self._arrays = _arrays(self._names)
-        targets = self._scalars - self._aliases.keys() | {"time"}
-        for name, target in self._aliases.items():
-            if target.removeprefix("-") in targets:
-                continue
-            raise ModelError(
-                f"{title or 'Result'}: alias '{name}' names '{target}'; "
-                "expected a name in values, or a minus sign and such a name"
-            )
-        self._known: dict[str, Values] = {"time": self._time}
-
-    @property
-    def time(self) -> Values:
-        """Output times, (times,) in s."""
-        return self._time
-
-    @property
-    def title(self) -> str:
-        """What was computed."""
-        return self._title
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of all scalars; vectors and matrices answer to their own names as well."""
-        return self._names
-
-    @property
-    def arrays(self) -> Mapping[str, np.ndarray]:
-        """Vector or matrix name -> the names of its elements in its shape."""
-        return self._arrays
-
-    @property
-    def aliases(self) -> Mapping[str, str]:
-        """Name -> the name it equals, with a minus sign before it if it is the negative."""
-        return self._aliases
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Name -> unit of all scalars, vectors and matrices; "" where none was declared."""
-        return {name: self.unit(name) for name in (*self._names, *self._arrays)}
-
-    def unit(self, name: str) -> str:
-        """The unit of one variable; that of its vector if the element has none of its own, "" if none."""
-        return "s" if name == "time" else self._attribute(self._units, name)
-
-    def description(self, name: str) -> str:
-        """The description of one variable, found like its unit."""
-        return "time" if name == "time" else self._attribute(self._descriptions, name)
-
-    def __contains__(self, name: object) -> bool:
-        return name == "time" or name in self._scalars or name in self._arrays
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __getitem__(self, name: str) -> Values:
-        if name not in self._known:
-            values = self._compute(name)
-            values.flags.writeable = False
-            self._known[name] = values
-        return self._known[name]
-
-    def final(self, name: str) -> Any:
-        """The last value: a float, or an array for a vector or matrix."""
-        last = self[name][-1]
-        return last if last.ndim else float(last)
-
-    def select(self, names: Sequence[str]) -> "Result":
-        """Only the named variables, vectors with all their elements; ModelError for an unknown name."""
-        values: dict[str, Values] = {}
-        for name in names:
-            elements = self._arrays[name].flat if name in self._arrays else [name]
-            values.update(
-                (str(element), self[str(element)]) for element in elements
-            )  # an unknown name raises
-        units = {name: self.unit(name) for name in values}
-        words = {name: self.description(name) for name in values}
-        return Result(self._time, values, units=units, descriptions=words, title=self._title)
+class Result(Series):
+    """The variables of a model at the output times of a simulation or an optimum, see `Series`, with figures and files."""
 
     def plot(self, *names: str, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Draw variables over time, one axis for each unit, and return the figure.
@@ -144,8 +22,6 @@ class Result:
         names: scalars or vectors; none means all, if they are few.
         file: also save the figure there, in the format that its suffix names.
         """
-        from gantrytau.results.figures import draw
-
         return draw(self, names, file)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -156,82 +32,8 @@ class Result:
         .mat: a trajectory of Dymola (and OpenModelica), read by their tools.
         An existing file is replaced only when the new one is complete.
         """
-        from gantrytau.results.files import save
-
         return save(self, path)
 
     def to_xarray(self) -> "xarray.Dataset":
         """The variables as a dataset with the coordinate `time`, vectors whole, units as attributes."""
-        from gantrytau.results.files import dataset
-
         return dataset(self)
-
-    def __repr__(self) -> str:
-        title = f"{self._title}: " if self._title else ""
-        span = f"{self._time.size} times from {self._time[0]:g} s to {self._time[-1]:g} s"
-        shown = ", ".join(self._names[:6]) + (", ..." if len(self._names) > 6 else "")
-        return f"<Result {title}{len(self._names)} variables at {span}: {shown}>"
-
-    def _compute(self, name: str) -> Values:
-        if name not in self:
-            path = self._title or "Result"
-            choice = ("time", *self._names, *self._arrays)
-            raise ModelError(f"{path} has no variable '{name}'{did_you_mean(str(name), choice)}")
-        if name in self._arrays:
-            elements = self._arrays[name]
-            columns = [self[element] for element in elements.flat]
-            return np.stack(columns, axis=1).reshape(self._time.size, *elements.shape)
-        if name in self._aliases:
-            target = self._aliases[name]
-            return -self[target[1:]] if target.startswith("-") else self[target].view()
-        values = np.array(self._values[name], dtype=float)
-        if values.size == 1:
-            return np.full(self._time.size, values.item())
-        if values.shape != self._time.shape:
-            raise ModelError(
-                f"{self._title or 'Result'}: {name} has values of shape {values.shape}; expected one value "
-                f"for each of {self._time.size} times, and vectors by their elements, '{name}[0]'"
-            )
-        return values
-
-    def _attribute(self, texts: Mapping[str, str], name: str) -> str:
-        """The text of a name, else of the array it belongs to, of its first element or of what it equals."""
-        if name in texts:
-            return texts[name]
-        if name in self._arrays:
-            return texts.get(str(self._arrays[name].flat[0]), "")
-        element = split_element(name)
-        if element and element[0] in texts:
-            return texts[element[0]]
-        if name in self._aliases:
-            return self._attribute(texts, self._aliases[name].removeprefix("-"))
-        if name not in self:
-            self._compute(name)  # raises
-        return ""
-
-
-def split_element(name: str) -> tuple[str, tuple[int, ...]] | None:
-    """The array and the index that an element's name consists of, or None for another name."""
-    match = _ELEMENT.fullmatch(name)
-    if match is None:
-        return None
-    before, index, behind = match.groups()
-    return before + behind, tuple(int(number) for number in index.split(","))
-
-
-def _arrays(names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Array name -> element names in the shape of the array, for arrays all of whose elements exist."""
-    found: dict[str, dict[tuple[int, ...], str]] = {}
-    for name in names:
-        element = split_element(name)
-        if element:
-            found.setdefault(element[0], {})[element[1]] = name
-    arrays, scalars = {}, frozenset(names)
-    for base, elements in found.items():
-        if base in scalars or len({len(index) for index in elements}) > 1:
-            continue
-        shape = tuple(int(size) for size in np.max(list(elements), axis=0) + 1)
-        if len(elements) == np.prod(shape):
-            arrays[base] = np.array([elements[index] for index in np.ndindex(*shape)], dtype=object)
-            arrays[base] = arrays[base].reshape(shape)
-    return arrays

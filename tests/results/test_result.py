@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gantrytau.errors import GantryTauError, ModelError
-from gantrytau.results.result import Result, split_element
+from gantrytau.results.result import Result
+from gantrytau.results.series import split_element
 
 matplotlib.use("Agg")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from gantrytau.errors import ModelError
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 from gantrytau_fmu.building.platforms import PLATFORMS, Platform
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows; the same content gives the same bytes

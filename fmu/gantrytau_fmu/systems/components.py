@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.results.result import split_element
+from gantrytau.results.series import split_element
 
 KINDS = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean", "String": "text"}
 SETTABLE = ("parameter", "structuralParameter", "input", "output", "local")

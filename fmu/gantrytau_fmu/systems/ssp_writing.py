@@ -9,7 +9,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from gantrytau.errors import ModelError
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.components import Component, Scalar, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (

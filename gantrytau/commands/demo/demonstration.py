@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

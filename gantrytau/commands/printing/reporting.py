@@ -148,7 +148,7 @@ def busy(words: str) -> Iterator[None]:
 
 def write_text(text: str, file: Path) -> None:
     """Write a text file whole; CommandError if that is not possible."""
-    from gantrytau.results.files import replacing
+    from gantrytau.whole_files import replacing
 
     with writable(file), replacing(file) as partial:
         partial.write_text(text, encoding="utf-8")

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau.errors import ModelError
+from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, told, vectors
 from gantrytau.kinematics.rods.linked import ThreeLinks
@@ -118,9 +119,27 @@ class Accuracy:
         axes: the two coordinates that vary, such as "yz"; file: saves the figure there, too.
         Raises ModelError for another quantity, other axes, or poses that lie on one line.
         """
-        from gantrytau.kinematics.accuracy.figures import draw_levels
+        inside = np.isfinite(self.error)
+        return draw_levels(self._panels(quantity), self.r, inside, self.carts, axes, file)
 
-        return draw_levels(self, quantity, axes, file)
+    def _panels(self, quantity: str) -> dict[str, np.ndarray]:
+        """Labels and values of the panels of a figure."""
+        if quantity == "error":
+            return {"largest error of the tool [µm]": self.error * 1e6}
+        if quantity == "bound":
+            return {"bound of the error of the tool [µm]": self.bound * 1e6}
+        if quantity == "areas":
+            return {f"face orthogonal to link {i + 1} [10⁻³ mm²]": self.areas[:, i] * 1e9 for i in range(3)}
+        if quantity == "angles":
+            pairs = ((2, 3), (3, 1), (1, 2))
+            angles = np.rad2deg(self.angles)
+            return {f"angle of links {i} and {j} [°]": angles[:, k] for k, (i, j) in enumerate(pairs)}
+        if quantity == "dihedral angles":
+            angles = np.rad2deg(self.dihedral_angles)
+            return {f"angle of the sides that meet at link {i + 1} [°]": angles[:, i] for i in range(3)}
+        raise ModelError(
+            f"plot: found the quantity {quantity!r}, expected 'error', 'bound', 'areas', 'angles' or 'dihedral angles'"
+        )
 
 
 def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> Accuracy:

@@ -1,33 +1,40 @@
 """Level plots of the accuracy over a slice of poses: Dressler (2012), Figures 4.8 to 4.10."""
 
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.results.figures import check_suffix, has_windows
-from gantrytau.results.files import replacing
+from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from gantrytau.kinematics.accuracy.accuracy import Accuracy
 
 _LEVELS = 12
 _GAP = 3.0  # triangles with sides longer than this many times the usual one span what has no poses
 
 
-def draw_levels(found: "Accuracy", quantity: str, axes: str, file: str | os.PathLike[str] | None) -> "Figure":
-    """One panel of levels, or three for the areas of the faces; see `Accuracy.plot`."""
+def draw_levels(
+    panels: Mapping[str, np.ndarray],
+    r: np.ndarray,
+    inside: np.ndarray,
+    carts: np.ndarray,
+    axes: str,
+    file: str | os.PathLike[str] | None,
+) -> "Figure":
+    """A panel of levels for each label and its values (N,); see `Accuracy.plot`.
+
+    r: (N, 3) in m; inside: whether a pose is in reach, (N,); carts: (N, 3, 3) in m, NaN out of reach.
+    """
     import matplotlib.pyplot as plt
 
     if file is not None:
         check_suffix(file)
-    panels = _panels(found, quantity)
     first, second = _coordinates(axes)
-    triangles = _triangles(found.r[:, first], found.r[:, second], np.isfinite(found.error), axes)
-    extent = np.ptp(found.r[np.isfinite(found.error)], axis=0)
+    triangles = _triangles(r[:, first], r[:, second], inside, axes)
+    extent = np.ptp(r[inside], axis=0)
     size = (1.0 + 4.6 * len(panels), np.clip(3.6 * extent[second] / extent[first] + 0.6, 2.5, 6.0))
     figure, drawn = plt.subplots(1, len(panels), squeeze=False, figsize=size, layout="constrained")
     for axis, (title, values) in zip(drawn[0], panels.items(), strict=True):
@@ -38,36 +45,11 @@ def draw_levels(found: "Accuracy", quantity: str, axes: str, file: str | os.Path
         )
         axis.clabel(lines, fontsize="x-small", fmt="%g")
         figure.colorbar(filled, ax=axis, label=title)
-        _carts(axis, found, first, second)
+        _carts(axis, carts, first, second)
         axis.set_xlabel(f"{axes[0]} [m]")
         axis.set_ylabel(f"{axes[1]} [m]")
         axis.set_aspect("equal")
-    if file is not None:
-        with replacing(file) as partial:
-            figure.savefig(partial, dpi=150)
-    if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)  # there is no window: the figure belongs to its caller alone
-    return figure
-
-
-def _panels(found: "Accuracy", quantity: str) -> dict[str, np.ndarray]:
-    """Labels and values of the panels of a figure."""
-    if quantity == "error":
-        return {"largest error of the tool [µm]": found.error * 1e6}
-    if quantity == "bound":
-        return {"bound of the error of the tool [µm]": found.bound * 1e6}
-    if quantity == "areas":
-        return {f"face orthogonal to link {i + 1} [10⁻³ mm²]": found.areas[:, i] * 1e9 for i in range(3)}
-    if quantity == "angles":
-        pairs = ((2, 3), (3, 1), (1, 2))
-        angles = np.rad2deg(found.angles)
-        return {f"angle of links {i} and {j} [°]": angles[:, k] for k, (i, j) in enumerate(pairs)}
-    if quantity == "dihedral angles":
-        angles = np.rad2deg(found.dihedral_angles)
-        return {f"angle of the sides that meet at link {i + 1} [°]": angles[:, i] for i in range(3)}
-    raise ModelError(
-        f"plot: found the quantity {quantity!r}, expected 'error', 'bound', 'areas', 'angles' or 'dihedral angles'"
-    )
+    return finished(figure, file)
 
 
 def _coordinates(axes: str) -> tuple[int, int]:
@@ -104,9 +86,9 @@ def _levels(values: np.ndarray) -> np.ndarray:
     return np.asarray(MaxNLocator(_LEVELS).tick_values(low, max(high, low + 1e-9 * (abs(low) + 1))))
 
 
-def _carts(axis: Any, found: "Accuracy", first: int, second: int) -> None:
+def _carts(axis: Any, carts: np.ndarray, first: int, second: int) -> None:
     """The guideways, where they pass through a slice that is across them."""
-    middle = np.nanmean(found.carts, axis=0)
+    middle = np.nanmean(carts, axis=0)
     for i, cart in enumerate(middle):
         axis.plot(cart[first], cart[second], "s", color="tab:red", markersize=5)
         axis.annotate(f"{i + 1}", (cart[first], cart[second]), xytext=(4, 4), textcoords="offset points")

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.kinematics.workspace.cells import Cells
 from gantrytau.kinematics.workspace.pose_limits import REASONS
-from gantrytau.results.figures import check_suffix, has_windows
-from gantrytau.results.files import replacing
+from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from gantrytau.kinematics.workspace.workspace import Workspace
 
 _COLOURS = ("#9fd69f", "#ffffff", "#c9d5e8", "#f2dfb0", "#e8b3ab")  # in the order of REASONS
 _OBSTACLE = "0.35"
@@ -23,7 +21,7 @@ _LAYERS = 12  # outlines across one axis that can still be told apart
 
 
 def draw_layer(
-    found: "Workspace", number: int, layer: int, quantity: str, file: str | os.PathLike[str] | None
+    found: Cells, number: int, layer: int, quantity: str, file: str | os.PathLike[str] | None
 ) -> "Figure":
     """A layer across axis `number`; see `Workspace.plot`."""
     import matplotlib.pyplot as plt
@@ -54,20 +52,19 @@ def draw_layer(
     axis.set_aspect("equal")
     area = found.cross_section("xyz"[number], float(at))
     axis.set_title(f"{'xyz'[number]} = {at:.3g} m, inside {area:.3g} m²")
-    _finish(figure, file)
-    return figure
+    return finished(figure, file)
 
 
-def _layer_of(found: "Workspace", values: np.ndarray, number: int, layer: int) -> np.ndarray:
+def _layer_of(found: Cells, values: np.ndarray, number: int, layer: int) -> np.ndarray:
     """Values (nx * ny * nz,) of one layer, rows along the first of the two other axes."""
     return np.moveaxis(values.reshape(found.shape), number, 0)[layer]
 
 
-def _edges(found: "Workspace", k: int) -> np.ndarray:
+def _edges(found: Cells, k: int) -> np.ndarray:
     return np.linspace(found.box[k, 0], found.box[k, 1], found.shape[k] + 1)
 
 
-def _limits(axis: Any, found: "Workspace", number: int, layer: int, others: list[int]) -> None:
+def _limits(axis: Any, found: Cells, number: int, layer: int, others: list[int]) -> None:
     """Cells in the colours of the limits that they break."""
     from matplotlib.colors import ListedColormap
 
@@ -78,7 +75,7 @@ def _limits(axis: Any, found: "Workspace", number: int, layer: int, others: list
     )
 
 
-def _legend(figure: Any, found: "Workspace", number: int, layer: int, hidden: bool) -> None:
+def _legend(figure: Any, found: Cells, number: int, layer: int, hidden: bool) -> None:
     """What colours mean, below the axes, where it hides nothing; hidden: an obstacle is drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -96,7 +93,7 @@ def _legend(figure: Any, found: "Workspace", number: int, layer: int, hidden: bo
 
 
 def _levels(
-    figure: Any, axis: Any, found: "Workspace", number: int, layer: int, others: list[int], quantity: str
+    figure: Any, axis: Any, found: Cells, number: int, layer: int, others: list[int], quantity: str
 ) -> None:
     """Levels of what is left of one limit, inside."""
     values = _layer_of(found, getattr(found.examined, quantity), number, layer)
@@ -109,7 +106,7 @@ def _levels(
     figure.colorbar(filled, ax=axis, label=f"{quantity} left [{_UNITS[quantity]}]")
 
 
-def _obstacles(axis: Any, found: "Workspace", number: int, at: float, others: list[int]) -> bool:
+def _obstacles(axis: Any, found: Cells, number: int, at: float, others: list[int]) -> bool:
     """Outlines of obstacles where the layer cuts them; whether it cuts any."""
     sides = [np.linspace(found.box[k, 0], found.box[k, 1], _FINE) for k in others]
     if any(found.box[k, 0] == found.box[k, 1] for k in others):
@@ -126,7 +123,7 @@ def _obstacles(axis: Any, found: "Workspace", number: int, at: float, others: li
     return some
 
 
-def _guideways(axis: Any, found: "Workspace", number: int, at: float, others: list[int]) -> None:
+def _guideways(axis: Any, found: Cells, number: int, at: float, others: list[int]) -> None:
     """Guideways as points where they pass through the layer, as lines where they go along it."""
     for i, (place, direction) in enumerate(found.rails):
         if abs(direction[number]) > 0.5 * np.linalg.norm(direction):
@@ -137,7 +134,7 @@ def _guideways(axis: Any, found: "Workspace", number: int, at: float, others: li
             axis.axline(place[others], place[others] + direction[others], color="tab:red", linewidth=0.8)
 
 
-def draw_solid(found: "Workspace", file: str | os.PathLike[str] | None) -> "Figure":
+def draw_solid(found: Cells, file: str | os.PathLike[str] | None) -> "Figure":
     """Outlines of layers across each axis in space; see `Workspace.plot_solid`."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import MaxNLocator
@@ -162,11 +159,10 @@ def draw_solid(found: "Workspace", file: str | os.PathLike[str] | None) -> "Figu
         getattr(axis, f"{name}axis").set_major_locator(MaxNLocator(parts))
     axis.set_box_aspect(high - low, zoom=0.9)  # with room for the labels
     axis.set_title(f"{found.volume:.3g} m³")
-    _finish(figure, file)
-    return figure
+    return finished(figure, file)
 
 
-def _outlines(axis: Any, found: "Workspace", number: int, colour: str) -> None:
+def _outlines(axis: Any, found: Cells, number: int, colour: str) -> None:
     """Outlines of some layers across one axis."""
     from contourpy import contour_generator
 
@@ -179,14 +175,3 @@ def _outlines(axis: Any, found: "Workspace", number: int, colour: str) -> None:
             points = np.empty((len(line), 3))
             points[:, number], points[:, others] = middles[number][layer], line
             axis.plot(*points.T, color=colour, linewidth=0.7)
-
-
-def _finish(figure: Any, file: str | os.PathLike[str] | None) -> None:
-    """Save a figure; without windows it belongs to its caller alone."""
-    import matplotlib.pyplot as plt
-
-    if file is not None:
-        with replacing(file) as partial:
-            figure.savefig(partial, dpi=150)
-    if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)

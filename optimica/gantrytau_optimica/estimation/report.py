@@ -67,8 +67,7 @@ def draw_fit(fit: "Estimate", file: Any):
     """One axis for every measured name (rows) and experiment (columns): dots measured, lines the model."""
     import matplotlib.pyplot as plt
 
-    from gantrytau.results.figures import has_windows
-    from gantrytau.results.files import replacing
+    from gantrytau.results.figures import finished
 
     names = list(dict.fromkeys(name for e in fit.experiments for name in e.measured))
     size = (4.5 * len(fit.experiments) + 1.5, 2.2 * len(names) + 0.8)
@@ -83,12 +82,7 @@ def draw_fit(fit: "Estimate", file: Any):
             if name in experiment.measured:
                 _one(fit, axes[row, column], column, name)
     figure.suptitle(f"{fit.name}: measured (dots) and model")
-    if file is not None:
-        with replacing(file) as partial:
-            figure.savefig(partial, dpi=150)
-    if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)
-    return figure
+    return finished(figure, file)
 
 
 def _label(fit: "Estimate", name: str) -> str:

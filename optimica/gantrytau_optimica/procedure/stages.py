@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 
 Record = TypeVar("Record")
 VERSION = "3"  # of what the stages compute; another one makes all anew

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau import ModelError
-from gantrytau.results.figures import has_windows
-from gantrytau.results.files import replacing
+from gantrytau.results.figures import finished
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,12 +44,7 @@ def draw(found: "TradeOff", file: str | os.PathLike[str] | None) -> "Figure":
         axis.margins(0.1)
         axis.grid(alpha=0.3)
     figure.suptitle(f"{found.name}: points labelled with their {found.weight}")
-    if file is not None:
-        with replacing(file) as partial:
-            figure.savefig(partial, dpi=150)
-    if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)  # there is no window: the figure belongs to its caller alone
-    return figure
+    return finished(figure, file)
 
 
 def _label(found: "TradeOff", name: str) -> str:

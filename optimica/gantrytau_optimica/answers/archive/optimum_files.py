@@ -20,8 +20,8 @@ from scipy import sparse
 
 from gantrytau import ModelError
 from gantrytau.language.symbols import split_derivative
-from gantrytau.results.files import replacing
 from gantrytau.simulation.to_result import labels
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.archive.run_record import hashes, plain, versions
 from gantrytau_optimica.answers.archive.saved import SavedOptimum, SavedPhase
 from gantrytau_optimica.answers.optimum import Optimum

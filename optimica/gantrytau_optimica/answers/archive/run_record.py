@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.problem.optimization import Optimization

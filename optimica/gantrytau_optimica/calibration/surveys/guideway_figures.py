@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.results.figures import check_suffix, has_windows
-from gantrytau.results.files import replacing
+from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +31,7 @@ def draw_errors(found: "Linearity", file: str | os.PathLike[str] | None) -> "Fig
         axis.set_ylabel(f"{name} [µm]")
     panels[0].legend(fontsize="small")
     panels[-1].set_xlabel("position of the cart [m]")
-    return saved(figure, file)
+    return finished(figure, file)
 
 
 def draw_backlash(found: "Linearity", file: str | os.PathLike[str] | None) -> "Figure":
@@ -54,7 +53,7 @@ def draw_backlash(found: "Linearity", file: str | os.PathLike[str] | None) -> "F
     axis.set_xlabel("position of the cart [m]")
     axis.set_ylabel("error along the axis [µm]")
     axis.legend(fontsize="small")
-    return saved(figure, file)
+    return finished(figure, file)
 
 
 def draw_spectrum(found: "Linearity", periods: np.ndarray, file: str | os.PathLike[str] | None) -> "Figure":
@@ -68,7 +67,7 @@ def draw_spectrum(found: "Linearity", periods: np.ndarray, file: str | os.PathLi
     axis.set_xlabel("period [mm]")
     axis.set_ylabel("amplitude [µm]")
     axis.legend(fontsize="small")
-    return saved(figure, file)
+    return finished(figure, file)
 
 
 def panels_of(
@@ -85,15 +84,3 @@ def panels_of(
     for axis in axes.flat:
         axis.grid(alpha=0.3)
     return figure, list(axes.flat)
-
-
-def saved(figure: "Figure", file: str | os.PathLike[str] | None) -> "Figure":
-    """The figure, written to its file if one is named."""
-    import matplotlib.pyplot as plt
-
-    if file is not None:
-        with replacing(file) as partial:
-            figure.savefig(partial, dpi=150)
-    if file is not None or not has_windows(plt.get_backend()):
-        plt.close(figure)  # there is no window: the figure belongs to its caller alone
-    return figure

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau_optimica.calibration.surveys.guideway_figures import MICRO, panels_of, saved
+from gantrytau.results.figures import finished
+from gantrytau_optimica.calibration.surveys.guideway_figures import MICRO, panels_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +35,7 @@ def draw_orientation(
         axis.set_ylabel(f"about {name} [0.001°]")
     panels[0].legend(fontsize="small")
     panels[-1].set_xlabel("pose, in the order along the guideways")
-    return saved(figure, file)
+    return finished(figure, file)
 
 
 def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[str] | None) -> "Figure":
@@ -70,7 +71,7 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
             )
     panels[0].set_ylabel(f"{axes[1]} [m]")
     figure.colorbar(drawn[0], ax=panels, label="error [µm]")
-    return saved(figure, file)
+    return finished(figure, file)
 
 
 def draw_sizes(found: "ErrorMap", file: str | os.PathLike[str] | None) -> "Figure":
@@ -85,4 +86,4 @@ def draw_sizes(found: "ErrorMap", file: str | os.PathLike[str] | None) -> "Figur
         right.hist(MICRO * components, bins="auto", histtype="step", label=f"axis {k + 1}")
     right.set_xlabel("component along a principal axis [µm]")
     right.legend(fontsize="small")
-    return saved(figure, file)
+    return finished(figure, file)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.kinematics.workspace.obstacles import Obstacle
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan

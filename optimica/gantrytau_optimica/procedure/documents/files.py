@@ -11,7 +11,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics import Limits
-from gantrytau.results.files import replacing
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, Cell
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
 from gantrytau_optimica.procedure.fleet import build_fleet
