@@ -2,7 +2,7 @@
 
 from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_optimum
 from gantrytau_optimica.answers.archive.run_record import compare_records, run_record, write_record
-from gantrytau_optimica.answers.archive.saved import MissingGuess, SavedOptimum
+from gantrytau_optimica.answers.archive.saved_optimum import MissingGuess, SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration

@@ -16,17 +16,17 @@ from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses, solution_given
-from gantrytau_optimica.problem.checking import one_point
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.reading import ReadProblem, read_problem
+from gantrytau_optimica.problem.problem_checks import one_point
+from gantrytau_optimica.problem.read_problem import SymbolicProblem, read_problem
 from gantrytau_optimica.refinement.refinement import with_ramps
-from gantrytau_optimica.solving.ipopt import Policy, Progress, Solver
+from gantrytau_optimica.solving.ipopt import Progress, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.transcription.program import check_freedom, transcribe
 from gantrytau_optimica.transcription.scheme import collocation
 from gantrytau_optimica.transcription.shooting import shoot
 
-Problem = Optimization | type[Optimization] | ReadProblem
+Problem = Optimization | type[Optimization] | SymbolicProblem
 
 
 def optimize(
@@ -68,7 +68,7 @@ def optimize(
     if record is not None:
         require_place(record)
     begun, clock = datetime.now(UTC), time.perf_counter()
-    read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
+    read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
     read_time = time.perf_counter() - clock
     found: Optimum | None = None
     try:
@@ -116,7 +116,7 @@ def prepare(
         raise ModelError(
             "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points"
         )
-    read = problem if isinstance(problem, ReadProblem) else read_problem(problem)
+    read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
     begin = time.perf_counter()
     near, guess = solution_given(guess), read_guesses(guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
@@ -130,7 +130,7 @@ def prepare(
         built = replace(built, problem=with_ramps(built.problem, meshes))
     program = shoot(built.problem, meshes, points) if shooting else transcribe(built.problem, meshes, grid)
     check_freedom(program)
-    policy = Policy(tolerance, max_iterations, max_time, progress)
+    policy = SolverSettings(tolerance, max_iterations, max_time, progress)
     return Prepared(
         built, program, Solver(program, policy), guess, time.perf_counter() - begin, refine, starts, near
     )

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
-from gantrytau_optimica.answers.archive.saved import SavedOptimum
+from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import Built, with_guesses
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit, Phase, Signal
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
-from gantrytau_optimica.problem.reading import ReadProblem
+from gantrytau_optimica.problem.read_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import searched
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
-from gantrytau_optimica.solving.carried import carried
 from gantrytau_optimica.solving.ipopt import Solver
+from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, share_of
 from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
@@ -126,7 +126,7 @@ class Prepared:
         close = Solver(program, replace(policy, near=True))
         found: list[Optimum] = []
         for branch in best.search.branches[:MOST_BRANCHES]:
-            nearby = carried(list(branch.optimum.phases.values()), program)
+            nearby = warm_start(list(branch.optimum.phases.values()), program)
             for one in (close, self.solver):
                 found.append(self._solved(built, program, one, nearby))
                 if found[-1].success or found[-1].status == "interrupted":
@@ -154,7 +154,7 @@ class Prepared:
         free = self._solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
             return optimum
-        again = self._solved(built, program, self.solver, carried(list(free.phases.values()), program))
+        again = self._solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
 
     def _coarse(self, built: Built) -> Program:
@@ -259,7 +259,7 @@ def solution_given(guess: Any) -> bool:
     return isinstance(guess, (Optimum, SavedOptimum))
 
 
-def read_guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:
+def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
     """Guesses by name, from those of the caller or from another solution. Raises ModelError for unknown names."""
     if isinstance(guess, (Result, Optimum)):
         return guess_of(guess, read.dae)
@@ -279,7 +279,7 @@ def read_guesses(guess: Any, read: ReadProblem) -> dict[str, Any]:
     return found
 
 
-def parameter_names(read: ReadProblem, name: str) -> tuple[str, ...]:
+def parameter_names(read: SymbolicProblem, name: str) -> tuple[str, ...]:
     """Scalar names of a parameter; ModelError if it is none."""
     elements = read.dae.expand(name)
     if elements[0] not in read.dae.table.symbols:

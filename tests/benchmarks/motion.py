@@ -7,7 +7,7 @@ from typing import Any
 
 from gantrytau.commands.app import motion_problems
 from gantrytau_optimica import optimize
-from gantrytau_optimica.problem.reading import read_problem
+from gantrytau_optimica.problem.read_problem import read_problem
 from tests.benchmarks import reference_collocation
 from tests.benchmarks.gta import Task
 from tests.benchmarks.table import Row, at_most, shown

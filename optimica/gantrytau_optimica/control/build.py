@@ -27,19 +27,19 @@ from gantrytau_optimica.control.guesses import first_guesses, horizon, number_gu
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, signal_limits, with_limits
 from gantrytau_optimica.problem.model_words import algebraic_words
 from gantrytau_optimica.problem.optimization import Point
-from gantrytau_optimica.problem.reading import Constraint, ReadProblem
+from gantrytau_optimica.problem.read_problem import ConstraintRow, SymbolicProblem
 
 
 @dataclass(frozen=True, eq=False)
 class Built:
     """The control problem, and what leads back from it to the model's names."""
 
-    read: ReadProblem
+    read: SymbolicProblem
     problem: ControlProblem
     system: System
     numbers: Mapping[str, float]  # parameters that are neither free nor held
     points: tuple[Point, ...]
-    constraints: tuple[Constraint, ...]
+    constraints: tuple[ConstraintRow, ...]
     closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
 
     def expressed(self, names: Sequence[str]) -> ca.SX:
@@ -63,7 +63,7 @@ class Built:
 
 
 def build(
-    read: ReadProblem,
+    read: SymbolicProblem,
     guess: Mapping[str, Any],
     held: Sequence[str] = (),
     controls: Mapping[str, Pieces] | None = None,
@@ -121,7 +121,7 @@ def build(
     return replace(built, problem=_with_sizes(with_guesses(built, guess)))
 
 
-def _check_courses(read: ReadProblem, number: int, phase: Phase) -> None:
+def _check_courses(read: SymbolicProblem, number: int, phase: Phase) -> None:
     """ModelError for samples of inputs that do not cover the phase or have gaps."""
     if not (phase.states and phase.start_time.is_constant() and phase.final_time.is_constant()):
         return  # without states nothing is needed between the samples; free times are refused where they are read
@@ -180,7 +180,7 @@ def _changed(draft: ControlProblem, change: Callable[[Phase, Signal], Signal]) -
 class _Split:
     """The system of equations split by phases."""
 
-    read: ReadProblem
+    read: SymbolicProblem
     system: System
     ode: ca.SX
     residuals: ca.SX
@@ -254,7 +254,7 @@ def _nominals(variable: FlatVariable, dae: Dae) -> list[tuple[str, float]]:
     return [(n, x) for n, x in zip(variable.elements, numbers, strict=True) if x > 0]
 
 
-def known(expressions: list[ca.SX], read: ReadProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
+def known(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
     """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
     old = [read.dae.table.symbols[n] for n in numbers]
     new = [ca.SX(x) for x in numbers.values()]
@@ -262,7 +262,7 @@ def known(expressions: list[ca.SX], read: ReadProblem, numbers: Mapping[str, flo
     return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
 
 
-def _with_courses(expressions: list[ca.SX], read: ReadProblem) -> list[ca.SX]:
+def _with_courses(expressions: list[ca.SX], read: SymbolicProblem) -> list[ca.SX]:
     """Inputs and their derivatives replaced by courses that are expressions of time."""
     courses = {name: course for name, course in read.courses.items() if isinstance(course, ca.SX)}
     if not courses or not expressions:
@@ -300,7 +300,7 @@ def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tu
     return tuple(found)
 
 
-def _declared_limits(dae: Dae) -> list[Constraint]:
+def _declared_limits(dae: Dae) -> list[ConstraintRow]:
     """Min and max of every variable of the model, eliminated ones included."""
     found = []
     for variable in dae.flat.variables:
@@ -309,7 +309,7 @@ def _declared_limits(dae: Dae) -> list[Constraint]:
         for k, (name, symbol) in enumerate(zip(variable.elements, variable.symbol.elements(), strict=True)):
             low = variable.min[k] if variable.min is not None else ca.SX(-ca.inf)
             high = variable.max[k] if variable.max is not None else ca.SX(ca.inf)
-            found.append(Constraint(symbol, low, high, f"limits of {name}"))
+            found.append(ConstraintRow(symbol, low, high, f"limits of {name}"))
     return found
 
 

@@ -11,16 +11,16 @@ from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import Course, Phase, SampleSum
 from gantrytau_optimica.control.guesses import derivative_symbol
 from gantrytau_optimica.problem.optimization import Point, Target
-from gantrytau_optimica.problem.reading import Constraint, ReadLink, ReadProblem
+from gantrytau_optimica.problem.read_problem import ConstraintRow, LinkedPaths, SymbolicProblem
 from gantrytau_optimica.problem.samples import Samples
 
-Conditions = tuple[list[Point], list[Constraint]]
+Conditions = tuple[list[Point], list[ConstraintRow]]
 
 
 def start_conditions(dae: Dae) -> Conditions:
     """Fixed starts and initial equations of the model, as conditions at the initial time."""
     points: list[Point] = []
-    found: list[Constraint] = []
+    found: list[ConstraintRow] = []
     for variable in dae.flat.variables:
         if not variable.fixed or variable.start is None:
             continue
@@ -29,19 +29,19 @@ def start_conditions(dae: Dae) -> Conditions:
         ):
             points.append(Point(ca.SX.sym(f"initial({name})"), symbol, "initial"))
             found.append(
-                Constraint(points[-1].symbol, value, value, f"initial({name}) == {value} (fixed start)")
+                ConstraintRow(points[-1].symbol, value, value, f"initial({name}) == {value} (fixed start)")
             )
     for equation in dae.flat.initial_equations:
         points.append(Point(ca.SX.sym(f"initial({equation.text})"), equation.residual, "initial"))
         zero = ca.SX(0)
-        found.append(Constraint(points[-1].symbol, zero, zero, f"initial equation {equation.text}"))
+        found.append(ConstraintRow(points[-1].symbol, zero, zero, f"initial equation {equation.text}"))
     return points, found
 
 
-def link_conditions(read: ReadProblem) -> Conditions:
+def link_conditions(read: SymbolicProblem) -> Conditions:
     """States of a phase that begin where those of the phase before end. ModelError for names that do not fit."""
     points: list[Point] = []
-    found: list[Constraint] = []
+    found: list[ConstraintRow] = []
     for link in read.links:
         jumping = _jumping(read, link)
         for state in read.dae.states:
@@ -60,16 +60,16 @@ def link_conditions(read: ReadProblem) -> Conditions:
                 Point(begin, read.dae.expression(state), "initial"),
             ]
             zero = ca.SX(0)
-            found.append(Constraint(begin - end, zero, zero, f"{state} begins where {before} ends"))
+            found.append(ConstraintRow(begin - end, zero, zero, f"{state} begins where {before} ends"))
         phases = {p.name: p for p in read.phases}
         if not phases[link.second].start_time.is_constant():
             gap = phases[link.second].start_time - phases[link.first].final_time
             zero = ca.SX(0)
-            found.append(Constraint(gap, zero, zero, f"{link.second} begins when {link.first} ends"))
+            found.append(ConstraintRow(gap, zero, zero, f"{link.second} begins when {link.first} ends"))
     return points, found
 
 
-def _jumping(read: ReadProblem, link: ReadLink) -> set[str]:
+def _jumping(read: SymbolicProblem, link: LinkedPaths) -> set[str]:
     states = {_key(read.dae, state) for state in read.dae.states}
     found = set()
     for name in link.jump:
@@ -90,7 +90,7 @@ def _key(dae: Dae, name: str) -> str:
 
 
 def with_targets(
-    read: ReadProblem, number: int, phase: Phase, expressions: Sequence[ca.SX], objective: ca.SX
+    read: SymbolicProblem, number: int, phase: Phase, expressions: Sequence[ca.SX], objective: ca.SX
 ) -> Phase:
     """The phase with the sums over samples and integrals of errors that the objective asks of it.
 
@@ -136,7 +136,7 @@ def _course(symbol: ca.SX, samples: Samples, column: int) -> Course:
     )
 
 
-def _horizon(read: ReadProblem, phase: Phase, target: Target) -> tuple[float, float]:
+def _horizon(read: SymbolicProblem, phase: Phase, target: Target) -> tuple[float, float]:
     if not (phase.start_time.is_constant() and phase.final_time.is_constant()):
         raise ModelError(
             f"{read.name}: {target.symbol} needs fixed times, found a free start or final time; give them as numbers"

@@ -8,12 +8,12 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.control.control_problem import Pieces
-from gantrytau_optimica.problem.reading import ReadProblem
+from gantrytau_optimica.problem.read_problem import SymbolicProblem
 
 KEYS = ("kind", "elements", "max_step", "step_penalty")
 
 
-def read_controls(read: ReadProblem, controls: Any) -> dict[str, Pieces]:
+def read_controls(read: SymbolicProblem, controls: Any) -> dict[str, Pieces]:
     """Pieces by scalar name from `{name: dict(kind=..., elements=..., max_step=..., step_penalty=...)}`."""
     if not isinstance(controls, Mapping):
         raise ModelError(

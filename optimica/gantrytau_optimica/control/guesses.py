@@ -12,7 +12,7 @@ from gantrytau import Dae, ModelError, Result
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
 from gantrytau_optimica.problem.optimization import Point
-from gantrytau_optimica.problem.reading import Constraint
+from gantrytau_optimica.problem.read_problem import ConstraintRow
 
 if TYPE_CHECKING:
     from gantrytau_optimica.answers.optimum import Optimum
@@ -188,7 +188,7 @@ def _times(source: "Result | Optimum", name: str) -> np.ndarray:
 
 
 def _ends(
-    dae: Dae, points: Sequence[Point], constraints: Sequence[Constraint], chosen: Mapping[str, float]
+    dae: Dae, points: Sequence[Point], constraints: Sequence[ConstraintRow], chosen: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
     """Values given at the start and at the end, by symbol; `chosen`: free and held numbers."""
     meaning = {

@@ -8,10 +8,12 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
-from gantrytau_optimica.problem.reading import Constraint
+from gantrytau_optimica.problem.read_problem import ConstraintRow
 
 
-def limit_rows(constraint: Constraint, expression: ca.SX, low: ca.SX, high: ca.SX, name: str) -> list[Limit]:
+def limit_rows(
+    constraint: ConstraintRow, expression: ca.SX, low: ca.SX, high: ca.SX, name: str
+) -> list[Limit]:
     """A constraint with numbers as limits; a limit that varies is brought to the other side.
 
     expression, low, high: those of the constraint in the symbols of the control problem.

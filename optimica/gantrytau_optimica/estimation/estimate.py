@@ -19,14 +19,18 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import Built, build
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase
+from gantrytau_optimica.estimation.collinear_parameters import (
+    LocalSlopes,
+    indistinguishable,
+    without_influence,
+)
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_times
 from gantrytau_optimica.estimation.experiments import Experiment, named
 from gantrytau_optimica.estimation.mesh_shift import mesh_shift
-from gantrytau_optimica.estimation.sensitivity import Residuals, check_determined, residuals
-from gantrytau_optimica.estimation.told_apart import Point, told_apart, without_influence
+from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
 from gantrytau_optimica.optimize import Prepared
-from gantrytau_optimica.solving.ipopt import Policy, Progress, Solver
+from gantrytau_optimica.solving.ipopt import Progress, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.transcription.program import transcribe
 from gantrytau_optimica.transcription.scheme import Collocation, collocation
@@ -73,7 +77,7 @@ def estimate(
     program = transcribe(built.problem, meshes, grid)
     found = residuals(program)
     check_determined(found, _without_start(read))
-    policy = Policy(tolerance, max_iterations, max_time, progress)
+    policy = SolverSettings(tolerance, max_iterations, max_time, progress)
     optimum = Prepared(built, program, Solver(program, policy), {}, time.perf_counter() - begin).solve()
     weights = np.ones(sum(found.sizes))
     if loss == "robust":
@@ -167,7 +171,7 @@ def _without_start(read: Plan) -> dict[str, list[str]]:
 def _robust(
     optimum: Optimum,
     found: Residuals,
-    policy: Policy,
+    policy: SolverSettings,
     grid: Collocation,
     meshes: Sequence[Mesh],
     known: bool,
@@ -242,24 +246,24 @@ def _refuse_lost(
     names = [found.program.problem.free[k].name for k in inner]
     values = w[free][inner]
     sizes = np.array([max(abs(v), 1e-3 * size[n]) for n, v in zip(names, values, strict=True)])
-    point = Point(slopes, values)
+    point = LocalSlopes(slopes, values)
     if not inner:
         return
     silent = without_influence(point, sizes, measured)
     kept = [k for k in range(len(inner)) if k not in silent]
 
-    def elsewhere() -> Point | None:
+    def elsewhere() -> LocalSlopes | None:
         numbers = w[free].copy()
         numbers[inner] += sizes * 0.1 * (1 + np.arange(len(inner)) / len(inner))
         moved = found.on_manifold(w, numbers)
         if moved is None:
             return None
-        return Point(found.jacobian(moved)[:, inner][:, kept], moved[free][inner][kept])
+        return LocalSlopes(found.jacobian(moved)[:, inner][:, kept], moved[free][inner][kept])
 
     words = [f"{names[k]} has no influence on what was measured" for k in silent]
     if kept:
-        words += told_apart(
-            [names[k] for k in kept], Point(slopes[:, kept], values[kept]), sizes[kept], elsewhere
+        words += indistinguishable(
+            [names[k] for k in kept], LocalSlopes(slopes[:, kept], values[kept]), sizes[kept], elsewhere
         )
     if words:
         remedy = "Leave it out" if len(words) == len(silent) == 1 else "Take one of each as known"

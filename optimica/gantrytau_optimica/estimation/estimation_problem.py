@@ -18,9 +18,9 @@ from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariab
 from gantrytau.language.model import Declared
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.estimation.experiments import Experiment, is_free
-from gantrytau_optimica.problem.checking import static
 from gantrytau_optimica.problem.optimization import Free, Optimization, sum_of_squares
-from gantrytau_optimica.problem.reading import ReadProblem, read_problem
+from gantrytau_optimica.problem.problem_checks import static
+from gantrytau_optimica.problem.read_problem import SymbolicProblem, read_problem
 from gantrytau_optimica.problem.samples import Samples
 
 PART = re.compile(r"([A-Za-z_]\w*)((?:\[\d+(?:, ?\d+)*\])?)")
@@ -46,7 +46,7 @@ class Estimated:
 class Plan:
     """The problem that was read, and the numbers to be estimated in the order of the answer."""
 
-    read: ReadProblem
+    read: SymbolicProblem
     numbers: tuple[Estimated, ...]
     experiments: tuple[Experiment, ...]
     static: bool
@@ -175,10 +175,10 @@ class _Change:
             if full != one.name and full not in one.elements:
                 continue
             if isinstance(one, FlatParameter) != (which == "parameters"):
-                told = "a parameter, expected it in parameters" if isinstance(one, FlatParameter) else (
+                kind = "a parameter, expected it in parameters" if isinstance(one, FlatParameter) else (
                     "a variable, expected a parameter; an initial value belongs in start of its Experiment"
                 )  # fmt: skip
-                raise ModelError(f"{self.model}: {which}: {name} is {told}")
+                raise ModelError(f"{self.model}: {which}: {name} is {kind}")
             return one.name, list(range(len(one.elements))) if full == one.name else [
                 one.elements.index(full)
             ]
@@ -292,7 +292,7 @@ def _declared(quantity: FlatVariable, k: int) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def _check_inputs(read: ReadProblem, experiments: Sequence[Experiment]) -> None:
+def _check_inputs(read: SymbolicProblem, experiments: Sequence[Experiment]) -> None:
     """ModelError for inputs that are not known, or not everywhere."""
     missing = [n for n in read.dae.inputs if n not in read.courses]
     if missing:
@@ -306,7 +306,7 @@ def _check_inputs(read: ReadProblem, experiments: Sequence[Experiment]) -> None:
                 value.require(f"{experiment.name}, input {name}", *experiment.horizon, between=True)
 
 
-def _as_rows(read: ReadProblem, experiments: Sequence[Experiment]) -> ReadProblem:
+def _as_rows(read: SymbolicProblem, experiments: Sequence[Experiment]) -> SymbolicProblem:
     """A static problem: every sample is a row of its own, at which the inputs have the values of that row."""
     phases, courses = [], dict(read.courses)
     for phase, experiment in zip(read.phases, experiments, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.estimation.sensitivity import residuals
+from gantrytau_optimica.estimation.residuals import residuals
 from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import transcribe

@@ -98,9 +98,9 @@ def relax(built: Built, program: Program, solution: Solution, seconds: float = 5
     # one condition is easier to discuss than several, unless these are clearly cheaper
     ways = [way for way in ways if way in alone or not alone or price(way) < 0.9 * min(map(price, alone))]
     ways.sort(key=lambda way: (len(way.which), price(way)))
-    told = [_told(built, program, softs, way) for way in ways]
+    conceded = [_concessions(built, program, softs, way) for way in ways]
     longer = _other_duration(program, w, end)
-    return Relaxed((*told, *([(longer,)] if longer else [])), True, unsolved)
+    return Relaxed((*conceded, *([(longer,)] if longer else [])), True, unsolved)
 
 
 def _other_duration(program: Program, w: np.ndarray, end: float) -> Concession | None:
@@ -148,7 +148,7 @@ class _Way:
     w: np.ndarray
 
 
-def _told(built: Built, program: Program, softs: Sequence[Soft], way: _Way) -> tuple[Concession, ...]:
+def _concessions(built: Built, program: Program, softs: Sequence[Soft], way: _Way) -> tuple[Concession, ...]:
     numbers = way.w[program.places.free]
     phases = [Trajectory(program.problem, layout, way.w, numbers) for layout in program.places.layouts]
     units = Meanings(built, program, phases).units

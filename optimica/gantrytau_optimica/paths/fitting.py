@@ -35,7 +35,7 @@ HERMITE = np.linalg.inv(
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class PiecewisePolynomial:
     """Polynomials over the arc length: place = sum of coefficients[i, j] * (s - knots[i])**j on piece i.
 
     knots: (n + 1,) in m, from 0; coefficients: (n, degree + 1, d).
@@ -54,24 +54,26 @@ class Pieces:
             found = found * x + factor * self.coefficients[index, j]
         return found
 
-    def between(self, start: float, stop: float) -> "Pieces":
+    def between(self, start: float, stop: float) -> "PiecewisePolynomial":
         """The part from one length to another, exactly."""
         inside = self.knots[(self.knots > start + 1e-12) & (self.knots < stop - 1e-12)]
         begins = np.concatenate([[start], inside])
         orders = range(self.coefficients.shape[1])
         factorials = np.cumprod([1.0, *np.arange(1.0, len(orders))])
         taylor = [self.derivative(begins, j) / factorials[j] for j in orders]
-        return Pieces(np.append(begins, stop) - start, np.stack(taylor, axis=1))
+        return PiecewisePolynomial(np.append(begins, stop) - start, np.stack(taylor, axis=1))
 
 
-def joined(parts: Sequence[Pieces]) -> Pieces:
+def joined(parts: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     """One after another."""
     offsets = np.cumsum([0.0, *(part.knots[-1] for part in parts)])
     knots = [part.knots[1:] + offset for part, offset in zip(parts, offsets, strict=False)]
-    return Pieces(np.concatenate([[0.0], *knots]), np.concatenate([part.coefficients for part in parts]))
+    return PiecewisePolynomial(
+        np.concatenate([[0.0], *knots]), np.concatenate([part.coefficients for part in parts])
+    )
 
 
-def continued(pieces: Pieces) -> Pieces:
+def continued(pieces: PiecewisePolynomial) -> PiecewisePolynomial:
     """The same with a straight piece at each end, for iterations that stray; it takes over only a little beyond the
     end, where a motion that ends to within rounding errors never is.
     """
@@ -86,7 +88,7 @@ def continued(pieces: Pieces) -> Pieces:
     inside = np.concatenate([first, pieces.coefficients[1:]])
     # the straight piece before the beginning counts from where it takes over, too
     outside[0, 0] -= outside[0, 1] * beyond
-    return Pieces(
+    return PiecewisePolynomial(
         np.concatenate([[ends[0] - beyond, ends[0]], knots[1:-1], [ends[1], ends[1] + beyond]]),
         np.concatenate([outside[:1], inside, outside[1:]]),
     )
@@ -102,15 +104,15 @@ class Curve:
     breaks: Array
 
 
-def line(start: Array, stop: Array) -> Pieces:
+def line(start: Array, stop: Array) -> PiecewisePolynomial:
     """The straight line between two places, one piece."""
     length = float(np.linalg.norm(stop - start))
     coefficients = np.zeros((1, 6, len(start)))
     coefficients[0, 0], coefficients[0, 1] = start, (stop - start) / length
-    return Pieces(np.array([0.0, length]), coefficients)
+    return PiecewisePolynomial(np.array([0.0, length]), coefficients)
 
 
-def by_length(curve: Curve, accuracy: float, name: str) -> Pieces:
+def by_length(curve: Curve, accuracy: float, name: str) -> PiecewisePolynomial:
     """A curve as pieces over its length, nowhere further from it than `accuracy` in m. ModelError for kinks."""
     spans = [(a, b, 0) for a, b in zip(curve.breaks[-2::-1], curve.breaks[:0:-1], strict=True)]
     lengths, coefficients = [0.0], []
@@ -129,7 +131,7 @@ def by_length(curve: Curve, accuracy: float, name: str) -> Pieces:
         else:
             middle = (a + b) / 2
             spans += [(middle, b, depth + 1), (a, middle, depth + 1)]
-    return Pieces(np.cumsum(lengths), np.array(coefficients))
+    return PiecewisePolynomial(np.cumsum(lengths), np.array(coefficients))
 
 
 def _piece(curve: Curve, a: float, b: float, name: str) -> tuple[float, Array, float]:
@@ -172,8 +174,8 @@ def spline(points: Array, start: Array | None, end: Array | None, closed: bool) 
 
 
 def rounded(
-    arcs: Sequence[Pieces], blend: float, accuracy: float, name: str
-) -> tuple[Pieces, list[float], list[float]]:
+    arcs: Sequence[PiecewisePolynomial], blend: float, accuracy: float, name: str
+) -> tuple[PiecewisePolynomial, list[float], list[float]]:
     """Arcs joined by quintics that cut the corners between them, no further from them than `blend` in m.
 
     Also where the middle of each rounding is and how far it is from the corner, in m.
@@ -195,7 +197,9 @@ def rounded(
     return joined(parts), places, gaps
 
 
-def _cut(before: Pieces, after: Pieces, blend: float, room: float) -> tuple[float, Curve, float]:
+def _cut(
+    before: PiecewisePolynomial, after: PiecewisePolynomial, blend: float, room: float
+) -> tuple[float, Curve, float]:
     """How much of two arcs a rounding of their corner replaces, the rounding, its distance from the corner, in m."""
     corner = after.derivative(np.array([0.0]))[0]
 
@@ -214,7 +218,7 @@ def _cut(before: Pieces, after: Pieces, blend: float, room: float) -> tuple[floa
     return high, *at(high)
 
 
-def _rounding(before: Pieces, after: Pieces, cut: float) -> Curve:
+def _rounding(before: PiecewisePolynomial, after: PiecewisePolynomial, cut: float) -> Curve:
     """The quintic from `cut` before a corner to `cut` behind it, with the tangents and curvatures there."""
     # between straight lines this speed puts the two inner control points into the corner: evenly rising curvature
     speed = 2.5 * cut
@@ -231,7 +235,7 @@ def _rounding(before: Pieces, after: Pieces, cut: float) -> Curve:
     )
 
 
-def nearest(pieces: Pieces, points: Array, near: Array | None = None) -> Array:
+def nearest(pieces: PiecewisePolynomial, points: Array, near: Array | None = None) -> Array:
     """The length in m at which a path is nearest to each of the points (n, d); `near`: where to look."""
     from scipy.spatial import KDTree
 

@@ -29,7 +29,7 @@ from gantrytau.language.declarations import Formula
 from gantrytau_optimica.paths.fitting import (
     Array,
     Curve,
-    Pieces,
+    PiecewisePolynomial,
     by_length,
     continued,
     line,
@@ -95,7 +95,7 @@ class Path:
     place, tangent and curvature; corners: those that were rounded; deviation: of a recording, else None.
     """
 
-    pieces: Pieces
+    pieces: PiecewisePolynomial
     corners: tuple[Corner, ...] = ()
     deviation: Deviation | None = None
 
@@ -218,7 +218,7 @@ class Path:
     def _rounded(
         cls,
         name: str,
-        arcs: list[Pieces],
+        arcs: list[PiecewisePolynomial],
         points: Array,
         rows: Sequence[int],
         angles: Array,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gantrytau import ModelError
-from gantrytau_optimica.paths.fitting import Array, Curve, Pieces, by_length, nearest
+from gantrytau_optimica.paths.fitting import Array, Curve, PiecewisePolynomial, by_length, nearest
 from gantrytau_optimica.paths.points import SHARP
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ STRAY = (
 class Smoothed:
     """A recording as a path; what is said of it: see Deviation. left_out: rows that were not followed."""
 
-    pieces: Pieces
+    pieces: PiecewisePolynomial
     largest: float
     rms: float
     row: int
@@ -86,7 +86,7 @@ def smoothed(points: Array, tolerance: float | None, accuracy: float, name: str)
         )
     along = _first_lengths(kept, thinned(kept, float(np.clip(6 * noise, 1e-3 * extent, 0.05 * extent))))
     finest = max(FINEST * noise, 1e-3 * extent)
-    pieces, fits = Pieces(np.zeros(0), np.zeros(0)), True
+    pieces, fits = PiecewisePolynomial(np.zeros(0), np.zeros(0)), True
     # the first pass follows lengths that the noise falsifies: it only has to lead close enough
     for _ in range(PASSES):
         found, fits = _fit(kept, along, tolerance, finest)

@@ -99,7 +99,7 @@ class Target:
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class PhaseLink:
     """The second phase begins where the first ends, but for the variables that jump."""
 
     first: Optimization
@@ -129,7 +129,7 @@ def reading() -> Iterator[Asked]:
         _asked.reset(token)
 
 
-def link(first: Optimization, second: Optimization, *, jump: Sequence[str] = ()) -> Link:
+def link(first: Optimization, second: Optimization, *, jump: Sequence[str] = ()) -> PhaseLink:
     """`yield link(self.out, self.back)`: all states of the second phase begin where the first ends.
 
     jump: names within the phase that do not, as "ball.v" after a contact. A free start time of the second phase
@@ -140,7 +140,7 @@ def link(first: Optimization, second: Optimization, *, jump: Sequence[str] = ())
             raise ModelError(f"link: found {which!r}, expected two phases: components that are Optimizations")
     if isinstance(jump, str):
         raise ModelError(f"link: found jump='{jump}', expected a list of names; write ['{jump}']")
-    return Link(first, second, tuple(jump))
+    return PhaseLink(first, second, tuple(jump))
 
 
 def sum_of_squares(expression: Any, samples: Samples) -> ca.SX:

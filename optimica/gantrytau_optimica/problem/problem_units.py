@@ -16,7 +16,7 @@ from gantrytau.language.symbols import time
 from gantrytau_optimica.problem.optimization import Point
 
 if TYPE_CHECKING:
-    from gantrytau_optimica.problem.reading import Constraint
+    from gantrytau_optimica.problem.read_problem import ConstraintRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,10 @@ class _Sides(Equation):
 
 
 def check_problem_units(
-    flat: FlatModel, constraints: Sequence["Constraint"], points: Sequence[Point], times: Mapping[str, ca.SX]
+    flat: FlatModel,
+    constraints: Sequence["ConstraintRow"],
+    points: Sequence[Point],
+    times: Mapping[str, ca.SX],
 ) -> None:
     """ModelError for terms or sides whose units disagree. A value at a time has the unit of its variable."""
     pairs = [(value, time, place) for place, value in times.items()]

@@ -19,7 +19,7 @@ WAVES = 3  # half waves in the deviation of a guess
 
 
 @dataclass(frozen=True)
-class Branch:
+class SolutionBranch:
     """Solutions with the same objective: how many first guesses led there, and the best of them."""
 
     objective: float
@@ -36,7 +36,7 @@ class Search:
     """All branches, the best first, and how many guesses did not lead to a solution."""
 
     starts: int
-    branches: tuple[Branch, ...]
+    branches: tuple[SolutionBranch, ...]
     failures: int
 
     def __str__(self) -> str:
@@ -61,14 +61,14 @@ def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: i
     found = sorted((o for o in tried if o.success), key=lambda o: o.objective)
     if not found:
         return tried[0]
-    branches: list[Branch] = []
+    branches: list[SolutionBranch] = []
     for optimum in found:
         if branches and optimum.objective - branches[-1].objective <= SAME * max(
             abs(optimum.objective), 1e-9
         ):
             branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
         else:
-            branches.append(Branch(optimum.objective, 1, optimum))
+            branches.append(SolutionBranch(optimum.objective, 1, optimum))
     return replace(found[0], search=Search(starts, tuple(branches), len(tried) - len(found)))
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.answers.playback.switching import Switch
-from gantrytau_optimica.answers.playback.switching import switches as switches_of
+from gantrytau_optimica.answers.playback.switches import Switch
+from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
-from gantrytau_optimica.refinement.remeshing import better_mesh
-from gantrytau_optimica.solving.carried import carried
+from gantrytau_optimica.refinement.remesh import better_mesh
+from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import transcribe
 
@@ -136,7 +136,7 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     scheme = optimum.program.places.layouts[0].scheme
     program = transcribe(optimum.program.problem, meshes, scheme, located)
-    better = solve(program, carried(trajectories, program))
+    better = solve(program, warm_start(trajectories, program))
     return better if better.success else None
 
 

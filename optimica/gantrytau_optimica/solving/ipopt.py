@@ -62,7 +62,7 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class Policy:
+class SolverSettings:
     """How long and how closely Ipopt is to look: tolerance, iterations, s, and who is told."""
 
     tolerance: float = 1e-8
@@ -77,7 +77,7 @@ class Policy:
 class Solver:
     """Ipopt with exact derivatives for one program; may be called again with other numbers and guesses."""
 
-    def __init__(self, program: Program, policy: Policy):
+    def __init__(self, program: Program, policy: SolverSettings):
         assembled = program.assembled
         self.policy = policy
         self.watch = Watch(assembled.variables, assembled.rows, policy.progress)

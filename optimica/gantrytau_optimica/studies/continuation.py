@@ -17,7 +17,7 @@ FEASIBLE = 1e-6  # violation of scaled rows
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Continuation:
     """Optima by value of the parameter, in the order asked for, what failed, and what was noticed."""
 
     optima: dict[float, Optimum]
@@ -25,7 +25,7 @@ class Course:
     findings: tuple[str, ...]
 
 
-def follow(prepared: Prepared, name: str, values: Sequence[float]) -> Course:
+def follow(prepared: Prepared, name: str, values: Sequence[float]) -> Continuation:
     """Solve for all values of the held parameter `name`; Ctrl-C ends it, and what was found so far is kept."""
     found: dict[float, Optimum] = {}
     failures: dict[float, SolveError] = {}
@@ -44,7 +44,7 @@ def follow(prepared: Prepared, name: str, values: Sequence[float]) -> Course:
     ordered = {value: found[value] for value in values if value in found}
     if not stopped:
         findings += _onto_better(prepared, name, ordered)
-    return Course(ordered, failures, tuple(findings))
+    return Continuation(ordered, failures, tuple(findings))
 
 
 def _next(

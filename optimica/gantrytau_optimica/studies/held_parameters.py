@@ -9,7 +9,7 @@ from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import Built, build
 from gantrytau_optimica.control.control_problem import Signal
-from gantrytau_optimica.solving.ipopt import Policy, Solution, Solver
+from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
 from gantrytau_optimica.studies.kkt import stationarity
 from gantrytau_optimica.transcription.program import Program, transcribe
 
@@ -35,7 +35,7 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     w = np.concatenate([located, optimum.solution.w[len(values) :]])
     solution = _carried(program, new, optimum.solution, w)
     if solution is None:  # limits in which the parameters occur are rows of their own now
-        solution = Solver(new, Policy()).solve(new, w)
+        solution = Solver(new, SolverSettings()).solve(new, w)
     found = replace(optimum, built=built, program=new, solution=solution)
     if not found.success or abs(found.objective - optimum.objective) > SAME * max(
         1.0, abs(optimum.objective)

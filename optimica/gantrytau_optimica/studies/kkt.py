@@ -31,7 +31,7 @@ SINGULAR = 1e14  # condition number from which on nothing is left of 16 digits
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class ActiveSet:
     """Inequalities of unknowns or of rows: where they hold as equations, and where this cannot be told.
 
     weight: multiplier / distance, zero where there is no limit.
@@ -52,8 +52,8 @@ class Slopes:
 
     objective: np.ndarray
     unknowns: np.ndarray
-    bounds: Limits
-    rows: Limits
+    bounds: ActiveSet
+    rows: ActiveSet
     defined: bool
 
 
@@ -90,8 +90,8 @@ class _Binding:
 
     fixed: np.ndarray
     equal: np.ndarray
-    bounds: Limits
-    rows: Limits
+    bounds: ActiveSet
+    rows: ActiveSet
     exact: bool
 
 
@@ -137,7 +137,7 @@ def _derivatives(program: Program, w: np.ndarray, multipliers: np.ndarray) -> tu
 
 def _limits(
     value: np.ndarray, multiplier: np.ndarray, lower: np.ndarray, upper: np.ndarray, equal: np.ndarray, size: float
-) -> Limits:  # fmt: skip
+) -> ActiveSet:  # fmt: skip
     bound = np.where(multiplier > 0, upper, lower)
     limited = ~equal & np.isfinite(bound)
     distance = np.where(limited, np.abs(value - np.where(limited, bound, 0.0)), np.inf)
@@ -145,7 +145,7 @@ def _limits(
     weight = np.abs(multiplier) / distance
     relative = weight * np.maximum(1.0, np.abs(np.where(limited, bound, 0.0))) / (size or 1.0)
     weak = limited & (relative > 1 / CLEAR) & (relative < CLEAR)
-    return Limits(limited & (relative >= CLEAR), weak, np.where(limited, weight, 0.0))
+    return ActiveSet(limited & (relative >= CLEAR), weak, np.where(limited, weight, 0.0))
 
 
 def _solved(matrix: Any, right: np.ndarray, worst: float) -> np.ndarray | None:

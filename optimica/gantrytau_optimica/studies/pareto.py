@@ -13,7 +13,7 @@ from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Guesses, Prepared, Problem, prepare
 from gantrytau_optimica.solving.ipopt import Progress
-from gantrytau_optimica.studies.continuation import Course, follow
+from gantrytau_optimica.studies.continuation import Continuation, follow
 from gantrytau_optimica.studies.figures import draw, write
 
 if TYPE_CHECKING:
@@ -127,7 +127,11 @@ def pareto(
 
 
 def _recorded(
-    prepared: Prepared, weight: str, course: Course, asked: Mapping[str, Quantity], units: dict[str, str]
+    prepared: Prepared,
+    weight: str,
+    course: Continuation,
+    asked: Mapping[str, Quantity],
+    units: dict[str, str],
 ) -> TradeOff:
     found = list(course.optima)
     columns = {

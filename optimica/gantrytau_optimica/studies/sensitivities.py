@@ -12,7 +12,7 @@ from gantrytau import ModelError
 from gantrytau.compiler.translation import names
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.held_parameters import holding
-from gantrytau_optimica.studies.kkt import Limits, Slopes, slopes
+from gantrytau_optimica.studies.kkt import ActiveSet, Slopes, slopes
 from gantrytau_optimica.studies.signal_slopes import Movement
 
 PREDICTED = "predicted to first order, not solved"
@@ -54,7 +54,7 @@ class Sensitivities:
     @cached_property
     def weak(self) -> tuple[str, ...]:
         """Limits that bind without a multiplier, with their times: beyond them derivatives differ to both sides."""
-        return tuple(_told(self.optimum, self.slopes.bounds, self.slopes.rows))
+        return tuple(_weakly_binding(self.optimum, self.slopes.bounds, self.slopes.rows))
 
     def signal(self, name: str, parameter: str) -> Callable[[Any], np.ndarray]:
         """Derivative of a variable at a fixed time as a vectorised function of time (n,) -> (n,) or (n, k).
@@ -238,7 +238,7 @@ def _moved(optimum: Optimum, step: np.ndarray, change: float, held: Mapping[str,
     return replace(optimum, built=built, program=program, solution=moved)
 
 
-def _told(optimum: Optimum, bounds: Limits, rows: Limits) -> list[str]:
+def _weakly_binding(optimum: Optimum, bounds: ActiveSet, rows: ActiveSet) -> list[str]:
     """Weakly binding limits in the model's words, with the time of the first."""
     program, found = optimum.program, []
     for phase, layout in zip(optimum.phases.values(), program.places.layouts, strict=True):

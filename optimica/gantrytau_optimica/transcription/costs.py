@@ -6,12 +6,12 @@ from scipy import sparse
 
 from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
 from gantrytau_optimica.transcription.point_functions import running
-from gantrytau_optimica.transcription.sparse_assembly import Block
 
 
-def running_costs(places: Places, layout: Layout) -> list[Block]:
+def running_costs(places: Places, layout: Layout) -> list[Term]:
     """The integral of the integrand, and the penalties on steps of piecewise inputs."""
     found, phase = [], layout.phase
     if not phase.integrand.is_zero():
@@ -19,7 +19,7 @@ def running_costs(places: Places, layout: Layout) -> list[Block]:
         weights = np.tile(layout.scheme.weights, layout.mesh.elements)[None, :]
         element, place = layout.points
         found.append(
-            run.block(phase.integrand * run.horizon * run.width, element, place, sparse.csr_matrix(weights))
+            run.term(phase.integrand * run.horizon * run.width, element, place, sparse.csr_matrix(weights))
         )
     for signal, chain in layout.chains.items():
         pieces, size = phase.signals[signal].pieces, places.scale[chain[0]]
@@ -27,7 +27,7 @@ def running_costs(places: Places, layout: Layout) -> list[Block]:
             step = ca.SX.sym("step")
             weights = np.full((1, chain.size - 1), pieces.step_penalty * size**2)
             found.append(
-                Block(
+                Term(
                     step,
                     ca.SX(0, 1),
                     ca.SX(0, 1),
@@ -41,7 +41,7 @@ def running_costs(places: Places, layout: Layout) -> list[Block]:
 
 
 def without_sums(problem: ControlProblem) -> ca.SX:
-    """The objective less its sums over samples, which have blocks of their own."""
+    """The objective less its sums over samples, which have terms of their own."""
     symbols = list({s.symbol.element_hash(): s.symbol for s in problem.sums}.values())
     return (
         ca.substitute(problem.objective, ca.vertcat(*symbols), ca.SX.zeros(len(symbols), 1))
@@ -50,7 +50,7 @@ def without_sums(problem: ControlProblem) -> ca.SX:
     )
 
 
-def sample_sums(places: Places, layout: Layout) -> list[Block]:
+def sample_sums(places: Places, layout: Layout) -> list[Term]:
     """The sums over samples of a phase, a small function at every sample. Raises ModelError where borders move."""
     problem, found = places.problem, []
     if layout.phase.sums and layout.knots.size:
@@ -70,7 +70,7 @@ def sample_sums(places: Places, layout: Layout) -> list[Block]:
         error = ((one.expression - value) / deviation) ** 2
         weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
         known = np.vstack([one.values, one.deviations])
-        found.append(run.block(error, element, place, weights, extra=((value, deviation), known)))
+        found.append(run.term(error, element, place, weights, extra=((value, deviation), known)))
     return found
 
 

@@ -14,9 +14,9 @@ from scipy import sparse
 
 from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, PointValue
+from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.sparse_assembly import Block
 
 
 def signals(phase: Phase) -> ca.SX:
@@ -45,14 +45,14 @@ class Running:
         """Length of the phase in s."""
         return self.layout.phase.final_time - self.layout.phase.start_time
 
-    def block(
+    def term(
         self,
         values: ca.SX,
         element: np.ndarray,
         place: np.ndarray,
         scatter: Sparse,
         extra: tuple[Sequence[ca.SX], np.ndarray] | None = None,
-    ) -> Block:
+    ) -> Term:
         """`values` at places (N,) of elements; extra: symbols (c,) with values (c, N) known there."""
         problem, layout = self.places.problem, self.layout
         share = self.ends[0] + self.left + self.place * self.width
@@ -73,7 +73,7 @@ class Running:
         local = [signals(layout.phase), problem.numbers]
         if layout.knots.size:
             local += [self.left, self.right]
-        return Block(
+        return Term(
             ca.vertcat(*local), ca.SX(0, 1), ca.vertcat(*constants), values, np.vstack(known),
             self.places.gather(layout, element, place), scatter,
         )  # fmt: skip
@@ -156,9 +156,9 @@ def places_of_points(
     return found
 
 
-def single_block(
+def single_term(
     places: Places, where: Sequence[Place], expressions: Sequence[ca.SX], scatter: Sparse
-) -> Block:
+) -> Term:
     """Expressions of points and free numbers, once."""
     problem = places.problem
     column = ca.vertcat(*expressions)
@@ -184,7 +184,7 @@ def single_block(
     if old:
         column = ca.substitute(column, ca.vertcat(*old), ca.vertcat(*new))
     matrix = sparse.vstack(gather).tocsr()
-    return Block(
+    return Term(
         ca.vertcat(*local), ca.SX(0, 1), ca.SX(0, 1), ca.densify(column), np.zeros((0, 1)), matrix, scatter
     )
 

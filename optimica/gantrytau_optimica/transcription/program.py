@@ -12,7 +12,7 @@
     integral        sum over elements of h sum_j w_j L(t_j, ...)
 
 What happens at a point is one small function, evaluated and differentiated for all points at once; the rest is
-linear (see assembly). Nothing symbolic grows with the number of elements.
+linear (see assemble). Nothing symbolic grows with the number of elements.
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,7 @@ from scipy import sparse
 from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit, signal_limits
+from gantrytau_optimica.transcription.assemble import Assembled, Term, assemble
 from gantrytau_optimica.transcription.costs import differences, running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -35,10 +36,9 @@ from gantrytau_optimica.transcription.point_functions import (
     places_of_points,
     running,
     share_of,
-    single_block,
+    single_term,
 )
 from gantrytau_optimica.transcription.scheme import Collocation
-from gantrytau_optimica.transcription.sparse_assembly import Assembled, Block, assemble
 
 FEW = 1e-5  # of an element, by which a moving point may stand outside of it
 
@@ -137,7 +137,7 @@ def transcribe(
     free, borders = located or (np.array([n.guess for n in problem.free]), [m.borders for m in meshes])
     where = places_of_points(places, free, borders, inside_only=located is None)
     groups: list[Rows] = []
-    objective, blocks, linear = [], [], []
+    objective, terms, linear = [], [], []
     paths = [
         [limit for limit in phase.path_limits if bare_limit(limit, phase) is None] for phase in problem.phases
     ]
@@ -153,15 +153,15 @@ def transcribe(
     ]
     total = count + len(problem.boundary)
     for mine, layout, path in linear:
-        blocks.append(_point_block(places, layout, path, mine.start, total))
+        terms.append(_point_term(places, layout, path, mine.start, total))
         if layout.begin.size:
-            blocks.append(_begin_block(places, layout, mine.begin, total))
+            terms.append(_begin_term(places, layout, mine.begin, total))
         objective += running_costs(places, layout)
     if problem.boundary:
         rows = np.arange(count, total)
         scatter = sparse.csr_matrix((np.ones(rows.size), (rows, rows - count)), shape=(total, rows.size))
-        blocks.append(single_block(places, where, [limit.expression for limit in problem.boundary], scatter))
-    objective.append(single_block(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]])))
+        terms.append(single_term(places, where, [limit.expression for limit in problem.boundary], scatter))
+    objective.append(single_term(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]])))
     objective += [b for layout in places.layouts for b in sample_sums(places, layout)]
     matrix = sparse.vstack(
         [m for mine, _, _ in linear for m in mine.linear] + [sparse.csr_matrix((total - count, places.size))]
@@ -170,7 +170,7 @@ def transcribe(
     for group in groups:
         lower[group.rows], upper[group.rows] = group.lower / group.size, group.upper / group.size
     lbw, ubw = _bounds(places)
-    assembled = assemble(objective, blocks, matrix.tocsr(), 0)
+    assembled = assemble(objective, terms, matrix.tocsr(), 0)
     return Program(problem, places, assembled, tuple(groups), lbw, ubw, lower, upper, tuple(where))
 
 
@@ -258,7 +258,7 @@ def _stretches(places: Places, layout: Layout) -> tuple[Sparse, np.ndarray]:
     return matrix, offset
 
 
-def _point_block(places: Places, layout: Layout, path: list[Limit], start: int, total: int) -> Block:
+def _point_term(places: Places, layout: Layout, path: list[Limit], start: int, total: int) -> Term:
     phase, run = layout.phase, running(places, layout)
     slopes = phase.ode * (run.horizon * run.width)
     values = ca.vertcat(slopes, phase.residuals, *(limit.expression for limit in path))
@@ -268,18 +268,18 @@ def _point_block(places: Places, layout: Layout, path: list[Limit], start: int, 
     factor[:, : len(phase.states)] = -1.0 / np.array([s.nominal for s in phase.states])
     index = np.arange(factor.size)
     scatter = sparse.csr_matrix((factor.ravel(), (start + index, index)), shape=(total, index.size))
-    return run.block(values, element, place, scatter)
+    return run.term(values, element, place, scatter)
 
 
-def _begin_block(places: Places, layout: Layout, start: int, total: int) -> Block:
+def _begin_term(places: Places, layout: Layout, start: int, total: int) -> Term:
     """The equations of the algebraics at the start of a phase."""
     run, nx, nz = running(places, layout), len(layout.phase.states), layout.begin.size
     rows = np.arange(nz)
     scatter = sparse.csr_matrix((np.ones(nz), (start + rows, rows)), shape=(total, nz))
-    block = run.block(layout.phase.residuals, np.zeros(1, int), np.zeros(1), scatter)
+    term = run.term(layout.phase.residuals, np.zeros(1, int), np.zeros(1), scatter)
     exact = places.pick([rows], [layout.begin], [np.ones(nz)], nz)
-    gather = sparse.vstack([block.gather[:nx], exact, block.gather[nx + nz :]]).tocsr()
-    return replace(block, gather=gather)
+    gather = sparse.vstack([term.gather[:nx], exact, term.gather[nx + nz :]]).tocsr()
+    return replace(term, gather=gather)
 
 
 def _bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:

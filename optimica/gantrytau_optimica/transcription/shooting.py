@@ -27,10 +27,11 @@ from scipy import sparse
 from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit
+from gantrytau_optimica.transcription.assemble import Term, assemble
 from gantrytau_optimica.transcription.costs import running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_block
+from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_term
 from gantrytau_optimica.transcription.program import (
     Program,
     Rows,
@@ -38,7 +39,6 @@ from gantrytau_optimica.transcription.program import (
     _rows,
 )
 from gantrytau_optimica.transcription.scheme import Collocation
-from gantrytau_optimica.transcription.sparse_assembly import Block, assemble
 
 PLACES = np.array([0.0, 0.5, 0.5, 1.0])
 WEIGHTS = np.array([1.0, 2.0, 2.0, 1.0]) / 6
@@ -172,19 +172,19 @@ def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Colloca
         for row, limit in zip(boundary, problem.boundary, strict=True)
     ]
     linear.append(sparse.csr_matrix((boundary.size, places.size)))
-    blocks = [b for part in parts for b in _blocks(places, *part, total)]
+    terms = [b for part in parts for b in _terms(places, *part, total)]
     if problem.boundary:
         scatter = sparse.csr_matrix(
             (np.ones(boundary.size), (boundary, boundary - count)), shape=(total, boundary.size)
         )
-        blocks.append(single_block(places, where, [limit.expression for limit in problem.boundary], scatter))
-    objective = [single_block(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]]))]
+        terms.append(single_term(places, where, [limit.expression for limit in problem.boundary], scatter))
+    objective = [single_term(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]]))]
     objective += [b for layout, *_ in parts for b in _costs(places, layout)]
     lower, upper = np.zeros(total), np.zeros(total)
     for group in groups:
         lower[group.rows], upper[group.rows] = group.lower / group.size, group.upper / group.size
     lbw, ubw = _stage_bounds(places)
-    assembled = assemble(objective, blocks, sparse.vstack(linear).tocsr(), 0)
+    assembled = assemble(objective, terms, sparse.vstack(linear).tocsr(), 0)
     return Program(problem, places, assembled, tuple(groups), lbw, ubw, lower, upper, tuple(where))
 
 
@@ -248,9 +248,9 @@ def _path_groups(layout: ShootingLayout, number: int, path: list[Limit], start: 
     return [Rows("path", x.name, number, rows + i, moments, x.lower, x.upper) for i, x in enumerate(path)]
 
 
-def _blocks(
+def _terms(
     places: Places, layout: ShootingLayout, path: list[Limit], start: int, stop: int, total: int
-) -> list[Block]:
+) -> list[Term]:
     """The four stages of every step, and the limits at the starts of steps and at the end."""
     phase, n, found = layout.phase, layout.mesh.elements, []
     steps = np.arange(n)
@@ -262,7 +262,7 @@ def _blocks(
         factor = np.ones((n, values.numel()))
         factor[:, : len(phase.states)] = -1.0 / np.array([s.nominal for s in phase.states])
         rows = start + (4 * steps[:, None] + j) * values.numel() + np.arange(values.numel())
-        found.append(run.block(values, steps, np.full(n, place), _scatter(factor, rows, total)))
+        found.append(run.term(values, steps, np.full(n, place), _scatter(factor, rows, total)))
     if path:
         limits = ca.vertcat(*(limit.expression for limit in path))
         for one, element, place, border in (
@@ -271,7 +271,7 @@ def _blocks(
         ):
             rows = stop + len(path) * border[:, None] + np.arange(len(path))
             found.append(
-                running(places, one).block(limits, element, place, _scatter(np.ones(rows.shape), rows, total))
+                running(places, one).term(limits, element, place, _scatter(np.ones(rows.shape), rows, total))
             )
     return found
 
@@ -280,7 +280,7 @@ def _scatter(factor: np.ndarray, rows: np.ndarray, total: int) -> Sparse:
     return sparse.csr_matrix((factor.ravel(), (rows.ravel(), np.arange(rows.size))), shape=(total, rows.size))
 
 
-def _costs(places: Places, layout: ShootingLayout) -> list[Block]:
+def _costs(places: Places, layout: ShootingLayout) -> list[Term]:
     """The integral by the same method, penalties on steps of inputs, and sums over samples."""
     phase = layout.phase
     bare = replace(layout, phase=replace(phase, integrand=ca.SX(0)))
@@ -291,7 +291,7 @@ def _costs(places: Places, layout: ShootingLayout) -> list[Block]:
             run = running(places, layout.stage(j))
             scatter = sparse.csr_matrix(np.full((1, n), weight))
             cost = phase.integrand * run.horizon * run.width
-            found.append(run.block(cost, np.arange(n), np.full(n, place), scatter))
+            found.append(run.term(cost, np.arange(n), np.full(n, place), scatter))
     return found
 
 

@@ -13,7 +13,7 @@ import pytest
 from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der, exp
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize
 from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_optimum
-from gantrytau_optimica.answers.archive.saved import MissingGuess
+from gantrytau_optimica.answers.archive.saved_optimum import MissingGuess
 from tests.optimica.problems import FastestMass, FastestOscillator, Mass
 
 

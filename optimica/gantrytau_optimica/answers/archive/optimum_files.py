@@ -23,7 +23,7 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.archive.run_record import hashes, plain, versions
-from gantrytau_optimica.answers.archive.saved import SavedOptimum, SavedPhase
+from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum, SavedPhase
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.trajectory import Trajectory

@@ -19,7 +19,7 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.reading import ReadProblem
+from gantrytau_optimica.problem.read_problem import SymbolicProblem
 
 PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")
 DIGITS = 16  # of a hash: two different problems meet by chance in one of 10^19 pairs
@@ -46,7 +46,7 @@ def run_record(
         {
             "problem": _problem(optimum, problem),
             "parameters": _parameters(optimum),
-            "options": {k: _told(v) for k, v in sorted((options or {}).items())},
+            "options": {k: _as_given(v) for k, v in sorted((options or {}).items())},
             "transcription": [_transcription(phase) for phase in optimum.phases.values()],
             "unknowns": program.places.size,
             "conditions": program.assembled.rows,
@@ -210,7 +210,7 @@ def _between(optimum: Optimum) -> float | None:
     return float(optimum.playback.violation) if optimum.success and optimum.playback.complete else None
 
 
-def _equations(read: ReadProblem) -> Iterator[str]:
+def _equations(read: SymbolicProblem) -> Iterator[str]:
     """The flat model in lines: declarations without numbers, equations, initial equations."""
     flat = read.dae.flat
     for quantity in (*flat.variables, *flat.parameters):
@@ -221,7 +221,7 @@ def _equations(read: ReadProblem) -> Iterator[str]:
     yield f"known {', '.join(read.dae.inputs)}"
 
 
-def _statements(read: ReadProblem) -> Iterator[str]:
+def _statements(read: SymbolicProblem) -> Iterator[str]:
     """Objective, constraints, horizon and values in lines."""
     yield f"minimise {read.objective}"
     for phase in read.phases:
@@ -250,10 +250,10 @@ def _hash(content: str | bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
-def _told(value: Any) -> Any:
+def _as_given(value: Any) -> Any:
     """An option as it was given, long or living things by what they are."""
     if isinstance(value, Mapping):
-        return {str(k): _told(v) for k, v in value.items()}
+        return {str(k): _as_given(v) for k, v in value.items()}
     if isinstance(value, np.ndarray) and value.size > 32:
         return f"array of shape {value.shape}, hash {_hash(np.ascontiguousarray(value).tobytes())}"
     if callable(value):

@@ -17,20 +17,28 @@ from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.functions import Between
 from gantrytau.language.symbols import split_derivative, writing
 from gantrytau.simulation.signals import read_signals
-from gantrytau_optimica.problem.checking import (
+from gantrytau_optimica.problem.model_words import relation_text, told
+from gantrytau_optimica.problem.optimization import (
+    Free,
+    Optimization,
+    PhaseLink,
+    Point,
+    Target,
+    initial,
+    reading,
+)
+from gantrytau_optimica.problem.problem_checks import (
     check_constraints,
     check_objective,
     check_spelling,
     check_times,
 )
-from gantrytau_optimica.problem.model_words import relation_text, told
-from gantrytau_optimica.problem.optimization import Free, Link, Optimization, Point, Target, initial, reading
 from gantrytau_optimica.problem.problem_units import check_problem_units
 from gantrytau_optimica.problem.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)
-class Constraint:
+class ConstraintRow:
     """lower <= expression <= upper for one scalar, in the model's symbols.
 
     name: as it was written; place: where it was written; lower and upper of an equation are the same object.
@@ -44,7 +52,7 @@ class Constraint:
 
 
 @dataclass(frozen=True, eq=False)
-class ReadPhase:
+class SymbolicPhase:
     """A phase in the model's symbols; `name` is its path, "" where there is only one."""
 
     name: str
@@ -58,7 +66,7 @@ class ReadPhase:
 
 
 @dataclass(frozen=True, eq=False)
-class ReadLink:
+class LinkedPaths:
     """The paths of two phases of which the second begins where the first ends, and what jumps, with its path."""
 
     first: str
@@ -67,15 +75,15 @@ class ReadLink:
 
 
 @dataclass(frozen=True, eq=False)
-class ReadProblem:
+class SymbolicProblem:
     """A problem in the model's symbols. courses: inputs that the optimiser does not choose, by scalar name."""
 
     name: str
     dae: Dae
     objective: ca.SX
-    phases: tuple[ReadPhase, ...]
-    constraints: tuple[Constraint, ...]
-    links: tuple[ReadLink, ...]
+    phases: tuple[SymbolicPhase, ...]
+    constraints: tuple[ConstraintRow, ...]
+    links: tuple[LinkedPaths, ...]
     points: tuple[Point, ...]
     targets: tuple[Target, ...]
     courses: Mapping[str, ca.SX | tuple[Samples, int]]
@@ -98,7 +106,7 @@ class ReadProblem:
 
 def read_problem(
     problem: Optimization | type[Optimization], change: Callable[[FlatModel], FlatModel] | None = None
-) -> ReadProblem:
+) -> SymbolicProblem:
     """Read a problem class or instance. Raises ModelError with the place of what is written wrongly.
 
     change: applied to the model once it is written out, before it is translated.
@@ -128,7 +136,7 @@ def read_problem(
             raise ModelError(
                 f"{name}.integrand: found an integrand beside phases, expected none; write it in the phases"
             )
-    constraints = [*(c for c in found if isinstance(c, Constraint)), *starts]
+    constraints = [*(c for c in found if isinstance(c, ConstraintRow)), *starts]
     mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
@@ -136,8 +144,8 @@ def read_problem(
     check_constraints(constraints, asked.targets)
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
     dae = translate_flat(flat, given=_given(stages, flat), find=mentioned)
-    links = [_link(name, instance, phases, c) for c in found if isinstance(c, Link)]
-    read = ReadProblem(
+    links = [_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink)]
+    read = SymbolicProblem(
         name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
         _courses(name, stages, dae),
     )  # fmt: skip
@@ -146,7 +154,7 @@ def read_problem(
     return read
 
 
-def _link(name: str, instance: Instance, phases: Sequence[ReadPhase], link: Link) -> ReadLink:
+def _link(name: str, instance: Instance, phases: Sequence[SymbolicPhase], link: PhaseLink) -> LinkedPaths:
     """A link by paths. Raises ModelError for phases of another problem."""
     paths = [instance.paths.get(id(one)) for one in (link.first, link.second)]
     known = [phase.name for phase in phases]
@@ -157,7 +165,7 @@ def _link(name: str, instance: Instance, phases: Sequence[ReadPhase], link: Link
                 f"{', '.join(known) if known != [''] else 'its phases (there are none)'}; write self.name of the phase"
             )
     first, second = (str(path) for path in paths)
-    return ReadLink(first, second, tuple(f"{second}.{n}" for n in link.jump))
+    return LinkedPaths(first, second, tuple(f"{second}.{n}" for n in link.jump))
 
 
 def _place(name: str, path: str, which: str) -> str:
@@ -191,10 +199,10 @@ def _varies(placed: Placed) -> bool:
     return not isinstance(placed.declaration, Parameter)
 
 
-def _phase(name: str, path: str, one: Any) -> ReadPhase:
+def _phase(name: str, path: str, one: Any) -> SymbolicPhase:
     integrand = _scalar(_place(name, path, "integrand"), one.integrand)
     times = [_time(_place(name, path, which), getattr(one, which)) for which in ("start_time", "final_time")]
-    return ReadPhase(path, integrand, *times)
+    return SymbolicPhase(path, integrand, *times)
 
 
 def _given(stages: list[tuple[str, Any]], flat: FlatModel) -> tuple[str, ...]:
@@ -265,8 +273,8 @@ def _time(place: str, value: Any) -> ca.SX:
     return time
 
 
-def _constraints(where: str, problem: Any) -> list[Constraint | Link]:
-    found: list[Constraint | Link] = []
+def _constraints(where: str, problem: Any) -> list[ConstraintRow | PhaseLink]:
+    found: list[ConstraintRow | PhaseLink] = []
     statements = told(where, problem.constraints)
     if not isinstance(statements, Iterable) or isinstance(statements, (ca.SX, str)):
         raise ModelError(f"{where}: found {statements!r}, expected constraints; give each out with `yield`")
@@ -279,15 +287,15 @@ def _constraints(where: str, problem: Any) -> list[Constraint | Link]:
         statement = told(place, lambda: next(generator, end))
         if statement is end:
             return found
-        found += [statement] if isinstance(statement, Link) else _constraint(place, statement)
+        found += [statement] if isinstance(statement, PhaseLink) else _constraint(place, statement)
 
 
-def _constraint(place: str, statement: Any) -> list[Constraint]:
+def _constraint(place: str, statement: Any) -> list[ConstraintRow]:
     if isinstance(statement, Between):
         expression = ca.densify(ca.SX(statement.expression))
         limits = [_limit(place, bound, expression) for bound in (statement.lower, statement.upper)]
         rows = zip(expression.elements(), *(limit.elements() for limit in limits), strict=True)
-        return [Constraint(e, low, high, f"{low} <= {e} <= {high}", place) for e, low, high in rows]
+        return [ConstraintRow(e, low, high, f"{low} <= {e} <= {high}", place) for e, low, high in rows]
     if isinstance(statement, (bool, ca.DM)) or (isinstance(statement, ca.SX) and statement.is_constant()):
         raise ModelError(
             f"{place}: found {statement}, expected a constraint; both sides were compared at once because there is "
@@ -298,7 +306,7 @@ def _constraint(place: str, statement: Any) -> list[Constraint]:
             f"{place}: found {statement!r}, expected a constraint; write `a == b`, `a <= b` or between(a, x, b) "
             "with symbols of the model, one by one or joined by casadi.vertcat(*list)"
         )
-    found: list[Constraint] = []
+    found: list[ConstraintRow] = []
     for element in ca.densify(statement).elements():
         equal = element.is_op(ca.OP_EQ)
         if element.is_constant() and float(element) != 0.0:
@@ -311,9 +319,9 @@ def _constraint(place: str, statement: Any) -> list[Constraint]:
         text = relation_text(left, right, "==" if equal else "<=")
         infinity = ca.SX(ca.inf)
         if left.is_constant():
-            found.append(Constraint(right, left, left if equal else infinity, text, place))
+            found.append(ConstraintRow(right, left, left if equal else infinity, text, place))
         else:
-            found.append(Constraint(left, right if equal else -infinity, right, text, place))
+            found.append(ConstraintRow(left, right if equal else -infinity, right, text, place))
     return found
 
 
@@ -330,9 +338,9 @@ def _limit(place: str, bound: Any, expression: ca.SX) -> ca.SX:
     return bound
 
 
-def _free_starts(flat: FlatModel, instance: Instance) -> tuple[FlatModel, list[Constraint]]:
+def _free_starts(flat: FlatModel, instance: Instance) -> tuple[FlatModel, list[ConstraintRow]]:
     """Starts given as `Start(Free(...))` or `Fixed(Free(...))`: not fixed, within the limits of the Free."""
-    found: list[Constraint] = []
+    found: list[ConstraintRow] = []
     released: set[str] = set()
     for placed in instance.quantities:
         leaf = placed.attributes.get("start")
@@ -346,6 +354,6 @@ def _free_starts(flat: FlatModel, instance: Instance) -> tuple[FlatModel, list[C
         high = ca.SX.inf() if leaf.value.max is None else ca.SX(leaf.value.max)
         point = initial(placed.symbol)
         name = f"limits of the start of {placed.name}"
-        found += [Constraint(e, low, high, name) for e in point.elements()]
+        found += [ConstraintRow(e, low, high, name) for e in point.elements()]
     variables = tuple(replace(v, fixed=False) if v.name in released else v for v in flat.variables)
     return replace(flat, variables=variables), found

@@ -1,10 +1,10 @@
 """Many copies of a small function, summed into one nonlinear program with exact sparse derivatives.
 
-A block evaluates `values(local, parameters, constants)` for N columns of local variables. It is tied to the
+A term evaluates `values(local, parameters, constants)` for N columns of local variables. It is tied to the
 program by two constant sparse matrices:
 
     local = gather w              w: variables of the program, (n,); local: (m N,)
-    g     = linear w + sum over the blocks of scatter values
+    g     = linear w + sum over the terms of scatter values
 
 Hence the nonzeros of Jacobian and Hessian are linear in the nonzeros of the small functions' derivatives,
 and the matrices of these relations are computed once. Nothing is differentiated at the size of the program.
@@ -24,11 +24,11 @@ from scipy import sparse
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Sparse = Any  # a matrix of scipy.sparse
-Entries = tuple[Indices, Indices, Indices, Array]  # row, column, number of the nonzero in its block, factor
+Entries = tuple[Indices, Indices, Indices, Array]  # row, column, number of the nonzero in its term, factor
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class Term:
     """N copies of a small function, and where they stand in the program."""
 
     local: ca.SX  # (m,)
@@ -77,19 +77,17 @@ class Assembled:
 
 
 def assemble(
-    objective: Sequence[Block], constraints: Sequence[Block], linear: Sparse, parameters: int
+    objective: Sequence[Term], constraints: Sequence[Term], linear: Sparse, parameters: int
 ) -> Assembled:
-    """The program: minimise the objective blocks' sum; the rows are linear w + the constraint blocks' sum."""
+    """The program: minimise the objective terms' sum; the rows are linear w + the constraint terms' sum."""
     rows, n = linear.shape
     w, p = ca.MX.sym("x", n), ca.MX.sym("p", parameters)
-    f = sum((_values(block, w, p) for block in objective), ca.MX(0))
-    g = sum((_values(block, w, p) for block in constraints), ca.mtimes(_dm(linear), w))
+    f = sum((_values(term, w, p) for term in objective), ca.MX(0))
+    g = sum((_values(term, w, p) for term in constraints), ca.mtimes(_dm(linear), w))
     gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
     jacobian = _jacobian(constraints, linear, w, p)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    hessian = _hessian(
-        [(block, lam_f) for block in objective] + [(block, lam_g) for block in constraints], w, p
-    )
+    hessian = _hessian([(term, lam_f) for term in objective] + [(term, lam_g) for term in constraints], w, p)
     # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
     return Assembled(
         nlp=ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"]),
@@ -109,44 +107,44 @@ def assemble(
     )
 
 
-def _values(block: Block, w: ca.MX, p: ca.MX) -> ca.MX:
-    return ca.mtimes(_dm(block.scatter), block.call("values", block.values, w, p))
+def _values(term: Term, w: ca.MX, p: ca.MX) -> ca.MX:
+    return ca.mtimes(_dm(term.scatter), term.call("values", term.values, w, p))
 
 
-def _jacobian(blocks: Sequence[Block], linear: Sparse, w: ca.MX, p: ca.MX) -> ca.MX:
+def _jacobian(terms: Sequence[Term], linear: Sparse, w: ca.MX, p: ca.MX) -> ca.MX:
     """Jacobian of the rows: nonzeros of the small Jacobians times their scatter and gather factors."""
     nonzeros, entries = [], []
-    for block in blocks:
-        small = ca.jacobian(block.values, block.local)
+    for term in terms:
+        small = ca.jacobian(term.values, term.local)
         if small.nnz() == 0:
             continue
-        nonzeros.append(block.call("jacobian", small.nz[:], w, p))
+        nonzeros.append(term.call("jacobian", small.nz[:], w, p))
         row, column = (np.array(part) for part in small.sparsity().get_triplet())
-        copy = np.arange(block.copies)[:, None]
-        source, rows, up = _expand(block.scatter.tocsc(), (copy * block.values.numel() + row).ravel())
-        inner, columns, down = _expand(block.gather, (copy * block.local.numel() + column).ravel()[source])
+        copy = np.arange(term.copies)[:, None]
+        source, rows, up = _expand(term.scatter.tocsc(), (copy * term.values.numel() + row).ravel())
+        inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
         entries.append((rows[inner], columns, source[inner], up[inner] * down))
     return _sum_into(entries, nonzeros, linear.tocoo())
 
 
-def _hessian(blocks: Sequence[tuple[Block, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
+def _hessian(terms: Sequence[tuple[Term, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
     """Upper triangle of the Hessian of the sum of multiplier * row."""
     nonzeros, entries = [], []
-    for block, multipliers in blocks:
-        weights = ca.SX.sym("weights", block.values.numel())
-        small = ca.triu(ca.hessian(ca.dot(weights, block.values), block.local)[0])
+    for term, multipliers in terms:
+        weights = ca.SX.sym("weights", term.values.numel())
+        small = ca.triu(ca.hessian(ca.dot(weights, term.values), term.local)[0])
         if small.nnz() == 0:
             continue
-        values = ca.mtimes(_dm(block.scatter.T.tocsr()), multipliers)
-        nonzeros.append(block.call("hessian", small.nz[:], w, p, weights, values))
+        values = ca.mtimes(_dm(term.scatter.T.tocsr()), multipliers)
+        nonzeros.append(term.call("hessian", small.nz[:], w, p, weights, values))
         row, column = (np.array(part) for part in small.sparsity().get_triplet())
         # the other triangle of a small Hessian may reach the upper one of the large
         mirrored = np.flatnonzero(row != column)
         number = np.concatenate([np.arange(len(row)), mirrored])
         row, column = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
-        copy = np.arange(block.copies)[:, None]
-        source, rows, up = _expand(block.gather, (copy * block.local.numel() + row).ravel())
-        inner, columns, down = _expand(block.gather, (copy * block.local.numel() + column).ravel()[source])
+        copy = np.arange(term.copies)[:, None]
+        source, rows, up = _expand(term.gather, (copy * term.local.numel() + row).ravel())
+        inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
         rows, factor = rows[inner], up[inner] * down
         place = (copy * small.nnz() + number).ravel()[source][inner]
         keep = rows <= columns
@@ -164,7 +162,7 @@ def _expand(matrix: Sparse, lines: Indices) -> tuple[Indices, Indices, Array]:
 
 
 def _sum_into(entries: Sequence[Entries], nonzeros: Sequence[ca.MX], fixed: Sparse) -> ca.MX:
-    """The constant matrix `fixed` (coo) and, on top of it, the nonzeros of the blocks times their factors."""
+    """The constant matrix `fixed` (coo) and, on top of it, the nonzeros of the terms times their factors."""
     shape = fixed.shape
     offsets = np.cumsum([0] + [part.numel() for part in nonzeros])
     parts = [

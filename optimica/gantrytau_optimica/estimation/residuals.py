@@ -18,10 +18,10 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from gantrytau import ModelError
+from gantrytau_optimica.transcription.assemble import Assembled, Term, assemble
 from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.point_functions import running
 from gantrytau_optimica.transcription.program import Program
-from gantrytau_optimica.transcription.sparse_assembly import Assembled, Block, assemble
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
@@ -96,7 +96,7 @@ class Residuals:
 
 def residuals(program: Program) -> Residuals:
     """Residuals of the sums over samples of a program."""
-    places, blocks, sizes = program.places, [], []
+    places, terms, sizes = program.places, [], []
     total = sum(s.times.size for s in program.problem.sums)
     for layout in places.layouts:
         start, final = (float(t) for t in (layout.phase.start_time, layout.phase.final_time))
@@ -108,18 +108,18 @@ def residuals(program: Program) -> Residuals:
             scatter = sparse.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(total, count))
             known = np.vstack([one.values, one.deviations])
             error = (one.expression - value) / deviation
-            blocks.append(
-                running(places, layout).block(
+            terms.append(
+                running(places, layout).term(
                     error, element, place, scatter, extra=((value, deviation), known)
                 )
             )
             sizes.append(count)
-    return Residuals(program, _assembled(places, blocks, total), tuple(sizes))
+    return Residuals(program, _assembled(places, terms, total), tuple(sizes))
 
 
-def _assembled(places: Places, blocks: Sequence[Block], rows: int) -> Assembled:
+def _assembled(places: Places, terms: Sequence[Term], rows: int) -> Assembled:
     """The residuals as rows of a program without an objective."""
-    return assemble([], blocks, sparse.csr_matrix((rows, places.size)), 0)
+    return assemble([], terms, sparse.csr_matrix((rows, places.size)), 0)
 
 
 def _csc(matrix: ca.DM) -> Any:

@@ -5,7 +5,7 @@ import numpy as np
 
 from gantrytau_optimica.answers.playback.playback import limits_of, range_of
 from gantrytau_optimica.answers.playback.replay import PLACES, Replayed
-from gantrytau_optimica.answers.playback.switching import sides, switches
+from gantrytau_optimica.answers.playback.switches import sides, switches
 from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.trajectory import Trajectory

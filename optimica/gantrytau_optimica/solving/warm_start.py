@@ -10,7 +10,7 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 INSIDE = 1e-9  # of an element: a value at a border is read from its own side
 
 
-def carried(trajectories: Sequence[Trajectory], program: Program) -> np.ndarray:
+def warm_start(trajectories: Sequence[Trajectory], program: Program) -> np.ndarray:
     """Unknowns of `program` from a solution of the same problem on other meshes, inside of their bounds."""
     places = program.places
     w = np.zeros(places.size)

@@ -19,20 +19,20 @@ SURE = 1e-3  # how closely a ratio of changes is to be a simple number
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class LocalSlopes:
     """Slopes of the residuals (N, k) with respect to parameters, and their values (k,), at one point; N >= k."""
 
     jacobian: np.ndarray
     values: np.ndarray
 
 
-def without_influence(point: Point, sizes: np.ndarray, measured: float) -> list[int]:
+def without_influence(point: LocalSlopes, sizes: np.ndarray, measured: float) -> list[int]:
     """Numbers of the parameters that no residual depends on; measured: norm of the values in deviations."""
     moved = np.linalg.norm(point.jacobian * sizes, axis=0)
     return np.flatnonzero(moved <= SILENT * max(measured, np.max(moved, initial=0.0))).tolist()
 
 
-def silent_changes(point: Point, sizes: np.ndarray) -> np.ndarray:
+def silent_changes(point: LocalSlopes, sizes: np.ndarray) -> np.ndarray:
     """Combined changes that no residual notices, relative to `sizes`, each with as few parameters as possible, (k, d)."""
     slopes = point.jacobian * sizes
     norms = np.linalg.norm(slopes, axis=0)
@@ -48,8 +48,8 @@ def silent_changes(point: Point, sizes: np.ndarray) -> np.ndarray:
     return changes / np.max(np.abs(changes), axis=0)
 
 
-def told_apart(
-    names: Sequence[str], point: Point, sizes: np.ndarray, elsewhere: Callable[[], Point | None]
+def indistinguishable(
+    names: Sequence[str], point: LocalSlopes, sizes: np.ndarray, elsewhere: Callable[[], LocalSlopes | None]
 ) -> list[str]:
     """A sentence for each group that cannot be told apart; [] if all can. elsewhere: slopes at another point."""
     changes = silent_changes(point, sizes)
