@@ -16,7 +16,6 @@ from gantrytau.compiler.states import StateChoice
 from gantrytau.compiler.system import System, assemble
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
-from gantrytau.language.events import event_names
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -64,7 +63,7 @@ class Dae:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is known from outside, scalars."""
-        events = set(event_names(self.flat))
+        events = set(self.flat.event_names)
         return tuple(n for n in self.known if n not in events)
 
     @property

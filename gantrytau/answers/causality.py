@@ -11,7 +11,6 @@ from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
 from gantrytau.compiler.translation import all_symbols, names, translate_flat
 from gantrytau.errors import ModelError, StructureError
-from gantrytau.language.events import event_names
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
         alias = dae.reduced.aliases[name]
         if alias.root is not None and alias.order == 0:
             roots.setdefault(alias.root, name)
-    for name in event_names(dae.flat):  # known anyway
+    for name in dae.flat.event_names:  # known anyway
         roots.pop(name, None)
     return translate_flat(
         dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start, events=True

@@ -10,7 +10,6 @@ from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.flat_model import FlatModel, Loop
 from gantrytau.flattening.flatten import flatten
 from gantrytau.flattening.unit_checking import check_units
-from gantrytau.language.events import event_names
 from gantrytau.language.model import Model
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ def check(model: Model) -> Diagnosis:
         if flat is None:
             cls = model if isinstance(model, type) else type(model)
             return Diagnosis(cls.__name__, 0, 0, missing=str(error))
-        unknowns, equations = _sizes(flat, len(flat.inputs) + len(event_names(flat)))
+        unknowns, equations = _sizes(flat, len(flat.inputs) + len(flat.event_names))
         return Diagnosis(flat.name, unknowns, equations, loops=flat.loops, missing=str(error))
 
 

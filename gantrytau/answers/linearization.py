@@ -19,7 +19,7 @@ from gantrytau.compiler.start.consistent_start import given_scalars, named_value
 from gantrytau.compiler.translation import all_symbols, names, retranslate, translate, translate_flat
 from gantrytau.dae import Dae
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
-from gantrytau.language.events import refuse_events
+from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name, split_derivative
 

@@ -21,9 +21,9 @@ from gantrytau.dae import Dae
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.flatten import flatten
+from gantrytau.flattening.instants import refuse_events
 from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.declarations import StateSelect
-from gantrytau.language.events import event_names, refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -89,7 +89,7 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
     """The parameters, and which scalars are known as functions of time."""
     scalars = [n for name in given for n in expand(flat, name)]
     parameters = {n for p in flat.parameters for n in p.elements}
-    events = event_names(flat)
+    events = flat.event_names
     known = tuple(n for n in scalars if n not in parameters)
     for name in known:
         if name.startswith("der("):
@@ -225,7 +225,7 @@ def _sampled_derivatives(flat: FlatModel) -> list[str]:
 
 def _refuse_differentiated(flat: FlatModel, reduced: Reduced, indexed: Indexed) -> None:
     """ModelError where the equations differentiate what jumps at instants."""
-    events = event_names(flat)
+    events = flat.event_names
     if not events:
         return
     where = [(a.root, a.order, n) for n, a in reduced.aliases.items()]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.language.declarations import StateSelect
-from gantrytau.language.events import Sampled, StickSlip
 from gantrytau.language.statements import Equation, Requirement
 
 
@@ -60,6 +59,48 @@ class Loop:
 
 
 @dataclass(frozen=True, eq=False)
+class Sampled:
+    """A scalar that takes the value of `expression` at t0 + k * period, k = 0, 1, ..., and is held in between.
+
+    name: of the variable; expression: of its value just before the instant, in its unit, of flat symbols;
+    period: s, of parameters; path, model: where it is stated.
+    """
+
+    name: str
+    expression: ca.SX
+    period: ca.SX
+    path: str
+    model: str
+
+    @property
+    def label(self) -> str:
+        """Where it is stated, and of what."""
+        return f"{self.path or 'the model'} ({self.model}), sampled({self.name})"
+
+
+@dataclass(frozen=True, eq=False)
+class StickSlip:
+    """Friction: force = mode * coulomb + smooth, mode the sign of the speed; at rest what holds it there.
+
+    force, speed: names of scalar variables; coulomb, smooth, breakaway: in the unit of the force, of flat
+    symbols; the speed stays zero while |force| <= breakaway; path, model: where it is stated.
+    """
+
+    force: str
+    speed: str
+    coulomb: ca.SX
+    smooth: ca.SX
+    breakaway: ca.SX
+    path: str
+    model: str
+
+    @property
+    def label(self) -> str:
+        """Where it is stated, and of what."""
+        return f"{self.path or 'the model'} ({self.model}), stick_slip({self.force})"
+
+
+@dataclass(frozen=True, eq=False)
 class FlatModel:
     """A model written out: variables, parameters and scalar equations between their symbols.
 
@@ -92,3 +133,8 @@ class FlatModel:
         """The variable, parameter or propagated quantity of that name."""
         everything = (*self.variables, *self.parameters, *self.propagated)
         return next((v for v in everything if v.name == name), None)
+
+    @property
+    def event_names(self) -> tuple[str, ...]:
+        """Scalars that are set at instants: sampled variables, then forces of friction that sticks."""
+        return (*(s.name for s in self.sampled), *(f.force for f in self.frictions))

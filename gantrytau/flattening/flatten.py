@@ -12,17 +12,11 @@ from gantrytau.errors import GantryTauError, ModelError, did_you_mean
 from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
+from gantrytau.flattening.instants import expressed, read_events, with_expressions, with_starts
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
 from gantrytau.language.declarations import Parameter, evaluate
-from gantrytau.language.events import (
-    Sampling,
-    Sticking,
-    expressed,
-    read_events,
-    with_expressions,
-    with_starts,
-)
+from gantrytau.language.events import Sampling, Sticking
 from gantrytau.language.model import Declared, Model
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.language.symbols import scalars, split_derivative, time, writing

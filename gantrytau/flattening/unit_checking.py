@@ -11,7 +11,7 @@ import casadi as ca
 
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.language.events import unit_equations
+from gantrytau.flattening.instants import unit_equations
 from gantrytau.language.symbols import split_derivative
 from gantrytau.language.units import ONE, Dimension, dimension, unit_text
 

@@ -14,7 +14,7 @@ from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.translation import names, retranslate, translate
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, SolveError
-from gantrytau.language.events import refuse_sticking
+from gantrytau.flattening.instants import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result

@@ -26,7 +26,7 @@ from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Strata
 from gantrytau.compiler.translation import names, translate, translate_flat
 from gantrytau.dae import Dae
 from gantrytau.errors import ModelError, StructureError
-from gantrytau.language.events import refuse_events
+from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name
 from gantrytau.writing.collect import collected, moving_part, without_factor

@@ -1,0 +1,218 @@
+"""What happens at instants, scalar by scalar: statements read into the records of the flat model, and their refusals."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip
+from gantrytau.language.events import Sampling, Sticking
+from gantrytau.language.statements import Equation, Requirement
+from gantrytau.language.symbols import Symbol, Symbols, scalars
+
+
+@dataclass(eq=False)
+class Events:
+    """What the samplings and frictions of a model say, scalar by scalar."""
+
+    sampled: list[Sampled] = field(default_factory=list)
+    frictions: list[StickSlip] = field(default_factory=list)
+    requirements: list[Requirement] = field(default_factory=list)
+    starts: dict[str, ca.SX] = field(default_factory=dict)
+    places: dict[str, str] = field(default_factory=dict)
+
+
+def read_events(stated: Sequence[tuple[str, str, int, Sampling | Sticking]], symbols: Symbols) -> Events:
+    """The records of statements (path, class, number, statement). ModelError for what cannot be one."""
+    events = Events()
+    for path, model, number, statement in stated:
+        place = f"{path or 'the model'} ({model}), equation {number}"
+        if isinstance(statement, Sampling):
+            _read_sampling(events, statement, symbols, (path, model, place))
+        else:
+            _read_sticking(events, statement, symbols, (path, model, place))
+    return events
+
+
+def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where: tuple[str, str, str]):
+    path, model, place = where
+    names = [s.name for s in _declared(statement.variable, symbols, place, "sampled", ("real", "output"))]
+    shape = statement.variable.shape
+    expressions = _sized(statement.expression, shape, place, "the expression")
+    period = _of_parameters(statement.period, (1, 1), symbols, place, "period")[0]
+    if period.is_constant() and not 0 < float(period) < float("inf"):
+        raise ModelError(f"{place}: found period={period}, expected a finite number above zero, in s")
+    if not period.is_constant():
+        events.requirements.append(
+            Requirement(period > 0, "expected a sampling period above zero, in s", path, model)
+        )
+    if statement.start is not None:
+        starts = _of_parameters(statement.start, shape, symbols, place, "start")
+        events.starts.update(zip(names, starts, strict=True))
+    for name, expression in zip(names, expressions, strict=True):
+        _take(events, name, place)
+        events.sampled.append(Sampled(name, expression, period, path, model))
+
+
+def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where: tuple[str, str, str]):
+    path, model, place = where
+    force = _single(_declared(statement.force, symbols, place, "the force", ("real", "output")), place)
+    speed = _single(_declared(statement.speed, symbols, place, "the speed", ("real", "output")), place)
+    parts = {
+        key: _sized(getattr(statement, key), (1, 1), place, key)[0]
+        for key in ("coulomb", "smooth", "breakaway")
+    }
+    _take(events, force, place)
+    limits = (
+        (parts["coulomb"], 0.0, "coulomb >= 0"),
+        (parts["breakaway"], parts["coulomb"], "breakaway >= coulomb"),
+    )
+    for larger, smaller, words in limits:
+        holds = larger >= smaller
+        leaves = [symbols.find(leaf) for leaf in ca.symvar(holds)]
+        if holds.is_constant() and not float(holds):
+            raise ModelError(
+                f"{place}: found {float(larger)} and {float(smaller)}, expected {words} in stick_slip; correct them"
+            )
+        if leaves and all(leaf is not None and leaf.kind == "parameter" for leaf in leaves):
+            events.requirements.append(Requirement(holds, f"expected {words} in stick_slip", path, model))
+    events.frictions.append(StickSlip(force, speed, **parts, path=path, model=model))
+
+
+def _take(events: Events, name: str, place: str) -> None:
+    if name in events.places:
+        raise ModelError(f"{place}: found {name}, which {events.places[name]} gives already; leave one out")
+    events.places[name] = place
+
+
+def _declared(variable: Any, symbols: Symbols, place: str, role: str, kinds: Sequence[str]) -> list[Symbol]:
+    """The symbols of a declared variable."""
+    elements = scalars(variable) if isinstance(variable, ca.SX) else []
+    found = [symbol for element in elements if (symbol := symbols.find(element)) is not None]
+    wrong = [s for s in found if s.kind not in kinds or s.order]
+    if not found or len(found) != len(elements) or wrong:
+        text = f"{wrong[0].name}, a derivative" if wrong and wrong[0].order else ""
+        text = text or (
+            f"{wrong[0].name}, declared as {wrong[0].kind}" if wrong else f"'{str(variable)[:80]}'"
+        )
+        raise ModelError(
+            f"{place}: {role}: found {text}, expected a variable declared as Real or Output; declare one"
+            + (" and equate it to the input" if wrong and wrong[0].kind == "input" else "")
+        )
+    return found
+
+
+def _single(found: Sequence[Symbol], place: str) -> str:
+    if len(found) > 1:
+        raise ModelError(
+            f"{place}: found {len(found)} elements in stick_slip, expected one; yield one for each element"
+        )
+    return found[0].name
+
+
+def _sized(value: Any, shape: tuple[int, int], place: str, role: str) -> list[ca.SX]:
+    """An expression as scalars, column after column, of a wanted shape; a row may stand for a column."""
+    try:
+        if isinstance(value, (list, tuple)):
+            symbolic = any(isinstance(item, ca.SX) for item in value)
+            value = ca.vertcat(*value) if symbolic else ca.DM(np.asarray(value, dtype=float))
+        found = ca.SX(value)
+    except (NotImplementedError, RuntimeError, TypeError, ValueError) as error:
+        raise ModelError(
+            f"{place}: found {role} {value!r}, expected a number or an expression of symbols"
+        ) from error
+    vectors = 1 in found.shape and 1 in shape
+    if found.numel() != shape[0] * shape[1] or (found.shape != shape and not vectors):
+        raise ModelError(f"{place}: {role} has shape {found.shape}, expected {shape}; correct it")
+    return scalars(found)
+
+
+def _of_parameters(
+    value: Any, shape: tuple[int, int], symbols: Symbols, place: str, role: str
+) -> list[ca.SX]:
+    """Numbers or expressions of parameters; one number may stand for all."""
+    whole = _sized(value, (1, 1) if isinstance(value, (int, float)) else shape, place, role)
+    for leaf in ca.symvar(ca.vertcat(*whole)):
+        symbol = symbols.find(leaf)
+        if symbol is None or symbol.kind != "parameter":
+            raise ModelError(
+                f"{place}: found {leaf.name()} in {role}, expected a number or an expression of parameters"
+            )
+    return whole * (shape[0] * shape[1] // len(whole))
+
+
+def expressed(events: Events, symbols: Symbols) -> list[Equation]:
+    """The expressions of the events as right sides of equations, for checks and substitutions."""
+    names = [*(s.name for s in events.sampled), *(f.force for f in events.frictions)]
+    return _right_sides(events.sampled, events.frictions, {n: symbols.by_name[n].sx for n in names})
+
+
+def _right_sides(
+    sampled: Sequence[Sampled], frictions: Sequence[StickSlip], symbols: Mapping[str, ca.SX]
+) -> list[Equation]:
+    found = [Equation(symbols[s.name], s.expression, s.path, s.model, 0, label=s.label) for s in sampled]
+    for f in frictions:
+        parts = (f.coulomb, f.smooth, f.breakaway)
+        found += [Equation(symbols[f.force], part, f.path, f.model, 0, label=f.label) for part in parts]
+    return found
+
+
+def with_expressions(
+    events: Events, written: Sequence[Equation]
+) -> tuple[tuple[Sampled, ...], tuple[StickSlip, ...]]:
+    """The records with the right sides of `expressed` as they were substituted."""
+    count = len(events.sampled)
+    held = [replace(s, expression=e.right) for s, e in zip(events.sampled, written[:count], strict=True)]
+    rest = [e.right for e in written[count:]]
+    frictions = [
+        replace(f, coulomb=rest[3 * k], smooth=rest[3 * k + 1], breakaway=rest[3 * k + 2])
+        for k, f in enumerate(events.frictions)
+    ]
+    return tuple(held), tuple(frictions)
+
+
+def with_starts(variables: Sequence[FlatVariable], events: Events) -> tuple[FlatVariable, ...]:
+    """Variables with the start values that samplings give; ModelError where they have another already."""
+    found = []
+    for variable in variables:
+        given = [n for n in variable.elements if n in events.starts]
+        if given and variable.start is not None:
+            raise ModelError(
+                f"{events.places[given[0]]}: found start= and the start value of the declaration of {given[0]}, "
+                "expected one of them; leave start= out"
+            )
+        starts = tuple(events.starts.get(n, ca.SX(0)) for n in variable.elements)
+        found.append(replace(variable, start=starts) if given else variable)
+    return tuple(found)
+
+
+def unit_equations(flat: FlatModel) -> list[Equation]:
+    """Equations whose units agree if those of the events do."""
+    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
+    periods = [
+        Equation(s.period, flat.time, s.path, s.model, 0, label=f"{s.label}, period") for s in flat.sampled
+    ]
+    return _right_sides(flat.sampled, flat.frictions, symbols) + periods
+
+
+def refuse_events(flat: FlatModel) -> None:
+    """ModelError naming the first component whose values or equations change at instants."""
+    refuse_sticking(flat)
+    for event in flat.sampled:
+        raise ModelError(
+            f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate and FMUs "
+            "sample it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a "
+            "continuous equation. translate(..., events=True) takes it as known"
+        )
+
+
+def refuse_sticking(flat: FlatModel) -> None:
+    """ModelError naming the first component whose friction sticks."""
+    for event in flat.frictions:
+        raise ModelError(
+            f"{event.label}: found friction that sticks, whose equations change at instants, expected equations that "
+            "stay. Export the model as an FMU (gantrytau_fmu.export_fmu), or take a smooth friction, TanhFriction"
+        )
