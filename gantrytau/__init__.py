@@ -4,8 +4,7 @@ from gantrytau.answers.c_code import c_source
 from gantrytau.answers.diagnosis import Diagnosis, check
 from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
 from gantrytau.answers.linearization import Linearization, linearize
-from gantrytau.compiler.translation import translate
-from gantrytau.dae import Dae
+from gantrytau.dae import Dae, translate
 from gantrytau.errors import (
     GantryTauError,
     InitializationError,

@@ -1,7 +1,6 @@
 """Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
 
 from collections.abc import Collection, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -9,18 +8,16 @@ from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import all_symbols, names, translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 DROPPED = "constraints that were left out"
 OPEN = 1e-6  # m or rad by which they may be violated
 
 
-def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Function:
+def function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.Function:
     """See Dae.function."""
     given, find = names(given), names(find)
     dae = _with_parameters(dae, given)
@@ -43,7 +40,7 @@ def function(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> ca.Functi
     raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
 
 
-def _dropped(dae: "Dae", given: Sequence[str]) -> ca.SX:
+def _dropped(dae: Translated, given: Sequence[str]) -> ca.SX:
     """What must be zero where given parameters could open a loop: the constraints left out as redundant."""
     parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
     if not parameters or not dae.redundant:
@@ -61,7 +58,7 @@ def _closed(function: ca.Function) -> ca.Function:
     return ca.Function("f", x, found, names, function.name_out()[:-1])
 
 
-def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iterator["Dae"]:
+def _translations(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Iterator[Translated]:
     """The model as it is translated, then with the wanted derivatives, then with other inputs."""
     yield dae
     orders = dae.indexed.orders
@@ -73,7 +70,7 @@ def _translations(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> Iter
     yield _flipped(dae, given, find)
 
 
-def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":
+def _with_parameters(dae: Translated, given: Sequence[str]) -> Translated:
     """Parameters that are given stay symbols, even those that shape the equations."""
     scalars = [n for name in given for n in dae.expand(name)]
     symbols = [n for n in scalars if n in dae.table.symbols and n not in dae.table.independent]
@@ -84,7 +81,7 @@ def _with_parameters(dae: "Dae", given: Sequence[str]) -> "Dae":
     return translate_flat(dae.flat, given=(*dae.inputs, *parameters), **chosen, events=True)
 
 
-def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
+def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
     """Expression of each known symbol in the arguments of the function."""
     known: dict[str, ca.SX] = {}
     for name, symbols in zip(given, columns, strict=True):
@@ -108,7 +105,7 @@ def _known(dae: "Dae", given: Sequence[str], columns: list[list[ca.SX]]) -> dict
 
 
 def _blocks(
-    dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
+    dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
 ) -> list[Block] | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
     unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
@@ -129,7 +126,7 @@ def _blocks(
     return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)
 
 
-def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
+def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Translated:
     """The model translated anew with the given variables as known functions of time."""
     scalars = [n for name in given for n in dae.expand(name) if not n.startswith("der(") and n != "time"]
     variables = [n for n in scalars if n not in dae.table.symbols]
@@ -146,7 +143,7 @@ def _flipped(dae: "Dae", given: Sequence[str], find: Sequence[str]) -> "Dae":
     )
 
 
-def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
+def _undetermined(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
     """What to give as well: the lowest derivatives that suffice, or the inputs of the model."""
     unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
     driving = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
@@ -161,20 +158,20 @@ def _undetermined(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX], inp
     return f"{text} Give also {', or '.join(dict.fromkeys(ways)) or 'states, inputs or derivatives'}."
 
 
-def _sufficient_inputs(dae: "Dae", known: dict[str, ca.SX], targets: list[ca.SX]) -> list[str]:
+def _sufficient_inputs(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX]) -> list[str]:
     """The inputs that are missing if these alone are, else nothing."""
     missing = [n for n in dae.known if n not in known]
     return missing if missing and _suffices(dae, known, targets, missing) else []
 
 
-def _suffices(dae: "Dae", known: Collection[str], targets: list[ca.SX], more: list[str]) -> bool:
+def _suffices(dae: Translated, known: Collection[str], targets: list[ca.SX], more: list[str]) -> bool:
     """Whether the targets follow from the known symbols and some more."""
     unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known and n not in more]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() in unknowns]
     return not block_pattern(dae.indexed.residuals, unknowns, wanted).undetermined
 
 
-def _whole(dae: "Dae", scalars: Sequence[str]) -> list[str]:
+def _whole(dae: Translated, scalars: Sequence[str]) -> list[str]:
     """The names with complete vectors under one name."""
     left = dict.fromkeys(scalars)
     for vector in dae.vectors.values():
@@ -221,7 +218,7 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
     return solved_one_by_one("f", parts, expressions[len(parts) :], arguments, start, (names_in, names_out))
 
 
-def _start_of(dae: "Dae", scalars: Sequence[str]) -> list[float]:
+def _start_of(dae: Translated, scalars: Sequence[str]) -> list[float]:
     """Numbers of arguments where the model starts; derivatives that do not occur there are zero."""
     found = []
     for name in scalars:

@@ -2,19 +2,17 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from gantrytau.answers.other_assemblies import Assembly, assemblies
+from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.flat_model import FlatModel, Loop
 from gantrytau.flattening.flatten import flatten
 from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.model import Model
-
-if TYPE_CHECKING:
-    from gantrytau.answers.other_assemblies import Assembly
-    from gantrytau.dae import Dae
 
 POOR = 1e4  # condition of the choice of states from which it deserves a remark
 FAR = 1e-6  # how far a start value moves, relative to its size, before that is worth a line
@@ -51,7 +49,7 @@ class Diagnosis:
     condition: float = 1.0
     blocks: tuple[tuple[str, int, int], ...] = ()  # kind, unknowns, torn unknowns
     moved: tuple[Moved, ...] = ()
-    assemblies: "tuple[Assembly, ...]" = ()
+    assemblies: tuple[Assembly, ...] = ()
     missing: str = ""
 
     def __str__(self) -> str:
@@ -91,8 +89,6 @@ def check(model: Model) -> Diagnosis:
     A model that cannot be translated gets a diagnosis that says in `missing` why not. Raises ModelError for
     what is written wrongly.
     """
-    from gantrytau.compiler.translation import translate_flat
-
     flat: FlatModel | None = None
     try:
         flat = flatten(model)
@@ -106,10 +102,8 @@ def check(model: Model) -> Diagnosis:
         return Diagnosis(flat.name, unknowns, equations, loops=flat.loops, missing=str(error))
 
 
-def diagnose(dae: "Dae") -> Diagnosis:
+def diagnose(dae: Translated) -> Diagnosis:
     """The diagnosis of a translated model."""
-    from gantrytau.answers.other_assemblies import assemblies
-
     unknowns, equations = _sizes(dae.flat, len(dae.known))
     return Diagnosis(
         model=dae.name,
@@ -117,7 +111,7 @@ def diagnose(dae: "Dae") -> Diagnosis:
         equations=equations,
         aliases=equations - len(dae.reduced.residuals),
         differentiated=sum(1 for c in dae.indexed.counts if c),
-        mobility=sum(1 for n in dae.choice.states if dae.indexed.orders.get(n, 0) > 1),
+        mobility=dae.mobility,
         redundant=tuple(e.name for e in (*dae.redundant, *dae.reduced.redundant)),
         loops=dae.flat.loops,
         states=dae.states,
@@ -132,7 +126,7 @@ def _sizes(flat: FlatModel, known: int) -> tuple[int, int]:
     return sum(len(v.elements) for v in flat.variables) - known, len(flat.equations)
 
 
-def _moved(dae: "Dae") -> tuple[Moved, ...]:
+def _moved(dae: Translated) -> tuple[Moved, ...]:
     """Start values that the start does not have, of aliases too."""
     started = [v for v in dae.flat.variables if v.start is not None]
     names = [n for v in started for n in v.elements]

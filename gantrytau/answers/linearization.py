@@ -13,11 +13,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.start.consistency import Level, solve_levels
-from gantrytau.compiler.start.consistent_start import given_scalars, named_values
-from gantrytau.compiler.translation import all_symbols, names, retranslate, translate, translate_flat
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translation import all_symbols, names, retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
@@ -73,7 +73,7 @@ def _complex_text(value: complex) -> str:
 
 
 def linearize(
-    model: Model | Dae,
+    model: Model | Translated,
     *,
     at: Mapping[str, Any] | None = None,
     steady: bool = False,
@@ -90,7 +90,7 @@ def linearize(
     States that cannot be states at the point are replaced by others. Raises InitializationError if there is
     no such point, StructureError if the equations are singular there, ModelError for unknown names.
     """
-    dae = model if isinstance(model, Dae) else translate(model)
+    dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_events(dae.flat)
     if parameters:
         dae = _with_parameters(dae, parameters)
@@ -117,7 +117,7 @@ def linearize(
     return Linearization(dae.name, A, B[:, chosen], C, D[:, chosen], dae.states, columns, rows, point)
 
 
-def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> Dae:
+def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translated:
     scalars = given_scalars(dae, parameters)
     for name in scalars:
         if name not in dae.table.symbols:
@@ -125,7 +125,7 @@ def _with_parameters(dae: Dae, parameters: Mapping[str, Any]) -> Dae:
     return retranslate(dae, with_values(dae.flat, scalars))
 
 
-def _with_outputs(dae: Dae, outputs: Sequence[str]) -> Dae:
+def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
     """The same system with the derivatives that are asked for among its unknowns."""
     known = {*all_symbols(dae.indexed, dae.reduced.known), *dae.table.symbols, dae.flat.time.name()}
     rows = [n for name in outputs for n in dae.expand(name)]
@@ -135,12 +135,12 @@ def _with_outputs(dae: Dae, outputs: Sequence[str]) -> Dae:
     return retranslate(replace(dae, settings={**dae.settings, "find": found}), dae.flat)
 
 
-def _rate(dae: Dae, state: str) -> ca.SX:
+def _rate(dae: Translated, state: str) -> ca.SX:
     base, order = split_derivative(state)
     return dae.reduced.chains.sx(base, order + 1)
 
 
-def _checked(dae: Dae, at: Mapping[str, Any]) -> dict[str, float]:
+def _checked(dae: Translated, at: Mapping[str, Any]) -> dict[str, float]:
     scalars = given_scalars(dae, at)
     for name in scalars:
         if name in dae.table.symbols:
@@ -148,15 +148,15 @@ def _checked(dae: Dae, at: Mapping[str, Any]) -> dict[str, float]:
     return scalars
 
 
-def _completed(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
+def _completed(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
     """Numbers of all symbols at the point that `Dae.evaluate` completes."""
     _checked(dae, at)
-    found = dae.evaluate(at)
+    found = evaluate(dae, at)
     values = dict(dae.start) | {dae.flat.time.name(): float(at.get(dae.flat.time.name(), 0.0))}
     return values | {n: float(found[n]) for n in all_symbols(dae.indexed, dae.reduced.known) if n in found}
 
 
-def _steady(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
+def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
     """Numbers of all symbols at a point where every derivative is zero.
 
     The equations as they were before differentiation are enough: at rest their derivatives hold too.
@@ -187,7 +187,7 @@ def _steady(dae: Dae, at: dict[str, Any]) -> dict[str, float]:
     )
 
 
-def _hold(dae: Dae, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
+def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
     """Enter given values; names of the symbols that they fix."""
     held: set[str] = set()
     for name, number in scalars.items():
@@ -215,7 +215,7 @@ def _hold(dae: Dae, scalars: Mapping[str, float], values: dict[str, float]) -> f
 class _Slopes:
     """All equations of a model, linear at a point, solved for what is no state."""
 
-    def __init__(self, dae: Dae, values: Mapping[str, float]):
+    def __init__(self, dae: Translated, values: Mapping[str, float]):
         self.dae, self.values = dae, values
         states = set(dae.choice.states)
         chains = dae.reduced.chains

@@ -6,17 +6,14 @@ taken; the others are looked for from many first guesses.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.start.consistency import newton
+from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import split_derivative
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 GUESSES = 40  # first guesses per block that has to be iterated
 SAME = 1e-6  # difference of unknowns below which two solutions are one
@@ -46,7 +43,7 @@ class Assembly:
         )
 
 
-def assemblies(dae: "Dae") -> tuple[Assembly, ...]:
+def assemblies(dae: Translated) -> tuple[Assembly, ...]:
     """Where the equations of positions have several solutions at the start."""
     units = {n: v.unit for v in dae.flat.variables for n in v.elements}
     found = []
@@ -79,7 +76,7 @@ def _shown(block: Block) -> list[str]:
     return (chosen or list(block.unknowns))[:6]
 
 
-def _others(dae: "Dae", block: Block, angles: np.ndarray) -> list[dict[str, float]]:
+def _others(dae: Translated, block: Block, angles: np.ndarray) -> list[dict[str, float]]:
     chains = dae.reduced.chains
     x = ca.vertcat(*(chains.named(n) for n in block.unknowns))
     f = ca.vertcat(*(dae.indexed.residuals[key] for key in block.equations))

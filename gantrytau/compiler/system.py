@@ -2,14 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import casadi as ca
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import split_derivative
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +31,7 @@ class System:
     definitions: (symbol, expression) in order of solution, through which every variable can be expressed.
     """
 
-    dae: "Dae"
+    dae: Translated
     time: ca.SX
     states: tuple[str, ...]
     x: ca.SX
@@ -74,7 +72,7 @@ def _cumulative(sizes) -> list[int]:
     return found
 
 
-def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
+def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
     """Put the blocks of a Dae together; see Dae.system."""
     chains, table = dae.reduced.chains, dae.table
     definitions, algebraics = _left_implicit(dae, form)
@@ -105,7 +103,7 @@ def assemble(dae: "Dae", form: Literal["explicit", "lifted"]) -> System:
 
 
 def _left_implicit(
-    dae: "Dae", form: Literal["explicit", "lifted"]
+    dae: Translated, form: Literal["explicit", "lifted"]
 ) -> tuple[list[tuple[ca.SX, ca.SX]], list[Algebraic]]:
     """What the blocks define outright, in order, and what stays as an equation."""
     definitions: list[tuple[ca.SX, ca.SX]] = []

@@ -1,4 +1,4 @@
-"""From a model to a Dae: the whole way, step by step."""
+"""From a model to the translated record: the whole way, step by step."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from gantrytau.compiler.redundancy import Settled, without_redundant
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import starting_guess
 from gantrytau.compiler.states import choose_states
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.flatten import flatten
@@ -29,7 +29,7 @@ from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 
-def translate(
+def translate_model(
     model: Model,
     *,
     given: Sequence[str] = (),
@@ -37,15 +37,8 @@ def translate(
     states: Sequence[str] | None = None,
     units: bool = True,
     events: bool = False,
-) -> Dae:
-    """Turn a model into a system of index one, sorted into blocks.
-
-    given: names that are known instead of the declared inputs, as functions of time (parameters named here
-    stay symbols); find: names and derivatives that must be available; states: names preferred as states;
-    units: check the dimensions of all equations; events: accept what is sampled, and friction that sticks, as
-    known after the inputs. Raises ModelError for faults of writing, StructureError if the equations cannot
-    determine the unknowns, InitializationError if no consistent start is found.
-    """
+) -> Translated:
+    """Flatten a model, check the dimensions of all equations, and translate it; see `gantrytau.translate`."""
     flat = flatten(model)
     if units:
         check_units(flat)
@@ -60,8 +53,8 @@ def translate_flat(
     states: Sequence[str] | None = None,
     start: Mapping[str, float] | None = None,
     events: bool = False,
-) -> Dae:
-    """Like `translate`, from the flattened model; `start`: numbers of symbols that replace start values."""
+) -> Translated:
+    """A system of index one, sorted into blocks; `start`: numbers of symbols that replace start values."""
     if not events:
         refuse_events(flat)
     given, find, states = (names(x) for x in (given, find, states or ()))
@@ -110,7 +103,7 @@ def _translated(
     known: tuple[str, ...],
     settings: Mapping[str, Any],
     start: Mapping[str, float],
-) -> Dae:
+) -> Translated:
     """From the flat model without redundant constraints to the sorted system."""
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     indexed = reduce_index(reduced, flat)
@@ -131,7 +124,7 @@ def _translated(
     blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
     refuse_undetermined(blocks, indexed, reduced, sample, flat)
     more = dict(started=guess.started, fixed=guess.fixed)
-    return Dae(
+    return Translated(
         flat, table, reduced, indexed, choice, blocks, known, sample, settled.redundant, {**settings, **more}
     )
 
@@ -156,7 +149,7 @@ def names(found: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def retranslate(dae: Dae, flat: FlatModel) -> Dae:
+def retranslate(dae: Translated, flat: FlatModel) -> Translated:
     """The same translation of a flat model with other parameter values."""
     chosen = {k: dae.settings[k] for k in ("given", "find", "states")}
     return translate_flat(flat, **chosen, events=True)

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.compiler.parameters import parameter_table, with_values
-from gantrytau.compiler.translation import translate
-from gantrytau.dae import Dae
+from gantrytau.dae import Dae, translate
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors

@@ -10,11 +10,11 @@ import numpy as np
 
 from gantrytau.compiler.blocks.pivots import sample_values
 from gantrytau.compiler.blocks.tearing import tear
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 
-def dependents(dae: Dae) -> list[tuple[int, str]]:
+def dependents(dae: Translated) -> list[tuple[int, str]]:
     """Equations and the variables they give, in order of solution; the coefficient is never zero."""
     indexed, chains = dae.indexed, dae.reduced.chains
     rows = [i for i, count in enumerate(indexed.counts) if count]
@@ -56,7 +56,7 @@ def entries(matrix: ca.SX) -> list[tuple[int, int, ca.SX]]:
     return list(zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True))
 
 
-def definitions_of(dae: Dae, pairs: Sequence[tuple[int, str]]) -> list[tuple[ca.SX, ca.SX]]:
+def definitions_of(dae: Translated, pairs: Sequence[tuple[int, str]]) -> list[tuple[ca.SX, ca.SX]]:
     """(symbol, expression) of dependent variables and their derivatives below the highest, in order."""
     indexed, chains = dae.indexed, dae.reduced.chains
     found: list[tuple[ca.SX, ca.SX]] = []

@@ -10,7 +10,7 @@ import numpy as np
 
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import Guess
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.conditioning import Conditioning
@@ -34,7 +34,7 @@ class Coordinates:
     renewed: what the held variables become at an instant.
     """
 
-    dae: Dae
+    dae: Translated
     states: tuple[str, ...]
     algebraics: tuple[str, ...]
     sampled: tuple[str, ...]

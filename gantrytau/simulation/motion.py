@@ -8,7 +8,7 @@ from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
 from gantrytau.compiler.index_reduction import Key
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.conditioning import Conditioning
@@ -17,7 +17,9 @@ from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import Samples, Signal
 
 
-def all_coordinates(dae: Dae, signals: Mapping[str, Signal], outputs: Sequence[str] = ()) -> Coordinates:
+def all_coordinates(
+    dae: Translated, signals: Mapping[str, Signal], outputs: Sequence[str] = ()
+) -> Coordinates:
     """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
     without value, or a sampled one that has to be differentiated.
     """
@@ -89,7 +91,7 @@ def _column(elements: Sequence[ca.SX]) -> ca.SX:
     return ca.vertcat(*elements) if elements else ca.SX(0, 1)
 
 
-def _states(dae: Dae, follow: Collection[str]) -> tuple[str, ...]:
+def _states(dae: Translated, follow: Collection[str]) -> tuple[str, ...]:
     """Every derivative below the highest of the variables that do not follow from others."""
     orders = dae.indexed.orders
     return tuple(
@@ -101,7 +103,7 @@ def _states(dae: Dae, follow: Collection[str]) -> tuple[str, ...]:
 
 
 def _highest_blocks(
-    dae: Dae, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
+    dae: Translated, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
 ) -> list[Block]:
     """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
     guide = Guide(dae.start, dae.table.values, states)
@@ -111,7 +113,7 @@ def _highest_blocks(
     return solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
 
 
-def _constraints(dae: Dae, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
+def _constraints(dae: Translated, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
     """Jacobian of the constraints of speeds, and which of its columns belong to dependent coordinates."""
     if not invariants:
         return ca.SX(0, 0), []
@@ -124,7 +126,7 @@ def _constraints(dae: Dae, invariants: list[ca.SX], states: Sequence[str]) -> tu
     return jacobian[:, used], [k for k, j in enumerate(used) if names[j] not in chosen]
 
 
-def _invariants(dae: Dae, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
+def _invariants(dae: Translated, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
     """Residuals of the levels below the last, positions, then velocities, and the names of their equations.
 
     used: equations that give dependent variables, which hold anyway.
@@ -138,7 +140,7 @@ def _invariants(dae: Dae, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, 
 
 
 def _known_symbols(
-    dae: Dae,
+    dae: Translated,
     signals: Mapping[str, Signal],
     sampled: Sequence[str],
     w: ca.SX,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau.compiler.parameters import with_values
-from gantrytau.compiler.translation import names, retranslate, translate
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translation import names, retranslate, translate_model
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.flattening.instants import refuse_sticking
 from gantrytau.language.model import Model
@@ -29,7 +29,7 @@ LEAST = 1e-13  # of a step: rounding
 
 
 def simulate(
-    model: Model | Dae,
+    model: Model | Translated,
     *,
     stop: float,
     start: float = 0.0,
@@ -49,7 +49,7 @@ def simulate(
     when there is no consistent start, ModelError for wrong names and values.
     """
     _check(start, stop, tolerance, points)
-    dae = model if isinstance(model, Dae) else translate(model, events=True)
+    dae = model if isinstance(model, Translated) else translate_model(model, events=True)
     refuse_sticking(dae.flat)
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -94,7 +94,7 @@ def _check(start: float, stop: float, tolerance: float, points: int) -> None:
         raise ModelError(f"simulate: found points={points!r}, expected a whole number of at least 2")
 
 
-def _check_inputs(dae: Dae, signals: Mapping[str, Signal], start: float, stop: float) -> None:
+def _check_inputs(dae: Translated, signals: Mapping[str, Signal], start: float, stop: float) -> None:
     for name, signal in signals.items():
         if name not in dae.inputs:
             raise ModelError(

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.language.units import dimension, unit_text
 from gantrytau.results.result import Result
@@ -46,7 +46,7 @@ def result_of(
     return Result(times, table, units=units, descriptions=words, title=dae.name)
 
 
-def _names(dae: Dae, outputs: Sequence[str] | None) -> list[str]:
+def _names(dae: Translated, outputs: Sequence[str] | None) -> list[str]:
     if outputs is not None:
         return [n for name in outputs for n in dae.expand(name)]
     names = list(dae.variables)
@@ -58,7 +58,7 @@ def _names(dae: Dae, outputs: Sequence[str] | None) -> list[str]:
     return names
 
 
-def labels(dae: Dae) -> tuple[dict[str, str], dict[str, str]]:
+def labels(dae: Translated) -> tuple[dict[str, str], dict[str, str]]:
     """Units and descriptions by name, derivatives included."""
     units: dict[str, str] = {}
     words: dict[str, str] = {}

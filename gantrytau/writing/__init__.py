@@ -1,19 +1,18 @@
 """The equations of a translated model, written out for readers and for other tools."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 FORMATS = ("text", "latex", "html", "modelica")
 
 
-def write_equations(dae: "Dae", format: str) -> str:
+def write_equations(dae: Translated, format: str, summary: Callable[[], str]) -> str:
     """The equations as "text", "latex", "html" (blocks, with their origin) or "modelica" (the flat model).
 
-    Raises ModelError for another format, and for a function that the format has no words for.
+    summary: what the page opens with. Raises ModelError for another format, and for a function that the
+    format has no words for.
     """
     if format == "text":
         from gantrytau.writing.text import block_text
@@ -26,7 +25,7 @@ def write_equations(dae: "Dae", format: str) -> str:
     if format == "html":
         from gantrytau.writing.html import html_page
 
-        return html_page(dae)
+        return html_page(dae, summary())
     if format == "modelica":
         from gantrytau.writing.modelica import modelica_text
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 from html import escape
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
@@ -13,9 +13,6 @@ from gantrytau.writing.mathml import MathSyntax, equality, html_name
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.text import PlainSyntax, event_lines, plain_number
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 STYLE = """
 :root { color-scheme: light dark; --line: #8886; --soft: #888; }
@@ -38,13 +35,13 @@ HEAD = ("name", "unit", "description", "role", "start or value")
 Declared = FlatVariable | FlatParameter
 
 
-def html_page(dae: "Dae") -> str:
-    """The page. Raises ModelError for an expression that cannot be read."""
-    return _Page(dae).text()
+def html_page(dae: Translated, summary: str) -> str:
+    """The page, which opens with a summary of the model. Raises ModelError for an expression that cannot be read."""
+    return _Page(dae).text(summary)
 
 
 class _Page:
-    def __init__(self, dae: "Dae"):
+    def __init__(self, dae: Translated):
         self.dae, self.flat = dae, dae.flat
         self.declared: dict[str, tuple[Declared, int]] = {
             n: (v, k)
@@ -68,7 +65,7 @@ class _Page:
         prefix = "derivative of " * order
         return f"{name}{unit}: {prefix}{variable.description or variable.kind}"
 
-    def text(self) -> str:
+    def text(self, summary: str) -> str:
         name = escape(self.dae.name)
         parts = [
             f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Equations of {name}</title>',
@@ -76,7 +73,7 @@ class _Page:
             f"<h1>Equations of {name}</h1>",
             '<nav><a href="#components">by component</a><a href="#blocks">by block</a>'
             '<a href="#tables">variables and parameters</a></nav>',
-            f"<pre>{escape(str(self.dae.diagnosis))}</pre>",
+            f"<pre>{escape(summary)}</pre>",
             '<h2 id="components">By component, as written</h2>',
             *self._components(),
             *self._events(),

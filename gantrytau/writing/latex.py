@@ -4,16 +4,13 @@ The fragment is included in a document with \usepackage{amsmath}; it defines not
 """
 
 import re
-from typing import TYPE_CHECKING
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.writing.names import GREEK, Name, name_of
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import ATOM, CHOICE, POWER, PRODUCT, SUM, Arguments, Written, infix
 from gantrytau.writing.text import event_lines, plain_number
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 WORDS = {
     "or": r" \lor ", "and": r" \land ", "not": r"\lnot ", "neg": "-",
@@ -133,7 +130,7 @@ def latex_name(name: Name) -> str:
     return text
 
 
-def latex_text(dae: "Dae") -> str:
+def latex_text(dae: Translated) -> str:
     """A LaTeX fragment: what is known, the states, and every block with its origin."""
     lines = [f"% Equations of {dae.name} in the order of their solution; needs \\usepackage{{amsmath}}."]
     lines += [rf"\section*{{Equations of {escaped(dae.name)}}}"]

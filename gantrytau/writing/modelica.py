@@ -8,10 +8,10 @@ Language Specification 3.6, chapters 2, 3 and 8.
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.declarations import StateSelect
@@ -23,9 +23,6 @@ from gantrytau.writing.sharing import Text, located, written, written_at
 from gantrytau.writing.syntax import CHOICE, Written, write
 from gantrytau.writing.text import event_lines
 
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
-
 SELECT = {
     StateSelect.NEVER: "never", StateSelect.AVOID: "avoid",
     StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
@@ -34,12 +31,12 @@ NO_FORCE = "no force for "  # begins the name of the equation that stands for a 
 LEAST_SAVING = 40  # nodes; each name is one more unknown for the tool that reads the text
 
 
-def modelica_text(dae: "Dae") -> str:
+def modelica_text(dae: Translated) -> str:
     """The flat model as a Modelica class; ModelError for a function that Modelica does not have."""
     return _Writer(dae).text()
 
 
-def independent_equations(dae: "Dae") -> list[Equation]:
+def independent_equations(dae: Translated) -> list[Equation]:
     """The equations of the flat model, as many as unknowns; those that repeat others are gone, their forces zero."""
     # a redundant constraint leaves its force undetermined; what became 0 == 0 leaves nothing behind
     idle = {id(e) for e in dae.redundant}
@@ -57,7 +54,7 @@ def independent_equations(dae: "Dae") -> list[Equation]:
 
 
 class _Writer:
-    def __init__(self, dae: "Dae"):
+    def __init__(self, dae: Translated):
         self.dae, self.flat, self.graph = dae, dae.flat, Graph()
         self.equations = independent_equations(dae)
         self.auxiliaries: list[str] = []

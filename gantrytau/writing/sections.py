@@ -2,14 +2,11 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from gantrytau.compiler.index_reduction import Key
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +52,7 @@ class Section:
         return f"{self.kind} block of {count} unknown{plural}, torn to {self.torn}"
 
 
-def sections(dae: "Dae") -> list[Section]:
+def sections(dae: Translated) -> list[Section]:
     """The blocks of a Dae as lines to be read."""
     found: list[Section] = []
     for number, block in enumerate(dae.blocks, start=1):
@@ -71,7 +68,7 @@ def sections(dae: "Dae") -> list[Section]:
     return found
 
 
-def origin_words(dae: "Dae", equations: Iterable[Key]) -> tuple[str, ...]:
+def origin_words(dae: Translated, equations: Iterable[Key]) -> tuple[str, ...]:
     """Where equations come from, rows of one vector equation put together: 'tool (Tool), equation 2, rows 0 to 2'."""
     rows: dict[tuple[str, str], list[int]] = {}
     for index, times in equations:

@@ -1,15 +1,11 @@
 """The blocks of a Dae as plain text, in the order of solution, with the component equation each line comes from."""
 
-from typing import TYPE_CHECKING
-
 import casadi as ca
 
+from gantrytau.compiler.translated import Translated
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
-
-if TYPE_CHECKING:
-    from gantrytau.dae import Dae
 
 WORDS = {
     "or": " or ", "and": " and ", "not": "not ", "neg": "-",
@@ -56,7 +52,7 @@ class PlainSyntax:
         return Written(f"{operation}({', '.join(arguments.bare(k) for k in range(len(arguments)))})")
 
 
-def block_text(dae: "Dae") -> str:
+def block_text(dae: Translated) -> str:
     """One line per solved unknown, in the order of solution, with the component equation it comes from."""
     lines = [
         f"{dae.name}",
@@ -69,7 +65,7 @@ def block_text(dae: "Dae") -> str:
     return "\n".join(lines) + "\n"
 
 
-def event_lines(dae: "Dae") -> list[str]:
+def event_lines(dae: Translated) -> list[str]:
     """What is set at instants, line by line."""
     lines = []
     for held in dae.flat.sampled:

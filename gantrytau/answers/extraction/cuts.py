@@ -15,8 +15,8 @@ from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import all_symbols
-from gantrytau.dae import Dae
 from gantrytau.errors import StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -101,7 +101,7 @@ class Strata:
     constraints: which equations relate T and q alone.
     """
 
-    def __init__(self, dae: Dae, roles: Mapping[str, Sequence[str]]):
+    def __init__(self, dae: Translated, roles: Mapping[str, Sequence[str]]):
         self.dae, self.roles = dae, roles
         self.columns = {k: _column([ca.SX.sym(n) for n in self.names(k)]) for k in EVERYTHING}
         self.p = _column([dae.table.symbols[n] for n in dae.table.independent])

@@ -23,8 +23,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Strata
-from gantrytau.compiler.translation import names, translate, translate_flat
-from gantrytau.dae import Dae
+from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translation import names, translate_flat, translate_model
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
@@ -101,7 +101,7 @@ TITLES = {
 
 
 def extract_mechanism(
-    model: Model | Dae, *, tool: str | Sequence[str], joints: Sequence[str], forces: Sequence[str]
+    model: Model | Translated, *, tool: str | Sequence[str], joints: Sequence[str], forces: Sequence[str]
 ) -> Mechanism:
     """The equations of a mechanism as named functions, extracted from the model.
 
@@ -110,7 +110,7 @@ def extract_mechanism(
     values. Source: Dressler (2012), section 6.3. Raises ModelError for unknown names and counts that do not fit,
     StructureError where tool, joints and forces do not determine each other.
     """
-    dae = model if isinstance(model, Dae) else translate(model)
+    dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_events(dae.flat)
     roles = _roles(dae, {"T": tool, "q": joints, "f": forces})
     strata = Strata(_moved_by_tool(dae, roles), roles)
@@ -129,7 +129,7 @@ def extract_mechanism(
     return Mechanism(model=dae.name, **lists, **found, written=_written(strata, functions, weights))
 
 
-def _roles(dae: Dae, given: Mapping[str, str | Sequence[str]]) -> dict[str, tuple[str, ...]]:
+def _roles(dae: Translated, given: Mapping[str, str | Sequence[str]]) -> dict[str, tuple[str, ...]]:
     """Scalar names of T, q and f; ModelError for names and counts that cannot be right."""
     found: dict[str, tuple[str, ...]] = {}
     for role, wanted in given.items():
@@ -150,7 +150,7 @@ def _roles(dae: Dae, given: Mapping[str, str | Sequence[str]]) -> dict[str, tupl
                 f"{ROLES[role]}: {name} of {dae.name} is {what}, expected a {kind}; name another"
             )
         found[role] = scalars
-    mobility = dae.diagnosis.mobility
+    mobility = dae.mobility
     if any(len(scalars) != mobility for scalars in found.values()):
         counts = ", ".join(f"{len(scalars)} {ROLES[role]}" for role, scalars in found.items())
         raise ModelError(
@@ -160,7 +160,7 @@ def _roles(dae: Dae, given: Mapping[str, str | Sequence[str]]) -> dict[str, tupl
     return found
 
 
-def _moved_by_tool(dae: Dae, roles: Mapping[str, Sequence[str]]) -> Dae:
+def _moved_by_tool(dae: Translated, roles: Mapping[str, Sequence[str]]) -> Translated:
     """The same model with the motion of the tool known, and as many inputs unknown."""
     roots = {dae.reduced.aliases[n].root for n in roles["f"]}
     others = [n for n in dae.known if n not in roots]

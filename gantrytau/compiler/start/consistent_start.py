@@ -1,23 +1,14 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import casadi as ca
-import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.compiler.parameters import ParameterTable, with_values
+from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import Guess
-from gantrytau.dae import Dae
-from gantrytau.errors import InitializationError, ModelError
+from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.language.symbols import derivative_name, split_derivative
-
-STEP = 0.3  # m or rad between stops on the way to given positions
-MOST_STEPS = 40
 
 
 def consistent_start(
@@ -63,145 +54,3 @@ def _initial_level(flat: FlatModel, table: ParameterTable, reduced: Reduced, sta
         + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
         tuple(n for s in stages for n in s.unknowns),
     )
-
-
-def evaluate(dae: Dae, given: dict[str, Any]) -> dict[str, Any]:
-    """See Dae.evaluate."""
-    scalars = given_scalars(dae, given)
-    parameters = {n: v for n, v in scalars.items() if n in dae.table.symbols}
-    if parameters:
-        from gantrytau.compiler.translation import retranslate
-
-        rest = {n: v for n, v in scalars.items() if n not in parameters}
-        return evaluate(retranslate(dae, with_values(dae.flat, parameters)), rest)
-    values = dict(dae.start)
-    held: set[str] = set()
-    for name, number in scalars.items():
-        base, order = split_derivative(name)
-        if name == dae.flat.time.name():
-            values[name] = number
-            continue
-        if base not in dae.reduced.aliases:
-            raise ModelError(f"{dae.name}: {name} is propagated, not a variable; give what it follows from")
-        alias = dae.reduced.aliases[base]
-        offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
-        if alias.root is None:
-            if abs(number - offset) > 1e-9 * max(1.0, abs(offset)):
-                raise InitializationError(
-                    f"{name}: found {number:g}, but it is constant and equal to {offset:g}"
-                )
-            continue
-        symbol = derivative_name(alias.root, alias.order + order)
-        value = (number - offset) / alias.factor
-        if symbol in held and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
-            raise InitializationError(
-                f"{name}: found {number:g}, which contradicts another given value of the same quantity"
-            )
-        values[symbol] = value
-        held.add(symbol)
-    for share in _shares(dae, values, held):
-        # on the way, so that mechanisms stay assembled as they are at the start
-        way = {n: dae.start.get(n, values[n]) for n in held}
-        near = {**values, **{n: begin + share * (values[n] - begin) for n, begin in way.items()}}
-        try:
-            reached = _complete(dae, near, frozenset(held))
-        except InitializationError:
-            break  # the straight way leads out of reach; the end need not be
-        values |= {n: v for n, v in reached.items() if n not in held}
-    found = _complete(dae, values, frozenset(held))
-    return named_values(dae, found)
-
-
-def _shares(dae: Dae, values: Mapping[str, float], held: set[str]) -> list[float]:
-    """Where to stop on the way from the start to given positions: after each metre or radian of STEP."""
-    places = [n for n in held if dae.indexed.orders.get(n, 0) > 1]
-    free = sum(1 for n in dae.choice.states if dae.indexed.orders.get(n, 0) > 1)
-    far = max((abs(values[n] - dae.start[n]) for n in places), default=0.0)
-    # more positions than can be chosen are consistent at the end of the way only
-    count = min(int(far / STEP) + 1, MOST_STEPS) if len(places) <= free else 1
-    return [k / count for k in range(1, count)]
-
-
-def _complete(dae: Dae, values: dict[str, float], held: frozenset[str]) -> dict[str, float]:
-    guess = Guess(values, frozenset(dae.settings.get("started", ())), frozenset())
-    derivatives = [n for n in values if split_derivative(n)[0] in dae.known]
-    try:
-        return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, held | set(derivatives))
-    except InitializationError as error:
-        free = tuple(n for n in dae.known if n not in held)
-        still = held | (set(derivatives) - set(free))
-        try:
-            if not free:
-                raise error
-            return consistent_start(
-                dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free
-            )
-        except InitializationError:
-            return _jointly(dae, guess, frozenset(still), free, error)
-
-
-def _jointly(
-    dae: Dae, guess: Guess, held: frozenset[str], free: tuple[str, ...], error: InitializationError
-) -> dict[str, float]:
-    """All levels at once: what is held may belong to a later level than the positions that it decides."""
-    orders = dae.indexed.orders
-    late = [n for n in held if orders.get(n, 0) < max(orders.values(), default=0) and n in orders]
-    if not late:
-        raise error  # all that is held are positions, which have been tried
-    whole = dae.indexed.whole
-    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free))
-    try:
-        found = solve_levels([level], guess.values, held=held, started=guess.started | held, title=dae.name)
-    except InitializationError:
-        raise error from None
-    return found
-
-
-def given_scalars(dae: Dae, given: Mapping[str, Any]) -> dict[str, float]:
-    """Values by scalar name; ModelError for unknown names, wrong lengths and numbers that are not finite."""
-    found: dict[str, float] = {}
-    for name, value in given.items():
-        elements = dae.expand(name)
-        try:
-            numbers = np.asarray(value, dtype=float).ravel(order="F")
-        except (TypeError, ValueError):
-            raise ModelError(f"{name}: found {value!r}, expected a number or an array of numbers") from None
-        if numbers.size != len(elements):
-            raise ModelError(f"{name}: found {numbers.size} values, expected {len(elements)}")
-        if not np.all(np.isfinite(numbers)):
-            raise ModelError(f"{name}: found {numbers.tolist()}, expected finite numbers")
-        found.update(zip(elements, numbers.tolist(), strict=True))
-    return found
-
-
-def named_values(dae: Dae, values: Mapping[str, float]) -> dict[str, Any]:
-    """Every variable, parameter and derivative by name, scalars as float and vectors as arrays."""
-    chains = dae.indexed.orders
-    names: list[str] = []
-    groups: list[tuple[str, tuple[int, ...], list[str]]] = []
-    for quantity in dae.flat.propagated:
-        groups.append((quantity.name, quantity.shape, list(quantity.elements)))
-    for variable in dae.flat.variables:
-        for order in range(max(chains.values(), default=0) + 1):
-            elements = [derivative_name(n, order) for n in variable.elements]
-            if all(_available(dae, n, order, chains, values) for n in variable.elements):
-                groups.append((derivative_name(variable.name, order), variable.shape, elements))
-                names += elements
-    names += dae.flat.definitions
-    numbers = dict(zip(names, dae.numbers(names, values).tolist(), strict=True))
-    for name, shape, elements in groups:
-        if shape:
-            numbers[name] = np.array([numbers[n] for n in elements]).reshape(shape, order="F")
-    for parameter in dae.flat.parameters:
-        numbers.update((n, dae.table.values[n]) for n in parameter.elements)
-        if parameter.shape:
-            whole = np.array([dae.table.values[n] for n in parameter.elements])
-            numbers[parameter.name] = whole.reshape(parameter.shape, order="F")
-    return numbers
-
-
-def _available(
-    dae: Dae, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]
-) -> bool:
-    alias = dae.reduced.aliases[name]
-    return alias.root is None or derivative_name(alias.root, alias.order + order) in values
