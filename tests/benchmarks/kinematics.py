@@ -12,9 +12,9 @@ import numpy as np
 from gantrytau.kinematics import Kinematics, accuracy, assembly_modes
 from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
-from tests.kinematics.test_accuracy import CASE_1, CASE_2, slice_between_guideways
 from tests.kinematics.test_assembly_modes import HOME, f1_hexapod, link_errors, random_hexapod
 from tests.kinematics.test_kinematics_f1 import LIMIT, poses
+from tests.references.cart_errors import CASE_1, CASE_2, slice_between_guideways
 
 POSES = 1_000_000
 # (4.9) pose after pose, as it is written down

@@ -47,19 +47,30 @@ def in_turn(programs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, fl
     return {name: statistics.median(found) for name, found in times.items()}
 
 
+WIDTH = 140  # of the table where the output is no terminal
+COLUMNS = (64, 50, 14, 4)  # figure, measured, target, met
+
+
 def print_table(title: str, parts: Iterable[Iterable[Row]]) -> int:
-    """Measure and print all rows; 1 if a target is missed."""
-    table = Table(title=title)
-    for heading in ("figure", "measured", "target", "met"):
-        table.add_column(heading, justify="left" if heading == "figure" else "right")
-    missed = False
+    """Measure all rows and print each as it comes; 1 if a target is missed."""
     screen = Console()
-    with screen.status("measuring") as status:
-        for part in parts:
-            for row in part:
-                status.update(f"measured {row.figure}")
-                verdict = "" if row.met is None else "yes" if row.met else "NO"
-                table.add_row(row.figure, row.measured, row.target, verdict)
-                missed |= row.met is False
-    screen.print(table)
-    return int(missed)
+    if not screen.is_terminal:
+        screen = Console(width=WIDTH)
+    screen.print(_line(title, "measured", "target", "met"), style="bold")
+    missed = []
+    for part in parts:
+        for row in part:
+            verdict = "" if row.met is None else "yes" if row.met else "NO"
+            screen.print(_line(row.figure, row.measured, row.target, verdict))
+            missed += [row.figure] if row.met is False else []
+    screen.print(f"Missed: {'; '.join(missed)}" if missed else "All targets are met.")
+    return int(bool(missed))
+
+
+def _line(*cells: str) -> Table:
+    """One line of the table, whose columns stand under each other though it grows."""
+    line = Table.grid(padding=(0, 1), expand=False)
+    for k, width in enumerate(COLUMNS):
+        line.add_column(width=width, justify="right" if k else "left")
+    line.add_row(*cells)
+    return line

@@ -8,14 +8,12 @@ from gantrytau import ModelError, Start, translate
 from gantrytau.kinematics.accuracy.accuracy import SIGNS, accuracy
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
+from tests.references.cart_errors import CASE_1, CASE_2, slice_between_guideways
 
 matplotlib.use("Agg")
 
 MODEL = GantryTau(prototypes.D1)
 D1 = Kinematics(MODEL)
-# Table 4.2 of Dressler (2012), in m: the same errors in all directions, and less along the guideways
-CASE_1 = np.repeat([[32e-6], [77e-6], [54e-6]], 3, axis=1)
-CASE_2 = np.array([[11e-6, 28e-6, 28e-6], [58e-6, 38e-6, 38e-6], [19e-6, 47e-6, 47e-6]])
 
 
 def with_links_along(axes: np.ndarray) -> GantryTau:
@@ -25,12 +23,6 @@ def with_links_along(axes: np.ndarray) -> GantryTau:
         direction = -axis + 0.3 * np.roll(axis, 1)
         arms.append(dict(length=2.0, offset=list(2.0 * axis - 0.7 * direction), direction=list(direction)))
     return MODEL.modified(dict(arms=arms, tool=dict(r=Start([0.0, 0.0, 0.0]))))
-
-
-def slice_between_guideways(x: float = 0.0, points: int = 31) -> np.ndarray:
-    """Places of the tool of D1 on a plane across its guideways."""
-    y, z = np.meshgrid(np.linspace(-4.95, -3.65, points), np.linspace(-0.65, 0.7, points), indexing="ij")
-    return np.stack([np.full_like(y, x), y, z], axis=-1).reshape(-1, 3)
 
 
 @pytest.mark.parametrize(("case", "low", "high"), [(CASE_1, 140e-6, 240e-6), (CASE_2, 90e-6, 170e-6)])
