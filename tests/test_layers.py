@@ -1,7 +1,12 @@
-"""The layers: models, optimica and fmu stand on gantrytau and do not know each other."""
+"""The house: what each folder may import, how large things may be, and that no name stands for two of them."""
 
 import ast
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -13,45 +18,346 @@ PACKAGES = {
     "gantrytau_optimica": ROOT / "optimica" / "gantrytau_optimica",
     "gantrytau_fmu": ROOT / "fmu" / "gantrytau_fmu",
 }
-FILES = [(package, file) for package, folder in PACKAGES.items() for file in sorted(folder.rglob("*.py"))]
-COMMAND_LINE = ROOT / "gantrytau" / "cli.py"
-COMMANDS = ROOT / "gantrytau" / "commands"  # the two are the composition root
+ORDER = {  # a room imports the rooms before it
+    "gantrytau": "errors interruption whole_files progress language flattening compiler results simulation writing "
+    "answers dae __init__ kinematics mechanics commands cli",
+    "gantrytau_models": "prototypes mechanisms control __init__",
+    "gantrytau_optimica": "problem control transcription solving failures answers refinement prepared optimize "
+    "studies estimation paths calibration procedure __init__",
+    "gantrytau_optimica.calibration": "data rods fitting judging calibration calibrate design devices surveys report",
+    "gantrytau_fmu": "description code describing building reading export systems __init__",
+}
+READMES = {  # the page with the map of a folder
+    "gantrytau": ROOT / "gantrytau" / "README.md",
+    "gantrytau.kinematics": ROOT / "gantrytau" / "kinematics" / "README.md",
+    "gantrytau.mechanics": ROOT / "gantrytau" / "mechanics" / "README.md",
+    "gantrytau_models": ROOT / "models" / "README.md",
+    "gantrytau_optimica": ROOT / "optimica" / "README.md",
+    "gantrytau_fmu": ROOT / "fmu" / "README.md",
+}
+FILES_IN_A_FOLDER, FILES_IN_THE_ROOT, LINES, LINES_OF_A_FUNCTION, ARGUMENTS = 14, 8, 400, 60, 8
+SHARED_NAMES = {"__init__", "figures", "files", "report"}  # of files
+SHARED_CLASSES = {"Experiment"}  # of an FMU, and of an estimation: each is the word of its field, and public
+COMPONENTS = (
+    "gantrytau.mechanics.",
+    "gantrytau_models.",
+)  # their classes have the field's words, twice if need be
+INSIDES = {"reduced", "indexed", "table", "choice", "blocks", "request", "settings"}  # of a translated model
+KEYHOLE = tuple(f"gantrytau.{room}" for room in ("compiler.", "simulation.", "writing.", "answers.", "dae"))
+KEYHOLE = (*KEYHOLE, "gantrytau_fmu.code.")  # who may look
+EXCEPTIONS = ROOT / "tests" / "house_exceptions.txt"  # may only shrink
 
 
-def imports(tree: ast.AST, inside_function: bool = False) -> Iterator[tuple[str, bool]]:
-    """The packages that a module imports, and whether it does so inside a function, or for type checkers only."""
-    for node in ast.iter_child_nodes(tree):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            names = [node.module]
-        yield from ((name.split(".")[0], inside_function) for name in names)
-        for_types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        yield from imports(node, inside_function or for_types or isinstance(node, ast.FunctionDef))
+@dataclass(frozen=True)
+class File:
+    """A module by its dotted name; a package has the name of its folder and `.__init__`."""
+
+    name: str
+    text: str
+
+    @cached_property
+    def nodes(self) -> list[ast.AST]:
+        return list(ast.walk(ast.parse(self.text)))
+
+    @cached_property
+    def offered(self) -> set[str]:
+        """The names in `__all__`."""
+        lists = (
+            n.value
+            for n in self.nodes
+            if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__"
+        )
+        return {name for names in lists for name in ast.literal_eval(names)}
+
+    @property
+    def package(self) -> str:
+        return self.name.split(".")[0]
+
+    def within(self, room: str) -> bool:
+        return self.name.startswith(f"{room}.")
 
 
-def offences(package: str, file: Path) -> list[str]:
-    """The packages that a file imports against the rule."""
-    may_join = file == COMMAND_LINE or COMMANDS in file.parents
-    return [
-        name
-        for name, inside_function in imports(ast.parse(file.read_text(encoding="utf-8")))
-        if name in PACKAGES and name not in {package, "gantrytau"} and not (may_join and inside_function)
-    ]
+House = Mapping[str, File]
 
 
-def test_the_source_is_found():
-    assert {package for package, _ in FILES} >= {"gantrytau", "gantrytau_models"}
+def house(packages: Mapping[str, Path]) -> House:
+    """All files of the packages, by name."""
+    files = {}
+    for package, folder in packages.items():
+        for path in sorted(folder.rglob("*.py")):
+            name = ".".join((package, *path.relative_to(folder).with_suffix("").parts))
+            files[name] = File(name, path.read_text(encoding="utf-8"))
+    return files
 
 
-@pytest.mark.parametrize(("package", "file"), FILES, ids=lambda value: Path(value).name)
-def test_a_module_imports_only_what_its_layer_may(package, file):
-    assert offences(package, file) == []
+def imports(files: House, file: File) -> Iterator[tuple[str, str, str]]:
+    """What a file imports of the house, late and for types too: the file, and module and name as they are written."""
+    for node in file.nodes:
+        if isinstance(node, ast.ImportFrom):
+            pairs = [("." * node.level + (node.module or ""), alias.name) for alias in node.names]
+        elif isinstance(node, ast.Import):
+            pairs = [(alias.name, "") for alias in node.names]
+        else:
+            continue
+        for module, name in pairs:
+            places = (f"{module}.{name}", f"{module}.{name}.__init__", module, f"{module}.__init__")
+            found = next((place for place in places if place in files), None)
+            if found not in (None, file.name) or module.startswith("."):
+                yield found or module, module, name
 
 
-def test_an_offence_is_noticed(tmp_path):
-    wrong = tmp_path / "wrong.py"
-    wrong.write_text("import gantrytau\ndef f():\n    from gantrytau_optimica.problem import at\n")
-    assert offences("gantrytau_models", wrong) == ["gantrytau_optimica"]
-    assert offences("gantrytau_optimica", wrong) == []
+def room_of(name: str, folder: str) -> str:
+    """The file or folder of `folder` in which a file is."""
+    return name[len(folder) + 1 :].split(".")[0]
+
+
+def wrong_arrows(files: House, order: Mapping[str, str] = ORDER) -> Iterator[str]:
+    """Imports of a later room, of a neighbouring package, and of what only the command line may know."""
+    for file in files.values():
+        commands = file.within("gantrytau.commands")
+        for target, module, name in imports(files, file):
+            package = target.split(".")[0]
+            if package not in (file.package, "gantrytau"):
+                wrong = not commands
+            elif target.startswith("gantrytau.commands."):
+                wrong = not commands and file.name != "gantrytau.cli"
+            else:
+                wrong = any(
+                    later(file.name, target, folder, rooms.split()) for folder, rooms in order.items()
+                )
+            if commands and not target.startswith("gantrytau.commands."):  # by the front door
+                door = files.get(f"{module}.__init__")
+                wrong = not target.endswith(".__init__") and (door is None or name not in door.offered)
+            if wrong:
+                yield f"{file.name} -> {target}"
+
+
+def later(name: str, target: str, folder: str, rooms: list[str]) -> bool:
+    """Whether a file in a folder needs one in a later room of it, or a room has no place in the order."""
+    if not (name.startswith(f"{folder}.") and target.startswith(f"{folder}.")):
+        return False
+    here, there = room_of(name, folder), room_of(target, folder)
+    return not {here, there} <= set(rooms) or rooms.index(there) > rooms.index(here)
+
+
+def circles(files: House) -> Iterator[str]:
+    """Files that need each other."""
+    graph = {name: sorted({target for target, _, _ in imports(files, file)}) for name, file in files.items()}
+    while True:  # one circle after the other, an arrow removed
+        try:
+            return TopologicalSorter(graph).prepare()
+        except CycleError as error:
+            found = error.args[1]
+            graph[found[1]].remove(found[0])
+            yield "circle of " + ", ".join(sorted(set(found)))
+
+
+def too_large(files: House) -> Iterator[str]:
+    """Folders, files, functions and signatures above their limits."""
+    classes = [node for file in files.values() for node in file.nodes if isinstance(node, ast.ClassDef)]
+    public = {name for file in files.values() for name in file.offered}
+    public |= {ast.unparse(base) for node in classes if node.name in public for base in node.bases}
+    for folder, count in Counter(name.rpartition(".")[0] for name in files).items():
+        if count > (FILES_IN_THE_ROOT if folder == "gantrytau" else FILES_IN_A_FOLDER):
+            yield f"{folder} has {count} files"
+    for file in files.values():
+        if len(file.text.splitlines()) > LINES:
+            yield f"{file.name} has {len(file.text.splitlines())} lines"
+        owners = {
+            id(part): node.name for node in file.nodes if isinstance(node, ast.ClassDef) for part in node.body
+        }
+        for node in file.nodes:
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                asked = [a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+                command = file.within("gantrytau.commands") and "json" in asked  # its signature is its help
+                lines = (node.end_lineno or 0) - (node.body[0].lineno if command else node.lineno) + 1
+                if lines > LINES_OF_A_FUNCTION:
+                    yield f"{file.name}.{node.name} has {lines} lines"
+                count = len(set(asked) - {"self", "cls"})
+                if count > ARGUMENTS and not command and owners.get(id(node), node.name) not in public:
+                    yield f"{file.name}.{node.name} has {count} arguments"
+
+
+def named_twice(files: House) -> Iterator[str]:
+    """Names that stand for two files, or for two classes."""
+    stems = Counter(name.rpartition(".")[2] for name in files)
+    classes = Counter(
+        node.name
+        for file in files.values()
+        if not file.name.startswith(COMPONENTS)
+        for node in file.nodes
+        if isinstance(node, ast.ClassDef)
+    )
+    yield from (f"{stem}.py {n} times" for stem, n in stems.items() if n > 1 and stem not in SHARED_NAMES)
+    yield from (
+        f"class {name} {n} times" for name, n in classes.items() if n > 1 and name not in SHARED_CLASSES
+    )
+
+
+def peeks(files: House) -> Iterator[str]:
+    """Looks into a translated model from outside of the compiler, and at private names of others."""
+    private = re.compile("_[^_]")
+    for file in files.values():
+        own = {
+            "_replace",
+            "_asdict",
+            *re.findall(r"(?:def |class |self\.|cls\.|^ *)(_\w+)", file.text, re.MULTILINE),
+        }
+        for node in file.nodes:
+            if isinstance(node, ast.ImportFrom):
+                yield from (
+                    f"{file.name}: {a.name} of {node.module}" for a in node.names if private.match(a.name)
+                )
+            elif isinstance(node, ast.Attribute):
+                of = ast.unparse(node.value).rpartition(".")[2]
+                inside = (
+                    node.attr in INSIDES and of in ("dae", "translated") and not file.name.startswith(KEYHOLE)
+                )
+                if inside or (
+                    private.match(node.attr) and of not in ("self", "cls") and node.attr not in own
+                ):
+                    yield f"{file.name}: {of}.{node.attr}"
+
+
+def unmapped(files: House, readmes: Mapping[str, Path] = READMES) -> Iterator[str]:
+    """What the first column of a page's map leaves out of files and folders, and what it names besides."""
+    for folder, page in readmes.items():
+        section = (
+            page.read_text(encoding="utf-8").partition("\n## How it is laid out")[2].partition("\n## ")[0]
+        )
+        rows = re.findall(r"^\| (.*?) \|", section, re.MULTILINE)[1:]
+        told = set(re.findall(r"\w+", re.sub(r"\]\(.*?\)", "]", " ".join(rows))))
+        there = set[str]()
+        for name in files:
+            if name.startswith(f"{folder}."):
+                deeper = [
+                    other
+                    for other in readmes
+                    if other.startswith(f"{folder}.") and name.startswith(f"{other}.")
+                ]
+                there.update((min(deeper, key=len) if deeper else name)[len(folder) + 1 :].split("."))
+        there -= {"__init__"}
+        yield from (f"the page of {folder} leaves out {name}" for name in sorted(there - told))
+        yield from (f"the page of {folder} names {name}, which is not there" for name in sorted(told - there))
+
+
+RULES = (wrong_arrows, circles, too_large, named_twice, peeks, unmapped)
+
+
+@pytest.fixture(scope="module")
+def files() -> House:
+    return house(PACKAGES)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_the_house_is_in_order(rule, files):
+    known = {line.split("  #")[0] for line in EXCEPTIONS.read_text(encoding="utf-8").splitlines()}
+    assert set(rule(files)) - known == set()
+
+
+OFFENCES = {  # rule -> files of a house, and what is said of them
+    wrong_arrows: (
+        {
+            "gantrytau/__init__": "",
+            "gantrytau/errors": "",
+            "gantrytau/language/model": "def f():\n    from gantrytau.compiler import blocks",
+            "gantrytau/compiler/blocks": "import gantrytau.commands.app\nfrom gantrytau.errors import E",
+            "gantrytau/commands/app": "from gantrytau import N, errors\nfrom gantrytau_models import Pendulum",
+            "gantrytau/attic/old": "import gantrytau.errors",
+            "gantrytau_models/__init__": "",
+            "gantrytau_models/control": "from gantrytau_fmu import export",
+            "gantrytau_fmu/export": "import gantrytau",
+        },
+        {
+            "gantrytau.language.model -> gantrytau.compiler.blocks",
+            "gantrytau.compiler.blocks -> gantrytau.commands.app",
+            "gantrytau.commands.app -> gantrytau.errors",
+            "gantrytau.attic.old -> gantrytau.errors",
+            "gantrytau_models.control -> gantrytau_fmu.export",
+        },
+    ),
+    circles: (
+        {
+            "gantrytau/a": "if TYPE_CHECKING:\n    from gantrytau.b import B",
+            "gantrytau/b": "def f():\n    from gantrytau import a",
+            "gantrytau/c": "import gantrytau.a",
+        },
+        {"circle of gantrytau.a, gantrytau.b"},
+    ),
+    too_large: (
+        {
+            **{f"gantrytau/{letter}": "" for letter in "abcdefgh"},
+            "gantrytau/__init__": "__all__ = ['shown']",
+            **{f"gantrytau/language/{letter}": "" for letter in "abcdefghijklmn"},
+            "gantrytau/language/long": "\n" * 401,
+            "gantrytau/language/a": "def f():\n" + "    pass\n" * 60,
+            "gantrytau/commands/a": "def f(a, b, c, d, e, f, g, h,\n json):" + "\n    pass" * 60,
+            "gantrytau/language/b": "def f(a, b, c, d, e, f, g, *, h, i): ...\ndef shown(a, b, c, d, e, f, g, h, i): 0",
+        },
+        {
+            "gantrytau has 9 files",
+            "gantrytau.language has 15 files",
+            "gantrytau.language.long has 401 lines",
+            "gantrytau.language.a.f has 61 lines",
+            "gantrytau.language.b.f has 9 arguments",
+        },
+    ),
+    named_twice: (
+        {
+            "gantrytau/figures": "class A: ...",
+            "gantrytau/results/figures": "class A: ...\nclass B: ...",
+            "gantrytau/results/graph": "class Experiment: ...",
+            "gantrytau/writing/graph": "class Experiment: ...",
+            "gantrytau/mechanics/rotational": "class B: ...",
+        },
+        {"graph.py 2 times", "class A 2 times"},
+    ),
+    peeks: (
+        {
+            "gantrytau/kinematics/poses": "robot.dae.table.values, figure.table, self._own, there._own",
+            "gantrytau/compiler/states": "dae.table",
+            "gantrytau/writing/text": "from gantrytau.errors import _words\nresult._signals",
+        },
+        {
+            "gantrytau.kinematics.poses: dae.table",
+            "gantrytau.writing.text: _words of gantrytau.errors",
+            "gantrytau.writing.text: result._signals",
+        },
+    ),
+    unmapped: (
+        {"gantrytau/errors": "", "gantrytau/language/model": "", "gantrytau/kinematics/poses": ""},
+        {
+            "the page of gantrytau leaves out errors",
+            "the page of gantrytau names closures, which is not there",
+        },
+    ),
+}
+PAGE = """
+| elsewhere | what |
+|---|---|
+| errors | not on the map |
+
+## How it is laid out, in the order of reading
+
+| file | what |
+|---|---|
+| `language/`: model, closures | errors are words here |
+| [kinematics/](elsewhere/README.md) | has a page of its own |
+
+## Limits
+"""
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_an_offence_is_noticed(rule, tmp_path):
+    texts, expected = OFFENCES[rule]
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / f"{name}.py").write_text(text)
+    (tmp_path / "README.md").write_text(PAGE)
+    (tmp_path / "poses.md").write_text(
+        "# Poses\n\n## How it is laid out\n\n| file | what |\n|---|---|\n| poses | rigid |\n"
+    )
+    found = house({path.name: path for path in tmp_path.iterdir() if path.is_dir()})
+    pages = ({"gantrytau": tmp_path / "README.md", "gantrytau.kinematics": tmp_path / "poses.md"},)
+    assert set(rule(found, *(pages if rule is unmapped else ()))) == expected
