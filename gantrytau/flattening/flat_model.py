@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -15,7 +16,8 @@ class FlatVariable:
 
     name: dotted path; shape: (), (n,) or (n, m); elements: names of its scalars, column after column;
     symbol: its SX; start, min, max: SX expressions of parameters per scalar, or None (no opinion);
-    model: class that declares it; owner: path of the component or connector that holds it.
+    model: class that declares it; owner: path of the component or connector that holds it; undetermined: the likely
+    cause where the equations do not determine it.
     """
 
     name: str
@@ -33,6 +35,7 @@ class FlatVariable:
     prefer: StateSelect = StateSelect.DEFAULT
     owner: str = ""
     free: bool = False
+    undetermined: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +126,6 @@ class FlatModel:
     rates: Mapping[str, ca.SX]
     loops: tuple[Loop, ...]
     inputs: tuple[str, ...]
-    hints: Mapping[str, str]
     absent: Mapping[str, str]
     requirements: tuple[Requirement, ...]
     sampled: tuple[Sampled, ...] = ()
@@ -133,6 +135,12 @@ class FlatModel:
         """The variable, parameter or propagated quantity of that name."""
         everything = (*self.variables, *self.parameters, *self.propagated)
         return next((v for v in everything if v.name == name), None)
+
+    @cached_property
+    def hints(self) -> Mapping[str, str]:
+        """Scalar name -> the likely cause where the equations do not determine it."""
+        told = (v for v in (*self.variables, *self.propagated) if v.undetermined)
+        return {name: v.undetermined for v in told for name in v.elements}
 
     @property
     def event_names(self) -> tuple[str, ...]:

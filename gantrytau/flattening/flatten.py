@@ -115,7 +115,6 @@ def write_out(instance: Instance) -> FlatModel:
         rates=spread.rates,
         loops=tuple(loop for _, loop in tree.closing),
         inputs=_free_inputs(instance, equations),
-        hints=_hints(instance),
         absent=absent,
         requirements=(*stated.requirements, *events.requirements),
         sampled=sampled,
@@ -314,6 +313,7 @@ def _common(placed: Placed) -> dict[str, Any]:
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
         owner=placed.path,
         free=getattr(placed.declaration, "free", False),
+        undetermined=attributes["undetermined"].value,
         **limits,
     )
 
@@ -327,15 +327,3 @@ def _parameter(placed: Placed) -> FlatParameter:
     declaration = placed.declaration
     assert isinstance(declaration, Parameter)
     return FlatParameter(**_common(placed), value=expression(placed, "value"), fold=declaration.fold)
-
-
-def _hints(instance: Instance) -> dict[str, str]:
-    hints: dict[str, str] = {}
-    by_path = dict(instance.components)
-    for placed in instance.quantities:
-        component = by_path.get(placed.path)
-        if component is not None and type(component).failure_hint is not Model.failure_hint:
-            words = component.failure_hint(placed.name.rsplit(".", 1)[-1])
-            if words:
-                hints |= dict.fromkeys(placed.elements, str(words))
-    return hints

@@ -21,7 +21,9 @@ from gantrytau.language.model import (
 )
 from gantrytau.language.symbols import Symbols, element_names
 
-ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "description")
+ATTRIBUTES = (
+    "start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "description", "undetermined",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,6 +141,7 @@ class Quantity(Formula):
         max: Any = None,
         nominal: Any = None,
         prefer: StateSelect = StateSelect.DEFAULT,
+        undetermined: str = "",
     ):
         self.declared_shape = shape
         self.unit = unit
@@ -151,6 +152,7 @@ class Quantity(Formula):
         self.max = max
         self.nominal = nominal
         self.prefer = prefer
+        self.undetermined = undetermined
         self.name = ""
         self.owner = ""
 
@@ -182,6 +184,7 @@ class Real(Quantity):
     shape: (), an int or a tuple; a function of the instance where it depends on its settings.
     start: guess of the initial value (None: no opinion); fixed: the start is an initial condition.
     min, max: limits used by optimisation; nominal: typical magnitude; prefer: see StateSelect.
+    undetermined: the likely cause where the equations do not determine it, for messages.
     """
 
 

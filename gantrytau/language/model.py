@@ -128,10 +128,6 @@ class Model(Declared):
         """Equations that hold at the start only."""
         yield from ()
 
-    def failure_hint(self, variable: str) -> str:
-        """What the likely cause is when `variable` of this component cannot be determined."""
-        return ""
-
 
 class Outer:
     """The component of a class that stands in this model or nearest around it: `world = Outer(World)`."""

@@ -19,6 +19,7 @@ from gantrytau import (
 )
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
+BESIDE = "a relative sensor carries no torque; connect it beside a component, not in its place"
 
 
 class Flange(Connector):
@@ -188,15 +189,14 @@ class Position(Model):
     """Turns the flange as a given function of time, whatever torque that takes."""
 
     phi = Input(unit="rad", description="angle", start=0.0)
-    tau = Real(unit="N.m", description="torque that it takes, positive with the angle")
+    tau = Real(
+        unit="N.m", description="torque that it takes, positive with the angle", undetermined=TWICE_HELD
+    )
     flange = Flange()
 
     def equations(self):
         yield self.flange.phi == self.phi
         yield self.flange.tau == -self.tau
-
-    def failure_hint(self, variable: str) -> str:
-        return TWICE_HELD if variable == "tau" else ""
 
 
 class Speed(Model):
@@ -204,7 +204,9 @@ class Speed(Model):
 
     w = Input(unit="rad/s", description="angular velocity", start=0.0)
     phi = Real(unit="rad", description="angle", start=0.0)
-    tau = Real(unit="N.m", description="torque that it takes, positive with the angle")
+    tau = Real(
+        unit="N.m", description="torque that it takes, positive with the angle", undetermined=TWICE_HELD
+    )
     flange = Flange()
 
     def equations(self):
@@ -212,22 +214,20 @@ class Speed(Model):
         yield der(self.phi) == self.w
         yield self.flange.tau == -self.tau
 
-    def failure_hint(self, variable: str) -> str:
-        return TWICE_HELD if variable == "tau" else ""
-
 
 class AngleSensor(Model):
     """Measures the angle of a flange."""
 
-    phi = Output(unit="rad", description="angle")
+    phi = Output(
+        unit="rad",
+        description="angle",
+        undetermined="a sensor of angle carries no torque, so it holds nothing",
+    )
     flange = Flange()
 
     def equations(self):
         yield self.phi == self.flange.phi
         yield self.flange.tau == 0
-
-    def failure_hint(self, variable: str) -> str:
-        return "a sensor of angle carries no torque, so it holds nothing" if variable == "phi" else ""
 
 
 class SpeedSensor(Model):
@@ -244,8 +244,8 @@ class SpeedSensor(Model):
 class RelativeSensor(Model):
     """Measures angle and speed between two flanges; connect it beside what it measures, not in between."""
 
-    phi_rel = Output(unit="rad", description="angle from flange_a to flange_b")
-    w_rel = Output(unit="rad/s", description="rate of phi_rel")
+    phi_rel = Output(unit="rad", description="angle from flange_a to flange_b", undetermined=BESIDE)
+    w_rel = Output(unit="rad/s", description="rate of phi_rel", undetermined=BESIDE)
     flange_a = Flange()
     flange_b = Flange()
 
@@ -255,14 +255,15 @@ class RelativeSensor(Model):
         yield self.flange_a.tau == 0
         yield self.flange_b.tau == 0
 
-    def failure_hint(self, variable: str) -> str:
-        return "a relative sensor carries no torque; connect it beside a component, not in its place"
-
 
 class TorqueSensor(Model):
     """Measures the torque passed on from flange_a to flange_b; connect it between two shafts."""
 
-    tau = Output(unit="N.m", description="torque on the shaft at flange_b, positive with the angle")
+    tau = Output(
+        unit="N.m",
+        description="torque on the shaft at flange_b, positive with the angle",
+        undetermined="both ends of the sensor are held, or it closes a rigid loop; its torque could be anything",
+    )
     flange_a = Flange()
     flange_b = Flange()
 
@@ -270,6 +271,3 @@ class TorqueSensor(Model):
         yield self.flange_a.phi == self.flange_b.phi
         yield self.flange_a.tau == self.tau
         yield self.flange_b.tau == -self.tau
-
-    def failure_hint(self, variable: str) -> str:
-        return "both ends of the sensor are held, or it closes a rigid loop; its torque could be anything"

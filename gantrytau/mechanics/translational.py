@@ -19,6 +19,7 @@ from gantrytau import (
 )
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
+BESIDE = "a relative sensor carries no force; connect it beside a component, not in its place"
 
 
 class Flange(Connector):
@@ -169,15 +170,12 @@ class Position(Model):
     """Moves the flange as a given function of time, whatever force that takes."""
 
     s = Input(unit="m", description="position along the axis", start=0.0)
-    f = Real(unit="N", description="force that it takes, positive along the axis")
+    f = Real(unit="N", description="force that it takes, positive along the axis", undetermined=TWICE_HELD)
     flange = Flange()
 
     def equations(self):
         yield self.flange.s == self.s
         yield self.flange.f == -self.f
-
-    def failure_hint(self, variable: str) -> str:
-        return TWICE_HELD if variable == "f" else ""
 
 
 class Speed(Model):
@@ -185,7 +183,7 @@ class Speed(Model):
 
     v = Input(unit="m/s", description="speed along the axis", start=0.0)
     s = Real(unit="m", description="position along the axis", start=0.0)
-    f = Real(unit="N", description="force that it takes, positive along the axis")
+    f = Real(unit="N", description="force that it takes, positive along the axis", undetermined=TWICE_HELD)
     flange = Flange()
 
     def equations(self):
@@ -193,22 +191,20 @@ class Speed(Model):
         yield der(self.s) == self.v
         yield self.flange.f == -self.f
 
-    def failure_hint(self, variable: str) -> str:
-        return TWICE_HELD if variable == "f" else ""
-
 
 class PositionSensor(Model):
     """Measures the position of a flange."""
 
-    s = Output(unit="m", description="position along the axis")
+    s = Output(
+        unit="m",
+        description="position along the axis",
+        undetermined="a sensor of position carries no force, so it holds nothing",
+    )
     flange = Flange()
 
     def equations(self):
         yield self.s == self.flange.s
         yield self.flange.f == 0
-
-    def failure_hint(self, variable: str) -> str:
-        return "a sensor of position carries no force, so it holds nothing" if variable == "s" else ""
 
 
 class SpeedSensor(Model):
@@ -225,8 +221,8 @@ class SpeedSensor(Model):
 class RelativeSensor(Model):
     """Measures distance and speed between two flanges; connect it beside what it measures, not in between."""
 
-    s_rel = Output(unit="m", description="distance from flange_a to flange_b")
-    v_rel = Output(unit="m/s", description="rate of s_rel")
+    s_rel = Output(unit="m", description="distance from flange_a to flange_b", undetermined=BESIDE)
+    v_rel = Output(unit="m/s", description="rate of s_rel", undetermined=BESIDE)
     flange_a = Flange()
     flange_b = Flange()
 
@@ -236,14 +232,15 @@ class RelativeSensor(Model):
         yield self.flange_a.f == 0
         yield self.flange_b.f == 0
 
-    def failure_hint(self, variable: str) -> str:
-        return "a relative sensor carries no force; connect it beside a component, not in its place"
-
 
 class ForceSensor(Model):
     """Measures the force passed on from flange_a to flange_b; connect it between two parts."""
 
-    f = Output(unit="N", description="force on the part at flange_b, positive along the axis")
+    f = Output(
+        unit="N",
+        description="force on the part at flange_b, positive along the axis",
+        undetermined="both ends of the sensor are held, or it closes a rigid loop; its force could be anything",
+    )
     flange_a = Flange()
     flange_b = Flange()
 
@@ -251,6 +248,3 @@ class ForceSensor(Model):
         yield self.flange_a.s == self.flange_b.s
         yield self.flange_a.f == self.f
         yield self.flange_b.f == -self.f
-
-    def failure_hint(self, variable: str) -> str:
-        return "both ends of the sensor are held, or it closes a rigid loop; its force could be anything"

@@ -7,8 +7,8 @@
 | frame.w | angular velocity, rad/s | world |
 | frame.f | cut force, positive into the component, N | world |
 | frame.t | cut torque about the frame's origin, positive into the component, N.m | world |
-| s, v, f | coordinate, speed and driving force of a prismatic joint | its axis |
-| phi, w, tau | angle, angular velocity and driving torque of a revolute joint, right-handed about n | its axis |
+| s, v, f | coordinate, speed and driving force of a prismatic or cylindrical joint | its axis |
+| phi, w, tau | angle, angular velocity and driving torque of a revolute or cylindrical joint about n | its axis |
 | q | unit quaternion (scalar first) of a free body or a spherical joint, R = R(q) | - |
 | n, r, r_cm, J | axes, offsets and inertia that belong to a component | its frame_a |
 
@@ -34,6 +34,7 @@ from gantrytau.mechanics.multibody.frames import (
     World,
 )
 from gantrytau.mechanics.multibody.joints import (
+    Cylindrical,
     Prismatic,
     Revolute,
     Spherical,
@@ -45,6 +46,7 @@ from gantrytau.mechanics.multibody.sensors import CutSensor, PoseSensor, Relativ
 __all__ = [
     "Body",
     "CutSensor",
+    "Cylindrical",
     "Fixed",
     "FixedRotation",
     "FixedTranslation",

@@ -7,6 +7,8 @@ from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
 from gantrytau.mechanics.multibody.frames import Frame, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
 
+MASSLESS = "the body has no mass or inertia against this motion"
+
 
 class PointMass(Model):
     """A mass without extension."""
@@ -36,11 +38,15 @@ class Body(Model):
     J = Parameter(
         np.diag([0.1, 0.1, 0.1]), unit="kg.m2", description="inertia about the centre of mass, in frame_a"
     )
-    r = Real(3, unit="m", description="position of frame_a, resolved in the world")
-    v = Real(3, unit="m/s", description="velocity of frame_a, resolved in the world")
+    r = Real(3, unit="m", description="position of frame_a, resolved in the world", undetermined=MASSLESS)
+    v = Real(3, unit="m/s", description="velocity of frame_a, resolved in the world", undetermined=MASSLESS)
     w = Real(3, unit="rad/s", description="angular velocity, resolved in the world")
     q = Real(
-        4, unit="1", description="orientation of a free body as a unit quaternion", start=[1.0, 0.0, 0.0, 0.0]
+        4,
+        unit="1",
+        description="orientation of a free body as a unit quaternion",
+        start=[1.0, 0.0, 0.0, 0.0],
+        undetermined=MASSLESS,
     )
     z = Real(3, unit="rad/s2", description="angular acceleration of a free body, resolved in the world")
     world = outer(World)
@@ -72,9 +78,6 @@ class Body(Model):
         # Newton's law for the centre of mass, Euler's in axes fixed to the body
         yield a.f == self.m * (centre - self.world.gravity)
         yield a.t == a.R @ (self.J @ gain + ca.cross(spin, self.J @ spin)) + ca.cross(arm, a.f)
-
-    def failure_hint(self, variable: str) -> str:
-        return "the body has no mass or inertia against this motion" if variable in ("r", "q", "v") else ""
 
 
 def no_negative_eigenvalue(A: ca.SX, least: float = -1e-12) -> ca.SX:

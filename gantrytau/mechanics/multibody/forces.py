@@ -55,7 +55,12 @@ class LineForce(TwoFrames):
     Connect it between flange_a and flange_b, whose distance is that of the frames.
     """
 
-    s = Real(unit="m", description="distance between the origins", start=1.0)
+    s = Real(
+        unit="m",
+        description="distance between the origins",
+        start=1.0,
+        undetermined="the two frames coincide, so the line has no direction",
+    )
     flange_a = translational.Flange()
     flange_b = translational.Flange()
 
@@ -70,6 +75,3 @@ class LineForce(TwoFrames):
         yield b.f == -along * self.flange_b.f
         yield a.t == 0
         yield b.t == 0
-
-    def failure_hint(self, variable: str) -> str:
-        return "the two frames coincide, so the line has no direction" if variable == "s" else ""

@@ -1,10 +1,31 @@
 """Joints: one, two or three coordinates between frame_a and frame_b, and the rod with two ball joints."""
 
-from gantrytau import Parameter, Real, branch, connect, constraint, cross, der, dot, norm_2, outer, require
+from collections.abc import Iterator
+from typing import Any
+
+import casadi as ca
+
+from gantrytau import (
+    Parameter,
+    Real,
+    branch,
+    connect,
+    constraint,
+    cross,
+    der,
+    dot,
+    norm_2,
+    outer,
+    require,
+)
 from gantrytau.language.declarations import StateSelect
+from gantrytau.language.statements import Branch
 from gantrytau.mechanics import rotational, translational
-from gantrytau.mechanics.multibody.frames import TwoFrames, World
+from gantrytau.mechanics.multibody.frames import Frame, TwoFrames, World
 from gantrytau.mechanics.multibody.orientation import about, of_quaternion, spin_of_quaternion, unit
+
+SLIDES = "nothing holds the sliding along its axis"
+TURNS = "nothing holds the rotation about its axis"
 
 
 class Prismatic(TwoFrames):
@@ -17,8 +38,10 @@ class Prismatic(TwoFrames):
         unit="1",
         description="motion of frame_b for a unit of s; along n, of length one unless set otherwise",
     )
-    s = Real(unit="m", description="coordinate along the axis", prefer=StateSelect.PREFER)
-    v = Real(unit="m/s", description="speed along the axis", prefer=StateSelect.PREFER)
+    s = Real(
+        unit="m", description="coordinate along the axis", prefer=StateSelect.PREFER, undetermined=SLIDES
+    )
+    v = Real(unit="m/s", description="speed along the axis", prefer=StateSelect.PREFER, undetermined=SLIDES)
     f = Real(unit="N", description="driving force along the axis")
     axis = translational.Flange()
     support = translational.Flange()
@@ -34,12 +57,7 @@ class Prismatic(TwoFrames):
         yield a.t + b.t + cross(way * self.s, b.f) == 0
         # what the axis drives is the part of the cut force that does work
         yield self.f == -dot(way, b.f)
-        yield self.axis.s == self.s
-        yield self.axis.f == self.f
-        yield self.support.s == 0
-
-    def failure_hint(self, variable: str) -> str:
-        return "nothing holds the sliding along its axis" if variable in ("s", "v") else ""
+        yield from _driven_along(self.s, self.f, self.axis, self.support)
 
 
 class Revolute(TwoFrames):
@@ -48,8 +66,15 @@ class Revolute(TwoFrames):
     n = Parameter(
         [0.0, 0.0, 1.0], unit="1", description="axis of rotation, resolved in frame_a", evaluate=True
     )
-    phi = Real(unit="rad", description="angle from frame_a to frame_b about n", prefer=StateSelect.PREFER)
-    w = Real(unit="rad/s", description="angular velocity about n", prefer=StateSelect.PREFER)
+    phi = Real(
+        unit="rad",
+        description="angle from frame_a to frame_b about n",
+        prefer=StateSelect.PREFER,
+        undetermined=TURNS,
+    )
+    w = Real(
+        unit="rad/s", description="angular velocity about n", prefer=StateSelect.PREFER, undetermined=TURNS
+    )
     tau = Real(unit="N.m", description="driving torque about n")
     axis = rotational.Flange()
     support = rotational.Flange()
@@ -58,25 +83,41 @@ class Revolute(TwoFrames):
         a, b = self.frame_a, self.frame_b
         n = unit(self.n)
         yield require(norm_2(self.n) > 0, "expected an axis that is not zero")
-        spin = a.R @ n * self.w
-        yield branch(
-            a,
-            b,
-            forward=dict(R=a.R @ about(n, self.phi), w=a.w + spin),
-            backward=dict(R=b.R @ about(n, -self.phi), w=b.w - spin),
-        )
+        yield _turned(a, b, n, self.phi, self.w)
         yield b.r == a.r
         yield self.w == der(self.phi)
         yield a.f + b.f == 0
         yield a.t + b.t == 0
         # what the axis drives is the part of the cut torque that does work
         yield self.tau == -dot(a.R @ n, b.t)
-        yield self.axis.phi == self.phi
-        yield self.axis.tau == self.tau
-        yield self.support.phi == 0
+        yield from _driven_about(self.phi, self.tau, self.axis, self.support)
 
-    def failure_hint(self, variable: str) -> str:
-        return "nothing holds the rotation about its axis" if variable in ("phi", "w") else ""
+
+class Cylindrical(TwoFrames):
+    """A joint that slides along and turns about an axis fixed in both frames, each driven through its own flange."""
+
+    n = Parameter([1.0, 0.0, 0.0], unit="1", description="axis, resolved in frame_a", evaluate=True)
+    s = Real(unit="m", description="coordinate along n", prefer=StateSelect.PREFER, undetermined=SLIDES)
+    v = Real(unit="m/s", description="speed along n", prefer=StateSelect.PREFER, undetermined=SLIDES)
+    f = Real(unit="N", description="driving force along n")
+    phi = Real(unit="rad", description="angle about n", prefer=StateSelect.PREFER, undetermined=TURNS)
+    w = Real(unit="rad/s", description="its rate", prefer=StateSelect.PREFER, undetermined=TURNS)
+    tau = Real(unit="N.m", description="driving torque about n")
+    axis_s, support_s = translational.Flange(), translational.Flange()
+    axis_phi, support_phi = rotational.Flange(), rotational.Flange()
+
+    def equations(self):
+        a, b, n = self.frame_a, self.frame_b, unit(self.n)
+        yield require(norm_2(self.n) > 0, "expected an axis that is not zero")
+        yield _turned(a, b, n, self.phi, self.w)
+        yield b.r == a.r + a.R @ n * self.s
+        yield ca.vertcat(self.v, self.w) == der(ca.vertcat(self.s, self.phi))
+        yield a.f + b.f == 0
+        yield a.t + b.t + cross(b.r - a.r, b.f) == 0
+        yield self.f == -dot(a.R @ n, b.f)
+        yield self.tau == -dot(a.R @ n, b.t)
+        yield from _driven_along(self.s, self.f, self.axis_s, self.support_s)
+        yield from _driven_about(self.phi, self.tau, self.axis_phi, self.support_phi)
 
 
 class Universal(TwoFrames):
@@ -109,6 +150,7 @@ class Spherical(TwoFrames):
         unit="1",
         description="orientation of frame_b in frame_a as a unit quaternion",
         start=[1.0, 0.0, 0.0, 0.0],
+        undetermined="nothing holds the rotation in the ball joint",
     )
 
     def equations(self):
@@ -128,16 +170,17 @@ class Spherical(TwoFrames):
         yield a.t == 0
         yield b.t == 0
 
-    def failure_hint(self, variable: str) -> str:
-        return "nothing holds the rotation in the ball joint" if variable == "q" else ""
-
 
 class SphericalSpherical(TwoFrames):
     """A rod of constant length with a ball joint at each end and a point mass in its middle."""
 
     L = Parameter(1.0, unit="m", min=0.0, description="length between the centres of the ball joints")
     m = Parameter(0.0, unit="kg", min=0.0, description="mass, in the middle of the rod")
-    tension = Real(unit="N/m", description="force along the rod, divided by its length; positive when pulled")
+    tension = Real(
+        unit="N/m",
+        description="force along the rod, divided by its length; positive when pulled",
+        undetermined="the rod has no direction in which it could push",
+    )
     world = outer(World)
 
     def equations(self):
@@ -155,5 +198,27 @@ class SphericalSpherical(TwoFrames):
         yield a.t == 0
         yield b.t == 0
 
-    def failure_hint(self, variable: str) -> str:
-        return "the rod has no direction in which it could push" if variable == "tension" else ""
+
+def _turned(a: Frame, b: Frame, n: Any, phi: Any, w: Any) -> Branch:
+    """Frame b turned against a by phi, at the rate w, about the unit axis n that is fixed in both."""
+    spin = a.R @ n * w
+    return branch(
+        a,
+        b,
+        forward=dict(R=a.R @ about(n, phi), w=a.w + spin),
+        backward=dict(R=b.R @ about(n, -phi), w=b.w - spin),
+    )
+
+
+def _driven_along(s: Any, f: Any, axis: translational.Flange, support: translational.Flange) -> Iterator[Any]:
+    """The flanges of a joint that slides."""
+    yield axis.s == s
+    yield axis.f == f
+    yield support.s == 0
+
+
+def _driven_about(phi: Any, tau: Any, axis: rotational.Flange, support: rotational.Flange) -> Iterator[Any]:
+    """The flanges of a joint that turns."""
+    yield axis.phi == phi
+    yield axis.tau == tau
+    yield support.phi == 0
