@@ -1,8 +1,17 @@
 """Everything the toolkit raises on purpose. Each message says path, found, expected, remedy."""
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+HINTS = {
+    "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; use if_else, between, "
+    "casadi.fmax, casadi.vertcat",
+    "Dimension mismatch": "the two operands have different shapes",
+    "not iterable": "a method yields its equations one by one: `yield a == b`",
+    "Wrong number or type of arguments": "found something that is no number or expression among symbols; join lists with "
+    "casadi.vertcat(*list)",
+}
 
 
 class GantryTauError(Exception):
@@ -55,3 +64,31 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
         return f"; did you mean '{close[0]}'{f' ({words})' if words else ''}?"
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     return f"; there is {shown}." if names else "."
+
+
+def in_words(error: Exception) -> str:
+    """What an error of Python or CasADi says, in one line, with a remedy where one is known."""
+    if isinstance(error, AttributeError) and error.obj is not None and error.name:
+        names = [n for n in dir(error.obj) if not n.startswith("_")]
+        owner = getattr(error.obj, "__name__", type(error.obj).__name__)
+        return f"{owner} has no '{error.name}'{did_you_mean(error.name, names)}"
+    lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
+    if "Assertion" in lines[0] and len(lines) > 1:
+        lines = lines[1:]
+    words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
+    return "; ".join([words.rstrip("."), *(text for key, text in HINTS.items() if key in str(error))][:2])
+
+
+def told(place: str, evaluate: Callable[[], Any], within: str | None = None) -> Any:
+    """The value of `evaluate()`; what is raised there is told with the place where it happened.
+
+    within: the path of a component; an error of the toolkit that names it or a part of it says its place itself.
+    """
+    try:
+        return evaluate()
+    except GantryTauError as error:
+        if within is not None and str(error).startswith((f"{within} (", f"{within}:", f"{within}.")):
+            raise
+        raise type(error)(f"{place}: {error}") from error
+    except Exception as error:  # of statements that are not ours
+        raise ModelError(f"{place}: {in_words(error)}") from error

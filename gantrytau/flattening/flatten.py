@@ -1,14 +1,14 @@
 """Writes an instantiated model out as one flat list of variables, parameters and scalar equations."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import GantryTauError, ModelError, did_you_mean
+from gantrytau.errors import ModelError, in_words, told
 from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Instance, Leaf, Placed, instantiate, prefer_of
@@ -17,16 +17,9 @@ from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
 from gantrytau.language.declarations import Parameter, evaluate
 from gantrytau.language.events import Sampling, Sticking
-from gantrytau.language.model import Declared, Model
+from gantrytau.language.model import Model
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.language.symbols import scalars, split_derivative, time, writing
-
-HINTS = {
-    "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; "
-    "use if_else, between, casadi.fmax, casadi.vertcat",
-    "Dimension mismatch": "the two operands have different shapes",
-    "not iterable": "equations(self) yields its equations one by one: `yield a == b`",
-}
 
 
 def flatten(model: Model) -> FlatModel:
@@ -174,41 +167,17 @@ def _is_parameter(placed: Placed) -> bool:
     return isinstance(placed.declaration, Parameter)
 
 
-def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str):
+def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str) -> Iterator[tuple[int, Any]]:
     """Numbered statements of a component; an error on the way is told with the place where it happened."""
-    number = 0
-    try:
-        for statement in generate():
-            number += not isinstance(statement, Requirement)
-            yield number, statement
-    except GantryTauError as error:
-        if str(error).startswith((f"{path or 'the model'} (", f"{path or 'the model'}:", f"{path}.")):
-            raise
-        raise type(error)(f"{path or 'the model'} ({model}), equation {number + 1}: {error}") from error
-    except (
-        RuntimeError,
-        TypeError,
-        AttributeError,
-        NotImplementedError,
-        ValueError,
-        IndexError,
-        KeyError,
-    ) as error:
-        raise ModelError(
-            f"{path or 'the model'} ({model}), equation {number + 1}: {_words(error)}"
-        ) from error
-
-
-def _words(error: Exception) -> str:
-    """What a Python or CasADi error says, in one line, with a remedy where one is known."""
-    if isinstance(error, AttributeError) and isinstance(error.obj, Declared) and error.name:
-        names = [n for n in dir(error.obj) if not n.startswith("_")]
-        return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(error.name, names)}"
-    lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
-    if "Assertion" in lines[0] and len(lines) > 1:
-        lines = lines[1:]
-    words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
-    return words.rstrip(".") + next((f"; {text}" for key, text in HINTS.items() if key in str(error)), "")
+    within, number, end = path or "the model", 0, object()
+    generator: Iterator[Any] = told(f"{within} ({model}), equation 1", lambda: iter(generate()), within)
+    while True:
+        place = f"{within} ({model}), equation {number + 1}"
+        statement = told(place, lambda: next(generator, end), within)
+        if statement is end:
+            return
+        number += not isinstance(statement, Requirement)
+        yield number, statement
 
 
 def _refuse_nan(equations: Iterable[Equation]) -> None:
@@ -261,7 +230,7 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
         value = evaluate(value, leaf.scope)
         found = ca.densify(ca.SX(_array(value)))
     except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
-        why = "" if isinstance(error, NotImplementedError) else f": {_words(error)}"
+        why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
         raise ModelError(
             f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
             f"parameters{why}"

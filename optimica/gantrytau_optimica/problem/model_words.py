@@ -1,13 +1,8 @@
 """Names of the solver's quantities in the words of the model."""
 
-from collections.abc import Callable
-from typing import Any
-
 import casadi as ca
 
-from gantrytau import Dae, GantryTauError, ModelError
-from gantrytau.errors import did_you_mean
-from gantrytau.language.model import Declared
+from gantrytau import Dae
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 
@@ -61,31 +56,6 @@ def spoken(dae: Dae, name: str) -> str:
         if own is not None:
             return derivative_name(own, order - k)
     return name
-
-
-def told(place: str, evaluate: Callable[[], Any]) -> Any:
-    """The value of `evaluate()`; errors of Python and CasADi are told with the place where they happened."""
-    try:
-        return evaluate()
-    except GantryTauError as error:
-        raise type(error)(f"{place}: {error}") from error
-    except Exception as error:  # of statements that are not ours
-        raise ModelError(f"{place}: {_why(error)}") from error
-
-
-def _why(error: Exception) -> str:
-    if "truth value" in str(error):
-        return (
-            "Python's chained comparison, `and` and the comparison of lists cannot work on symbols; write "
-            "between(lower, x, upper), and join lists with casadi.vertcat(*list)"
-        )
-    if isinstance(error, AttributeError) and isinstance(error.obj, Declared):
-        names = [n for n in vars(error.obj) if not n.startswith("_")]
-        return f"{type(error.obj).__name__} has no '{error.name}'{did_you_mean(str(error.name), names)}"
-    if "Wrong number or type of arguments" in str(error):
-        return "found something that is no number or expression among symbols; join lists with casadi.vertcat(*list)"
-    text = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
-    return text.split(": ", 1)[-1] if ".cpp" in text else text
 
 
 def relation_text(left: ca.SX, right: ca.SX, sign: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gantrytau import Dae, ModelError, Parameter, translate
 from gantrytau.compiler.translation import names
+from gantrytau.errors import told
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
@@ -17,7 +18,7 @@ from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.functions import Between
 from gantrytau.language.symbols import split_derivative, writing
 from gantrytau.simulation.signals import read_signals
-from gantrytau_optimica.problem.model_words import relation_text, told
+from gantrytau_optimica.problem.model_words import relation_text
 from gantrytau_optimica.problem.optimization import (
     Free,
     Optimization,

@@ -42,7 +42,10 @@ def message(wrong, **policy) -> str:
         (lambda p: [p.mass], "expected a constraint; write `a == b`"),
         (lambda p: [p.mass.x], "found `mass.x`, expected `a == b`, `a <= b` or between(a, x, b)"),
         (lambda p: [p.mass.x != 1], "found `(mass.x!=1)`, expected"),
-        (lambda p: [0 <= p.mass.x <= 1], "Problem, constraint 5: Python's chained comparison"),
+        (
+            lambda p: [0 <= p.mass.x <= 1],
+            "Problem, constraint 5: Cannot compute the truth value of a CasADi SXElem symbolic expression; Python's if",
+        ),
         (lambda p: [p.mass.speed <= 1], "Problem, constraint 5: Mass has no 'speed'"),
         (
             lambda p: [between(2, p.mass.v, 1)],
