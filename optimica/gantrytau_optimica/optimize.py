@@ -15,16 +15,18 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.control.controls import read_controls
+from gantrytau_optimica.failures.dependence import check_freedom
 from gantrytau_optimica.prepared import Guesses, Prepared, parameter_names, read_guesses, solution_given
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.problem_checks import one_point
-from gantrytau_optimica.problem.read_problem import SymbolicProblem, read_problem
+from gantrytau_optimica.problem.read_problem import read_problem
+from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.ipopt import Progress, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
-from gantrytau_optimica.transcription.program import check_freedom, transcribe
 from gantrytau_optimica.transcription.scheme import collocation
 from gantrytau_optimica.transcription.shooting import shoot
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 Problem = Optimization | type[Optimization] | SymbolicProblem
 

@@ -9,19 +9,21 @@ import numpy as np
 from gantrytau import ModelError, Result, SolveError
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.build import Built, with_guesses
+from gantrytau_optimica.control.build import with_guesses
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit, Phase, Signal
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
-from gantrytau_optimica.problem.read_problem import SymbolicProblem
+from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import searched
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, share_of
-from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
 FEW = 30  # elements, from which on first guesses are tried on half as many

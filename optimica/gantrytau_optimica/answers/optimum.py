@@ -12,7 +12,7 @@ from gantrytau import Dae, ModelError, Result
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.playback.playback import Playback, play_back
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.failures.failure_report import report
 from gantrytau_optimica.failures.relaxation import Relaxed, relax
 from gantrytau_optimica.solving.ipopt import Solution
@@ -67,7 +67,7 @@ class Optimum:
         """Wall time of the solver in s."""
         return self.solution.solve_time
 
-    @cached_property
+    @property
     def free(self) -> dict[str, float]:
         """The free numbers by name."""
         return {n.name: self._numbers[n.name] for n in self.program.problem.free if not n.held}

@@ -11,7 +11,8 @@ import numpy as np
 from gantrytau import Dae, ModelError
 from gantrytau.compiler.system import System
 from gantrytau.flattening.flat_model import FlatVariable
-from gantrytau.language.symbols import split_derivative, time
+from gantrytau.language.symbols import time
+from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
 from gantrytau_optimica.control.control_problem import (
     ControlProblem,
@@ -26,40 +27,7 @@ from gantrytau_optimica.control.control_problem import (
 from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess, typical_size
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, signal_limits, with_limits
 from gantrytau_optimica.problem.model_words import algebraic_words
-from gantrytau_optimica.problem.optimization import Point
-from gantrytau_optimica.problem.read_problem import ConstraintRow, SymbolicProblem
-
-
-@dataclass(frozen=True, eq=False)
-class Built:
-    """The control problem, and what leads back from it to the model's names."""
-
-    read: SymbolicProblem
-    problem: ControlProblem
-    system: System
-    numbers: Mapping[str, float]  # parameters that are neither free nor held
-    points: tuple[Point, ...]
-    constraints: tuple[ConstraintRow, ...]
-    closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
-
-    def expressed(self, names: Sequence[str]) -> ca.SX:
-        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.
-
-        Raises ModelError for derivatives that the problem does not hold.
-        """
-        found = self.system.resolve([self.read.dae.expression(name) for name in names])
-        column = ca.vertcat(ca.SX(0, 1), *known(found, self.read, self.numbers))
-        problem = self.problem
-        own = [problem.time, problem.numbers, *(s.symbol for s in problem.signals)]
-        own += [c.symbol for phase in problem.phases for c in phase.courses]
-        inside = {e.element_hash() for e in ca.vertcat(*own).elements()}
-        for leaf in ca.symvar(column):
-            if leaf.element_hash() not in inside:
-                raise ModelError(
-                    f"{problem.name}: {', '.join(names[:3])} needs {leaf.name()}, which is not part of the problem; mention "
-                    "it there, in a constraint or an equation"
-                )
-        return column
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
 
 
 def build(
@@ -84,13 +52,13 @@ def build(
     limits = (*constraints, *_declared_limits(dae))
 
     def resolve(expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        return known(system.express([ca.SX(e) for e in expressions]), read, numbers)
+        return with_values(system.express([ca.SX(e) for e in expressions]), read, numbers)
 
     rows = resolve([e for c in limits for e in (c.expression, c.lower, c.upper)])
     values = resolve([p.expression for p in points])
     times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
     objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
-    ode, residuals = known([system.ode, system.residuals], read, numbers)
+    ode, residuals = with_values([system.ode, system.residuals], read, numbers)
     split = _Split(read, system, ode, residuals, dict(controls or {}))
     phases = []
     for k, stage in enumerate(read.phases):
@@ -116,7 +84,7 @@ def build(
     draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
     check_symbols(draft, read.name)
     names = [a.name for a in system.algebraics if a.closed is not None]
-    forms = known([a.closed for a in system.algebraics if a.closed is not None], read, {})
+    forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
     built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
     return replace(built, problem=_with_sizes(with_guesses(built, guess)))
 
@@ -252,31 +220,6 @@ def _nominals(variable: FlatVariable, dae: Dae) -> list[tuple[str, float]]:
         return []
     numbers = (abs(float(dae.table.number(x)[0])) for x in variable.nominal)
     return [(n, x) for n, x in zip(variable.elements, numbers, strict=True) if x > 0]
-
-
-def known(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
-    """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
-    old = [read.dae.table.symbols[n] for n in numbers]
-    new = [ca.SX(x) for x in numbers.values()]
-    expressions = _with_courses(expressions, read)
-    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
-
-
-def _with_courses(expressions: list[ca.SX], read: SymbolicProblem) -> list[ca.SX]:
-    """Inputs and their derivatives replaced by courses that are expressions of time."""
-    courses = {name: course for name, course in read.courses.items() if isinstance(course, ca.SX)}
-    if not courses or not expressions:
-        return expressions
-    old, new = [], []
-    for leaf in ca.symvar(ca.vertcat(*(ca.vec(ca.densify(e)) for e in expressions))):
-        base, order = split_derivative(leaf.name())
-        if base in courses:
-            value = courses[base]
-            for _ in range(order):
-                value = ca.jacobian(value, time)
-            old.append(leaf)
-            new.append(ca.densify(value))
-    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
 
 
 def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tuple[FreeNumber, ...]:

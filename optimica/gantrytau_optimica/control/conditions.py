@@ -11,8 +11,8 @@ from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import Course, Phase, SampleSum
 from gantrytau_optimica.control.guesses import derivative_symbol
 from gantrytau_optimica.problem.optimization import Point, Target
-from gantrytau_optimica.problem.read_problem import ConstraintRow, LinkedPaths, SymbolicProblem
 from gantrytau_optimica.problem.samples import Samples
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, LinkedPaths, SymbolicProblem
 
 Conditions = tuple[list[Point], list[ConstraintRow]]
 

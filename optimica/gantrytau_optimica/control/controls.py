@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.control.control_problem import Pieces
-from gantrytau_optimica.problem.read_problem import SymbolicProblem
+from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 KEYS = ("kind", "elements", "max_step", "step_penalty")
 

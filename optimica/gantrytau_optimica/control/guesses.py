@@ -3,26 +3,23 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError, Result
 from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
 from gantrytau_optimica.problem.optimization import Point
-from gantrytau_optimica.problem.read_problem import ConstraintRow
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.answers.optimum import Optimum
-    from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
 Guess = Callable[[np.ndarray], np.ndarray]
 RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
 
 
-def first_guesses(built: "Built", given: Mapping[str, Any]) -> dict[str, Guess]:
+def first_guesses(built: Built, given: Mapping[str, Any]) -> dict[str, Guess]:
     """A function of shares of the horizon (n,) for every signal of the control problem, by name."""
     dae, problem = built.read.dae, built.problem
     horizons = [horizon(problem, phase) for phase in problem.phases]
@@ -43,7 +40,7 @@ def first_guesses(built: "Built", given: Mapping[str, Any]) -> dict[str, Guess]:
     return found
 
 
-def with_algebraics(built: "Built", problem: ControlProblem) -> ControlProblem:
+def with_algebraics(built: Built, problem: ControlProblem) -> ControlProblem:
     """The problem with algebraics guessed anew from the guesses of its other signals, where these give them outright."""
     built = replace(built, problem=problem)
     phases = []
@@ -137,6 +134,16 @@ def _one(
     return guess
 
 
+class GivenSolution(Protocol):
+    """A solution of another problem: its variables by name, each over the times of its phase."""
+
+    @property
+    def free(self) -> Mapping[str, float]: ...  # numbers that were chosen
+    def __contains__(self, name: object) -> bool: ...
+    def __getitem__(self, name: str) -> Any: ...
+    def time_of(self, name: str) -> np.ndarray: ...
+
+
 class Stretched(ABC):
     """A signal of another solution, given over shares of its own horizon."""
 
@@ -156,7 +163,7 @@ class _Stretched(Stretched):
         return np.interp(np.atleast_1d(fraction), self.share, self.values)
 
 
-def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[str, Any]:
+def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> dict[str, Any]:
     """Guesses from another solution by name: signals, their time stretched onto the new horizon, and free numbers.
 
     component: path of the component that the solution is of. What the solution does not have keeps its default guess;
@@ -182,7 +189,7 @@ def guess_of(source: "Result | Optimum", dae: Dae, component: str = "") -> dict[
     return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
 
 
-def _times(source: "Result | Optimum", name: str) -> np.ndarray:
+def _times(source: Result | GivenSolution, name: str) -> np.ndarray:
     """The times of a variable, in an optimum those of its phase."""
     return np.asarray(source.time if isinstance(source, Result) else source.time_of(name))
 
@@ -256,7 +263,7 @@ LEAST_ROOT = (
 
 
 def _algebraics(
-    built: "Built",
+    built: Built,
     phase: Phase,
     symbols: Mapping[str, Guess],
     own: Mapping[str, Guess],

@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
-from gantrytau_optimica.problem.read_problem import ConstraintRow
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
 
 def limit_rows(

@@ -17,7 +17,8 @@ import numpy as np
 from gantrytau import Model, ModelError, SolveError
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.build import Built, build
+from gantrytau_optimica.control.build import build
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase
 from gantrytau_optimica.estimation.collinear_parameters import (
     LocalSlopes,
@@ -32,8 +33,8 @@ from gantrytau_optimica.estimation.residuals import Residuals, check_determined,
 from gantrytau_optimica.optimize import Prepared
 from gantrytau_optimica.solving.ipopt import Progress, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
-from gantrytau_optimica.transcription.program import transcribe
 from gantrytau_optimica.transcription.scheme import Collocation, collocation
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 EXPECTED_NOISE = (
     0.01  # of the spread of the data, where no deviations were given: for the solver's scaling only

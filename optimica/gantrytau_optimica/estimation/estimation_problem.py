@@ -20,8 +20,9 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.estimation.experiments import Experiment, is_free
 from gantrytau_optimica.problem.optimization import Free, Optimization, sum_of_squares
 from gantrytau_optimica.problem.problem_checks import static
-from gantrytau_optimica.problem.read_problem import SymbolicProblem, read_problem
+from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.samples import Samples
+from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 PART = re.compile(r"([A-Za-z_]\w*)((?:\[\d+(?:, ?\d+)*\])?)")
 

@@ -12,7 +12,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.estimation.residuals import residuals
 from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.program import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 
 def mesh_shift(

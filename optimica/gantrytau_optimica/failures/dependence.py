@@ -7,9 +7,11 @@ span of the rows before it says nothing new, or cannot be: it follows from them 
 import casadi as ca
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau_optimica.failures.row_meanings import MEANING
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 COARSE = 4  # elements on which dependence is looked for; it does not change with their number
 MOST = 3000  # unknowns up to which dense matrices are quick
@@ -50,11 +52,21 @@ def dependent_conditions(program: Program) -> list[str]:
     return _repeated(matrix, [names.get(int(r)) for r in rows], alone)
 
 
-def decided_text(program: Program) -> str:
-    """The same as the end of a sentence."""
-    found = dependent_conditions(program)
-    more = f", and {len(found) - 4} more" if len(found) > 4 else ""
-    return f"; {', '.join(found[:4])}{more}" if found else ""
+def check_freedom(program: Program) -> None:
+    """ModelError if nothing is free, or if there are more conditions than unknowns."""
+    name = program.problem.name
+    equalities = int(np.sum(program.lbg == program.ubg))
+    unknowns = program.places.size - int(np.sum(program.lbw == program.ubw))
+    if unknowns == 0:
+        raise ModelError(f"{name}: nothing is free; declare a Free number or an Input")
+    if equalities > unknowns:
+        found = dependent_conditions(program)
+        more = f", and {len(found) - 4} more" if len(found) > 4 else ""
+        raise ModelError(
+            f"{name}: {equalities} conditions for {unknowns} unknowns on this mesh, expected no more conditions than "
+            "unknowns; remove some at the ends or along the path, or free a number"
+            + (f"; {', '.join(found[:4])}{more}" if found else "")
+        )
 
 
 def _beside(x: np.ndarray) -> np.ndarray:

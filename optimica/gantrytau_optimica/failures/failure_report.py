@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.failures.dependence import dependent_conditions
 from gantrytau_optimica.failures.nonfinite import not_finite
 from gantrytau_optimica.failures.row_meanings import Meanings, intervals, row_sizes, signal_words

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.build import Built, known
+from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.failures.row_meanings import signal_words
 from gantrytau_optimica.problem.model_words import definition_words, motion_words
 from gantrytau_optimica.transcription.trajectory import Trajectory
@@ -79,7 +79,7 @@ def _expressions(built: Built, phases: Sequence[Trajectory]) -> Iterator[tuple[c
     words = definition_words(dae)
     symbols = [symbol for symbol, _ in built.system.definitions]
     resolved = (
-        known(built.system.resolve([e for _, e in built.system.definitions]), built.read, built.numbers)
+        with_values(built.system.resolve([e for _, e in built.system.definitions]), built.read, built.numbers)
         if symbols
         else []
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Limit
 from gantrytau_optimica.control.limits import known_states
 

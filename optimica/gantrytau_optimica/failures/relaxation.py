@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.failures.elastic import Elastic, Soft, soft_conditions
 from gantrytau_optimica.failures.row_meanings import Meanings, intervals
 from gantrytau_optimica.solving.ipopt import WORDS, Solution
-from gantrytau_optimica.transcription.program import Program, first_guess, transcribe
+from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 SMALL = 1e-6  # of its size: what gives way by less holds
 SINGLE = 4  # conditions that are tried alone

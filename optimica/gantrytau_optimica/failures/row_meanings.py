@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.simulation.to_result import labels
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.transcription.program import Program, Rows
 from gantrytau_optimica.transcription.trajectory import Trajectory

@@ -3,16 +3,14 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
 from gantrytau import Dae, ModelError
 from gantrytau.language.symbols import split_derivative, time
 from gantrytau_optimica.problem.optimization import Optimization, Point, Target
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.problem.read_problem import ConstraintRow, SymbolicProblem
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
 
 
 def static(dae: Dae) -> bool:
@@ -24,7 +22,7 @@ def _constant(course: Any) -> bool:
     return isinstance(course, ca.SX) and course.is_constant()
 
 
-def one_point(read: "SymbolicProblem") -> bool:
+def one_point(read: SymbolicProblem) -> bool:
     """Whether a problem is static in its costs, limits and inputs as well, and asks for values at one time only."""
     if not static(read.dae) or any(not _constant(course) for course in read.courses.values()):
         return False
@@ -34,7 +32,7 @@ def one_point(read: "SymbolicProblem") -> bool:
     return not timed and not read.targets and len({str(p.time) for p in read.points}) <= 1
 
 
-def check_objective(read: "SymbolicProblem") -> "SymbolicProblem":
+def check_objective(read: SymbolicProblem) -> SymbolicProblem:
     """The problem, if its objective depends on numbers only; a signal of a static problem has one value as well."""
     signals = set(read.dae.variables)
     bare = [
@@ -57,7 +55,7 @@ def check_objective(read: "SymbolicProblem") -> "SymbolicProblem":
     )
 
 
-def _check_targets(read: "SymbolicProblem") -> "SymbolicProblem":
+def _check_targets(read: SymbolicProblem) -> SymbolicProblem:
     """Sums over samples enter the objective times a number, and nothing else."""
     points = {e.element_hash() for p in read.points for e in p.symbol.elements()}
     for target in read.targets:
@@ -74,7 +72,7 @@ def _check_targets(read: "SymbolicProblem") -> "SymbolicProblem":
     return read
 
 
-def check_constraints(constraints: Iterable["ConstraintRow"], targets: Iterable[Target]) -> None:
+def check_constraints(constraints: Iterable[ConstraintRow], targets: Iterable[Target]) -> None:
     """ModelError for a sum over samples in a constraint."""
     for constraint in constraints:
         whole = ca.vertcat(constraint.expression, constraint.lower, constraint.upper)
@@ -98,7 +96,7 @@ def check_spelling(problem: type[Optimization]) -> None:
             )
 
 
-def check_times(read: "SymbolicProblem") -> None:
+def check_times(read: SymbolicProblem) -> None:
     """ModelError for a time that is neither a number nor made of free numbers and parameters."""
     known = {n for p in read.dae.flat.parameters for n in p.elements}
     for phase in read.phases:

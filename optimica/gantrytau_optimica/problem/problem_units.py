@@ -5,7 +5,6 @@ Objective and integrand are not: a cost may add what is not alike, with weights 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -14,9 +13,7 @@ from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import time
 from gantrytau_optimica.problem.optimization import Point
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.problem.read_problem import ConstraintRow
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +28,7 @@ class _Sides(Equation):
 
 def check_problem_units(
     flat: FlatModel,
-    constraints: Sequence["ConstraintRow"],
+    constraints: Sequence[ConstraintRow],
     points: Sequence[Point],
     times: Mapping[str, ca.SX],
 ) -> None:

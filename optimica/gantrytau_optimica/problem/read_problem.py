@@ -1,7 +1,7 @@
 """Reads an optimisation problem: the model translated, objective and constraints in its symbols."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,15 +16,13 @@ from gantrytau.flattening.flatten import write_out
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.functions import Between
-from gantrytau.language.symbols import split_derivative, writing
+from gantrytau.language.symbols import writing
 from gantrytau.simulation.signals import read_signals
 from gantrytau_optimica.problem.model_words import relation_text
 from gantrytau_optimica.problem.optimization import (
     Free,
     Optimization,
     PhaseLink,
-    Point,
-    Target,
     initial,
     reading,
 )
@@ -36,73 +34,12 @@ from gantrytau_optimica.problem.problem_checks import (
 )
 from gantrytau_optimica.problem.problem_units import check_problem_units
 from gantrytau_optimica.problem.samples import Samples
-
-
-@dataclass(frozen=True, eq=False)
-class ConstraintRow:
-    """lower <= expression <= upper for one scalar, in the model's symbols.
-
-    name: as it was written; place: where it was written; lower and upper of an equation are the same object.
-    """
-
-    expression: ca.SX
-    lower: ca.SX
-    upper: ca.SX
-    name: str
-    place: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class SymbolicPhase:
-    """A phase in the model's symbols; `name` is its path, "" where there is only one."""
-
-    name: str
-    integrand: ca.SX
-    start_time: ca.SX  # a number or an expression of free numbers
-    final_time: ca.SX
-
-    def owns(self, name: str) -> bool:
-        """Whether a variable belongs to this phase."""
-        return not self.name or name.startswith(f"{self.name}.")
-
-
-@dataclass(frozen=True, eq=False)
-class LinkedPaths:
-    """The paths of two phases of which the second begins where the first ends, and what jumps, with its path."""
-
-    first: str
-    second: str
-    jump: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class SymbolicProblem:
-    """A problem in the model's symbols. courses: inputs that the optimiser does not choose, by scalar name."""
-
-    name: str
-    dae: Dae
-    objective: ca.SX
-    phases: tuple[SymbolicPhase, ...]
-    constraints: tuple[ConstraintRow, ...]
-    links: tuple[LinkedPaths, ...]
-    points: tuple[Point, ...]
-    targets: tuple[Target, ...]
-    courses: Mapping[str, ca.SX | tuple[Samples, int]]
-
-    def phase_of(self, expression: ca.SX, what: str) -> int:
-        """Number of the phase whose variables an expression holds. Raises ModelError if they are of several."""
-        if len(self.phases) == 1:
-            return 0
-        names = [split_derivative(leaf.name())[0] for leaf in ca.symvar(expression)]
-        found = {k for n in names for k, phase in enumerate(self.phases) if phase.owns(n)}
-        if len(found) != 1:
-            words = (
-                "belongs to no phase"
-                if not found
-                else "joins " + " and ".join(self.phases[k].name for k in sorted(found))
-            )
-            raise ModelError(f"{self.name}: {what} {words}, expected variables of one phase")
-        return found.pop()
+from gantrytau_optimica.problem.symbolic_problem import (
+    ConstraintRow,
+    LinkedPaths,
+    SymbolicPhase,
+    SymbolicProblem,
+)
 
 
 def read_problem(

@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.build import Built
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Phase, Signal
 from gantrytau_optimica.control.guesses import Guess, horizon, with_algebraics
 from gantrytau_optimica.control.limits import signal_limits

@@ -12,7 +12,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pi
 from gantrytau_optimica.refinement.remesh import better_mesh
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.program import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000

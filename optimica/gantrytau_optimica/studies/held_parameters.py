@@ -7,11 +7,13 @@ import numpy as np
 
 from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.build import Built, build
+from gantrytau_optimica.control.build import build
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
 from gantrytau_optimica.studies.kkt import stationarity
-from gantrytau_optimica.transcription.program import Program, transcribe
+from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.transcribe import transcribe
 
 SAME = 1e-6  # relative: within it two objectives are those of one solution
 STATIONARY = 1e-6  # gradient of the Lagrangian relative to its terms, a hundred times Ipopt's tolerance

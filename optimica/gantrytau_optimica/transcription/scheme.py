@@ -49,16 +49,3 @@ def collocation(scheme: str, count: int) -> Collocation:
         coefficients.sum(axis=0),
         weights,
     )
-
-
-def interpolation(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Weights (len(at), n): value at each `at` of the polynomial through values at the n nodes."""
-    at = np.atleast_1d(at)
-    difference = nodes[:, None] - nodes[None, :]
-    np.fill_diagonal(difference, 1.0)
-    found = np.ones((at.size, nodes.size))
-    for j in range(nodes.size):
-        for m in range(nodes.size):
-            if m != j:
-                found[:, j] *= (at - nodes[m]) / difference[j, m]
-    return found

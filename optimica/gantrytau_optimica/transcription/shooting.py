@@ -28,16 +28,12 @@ from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.transcription.assemble import Term, assemble
+from gantrytau_optimica.transcription.collocate import phase_rows, unknown_limits
 from gantrytau_optimica.transcription.costs import running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_term
-from gantrytau_optimica.transcription.program import (
-    Program,
-    Rows,
-    _bounds,
-    _rows,
-)
+from gantrytau_optimica.transcription.program import Program, Rows, boundary_part, row_limits
 from gantrytau_optimica.transcription.scheme import Collocation
 
 PLACES = np.array([0.0, 0.5, 0.5, 1.0])
@@ -135,9 +131,8 @@ def shoot(problem: ControlProblem, meshes: Sequence[Mesh], steps: int) -> Progra
     return shoot_steps(problem, fine, _reading(steps))
 
 
-def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Collocation) -> Program:
+def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Shooting) -> Program:
     """The same on meshes that hold the steps already, of which `scheme.steps` make up an element."""
-    assert isinstance(scheme, Shooting)
     if any(mesh.moving for mesh in meshes):
         raise ModelError(
             f"{problem.name}: lengths='free' and scheme='shooting' do not go together; use scheme='radau' or given lengths"
@@ -158,34 +153,23 @@ def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Colloca
     count = 0
     for number, layout in enumerate(places.layouts):
         assert isinstance(layout, ShootingLayout)
-        mine = _rows(places, layout.stages, number, [], count)
+        mine = phase_rows(places, layout.stages, number, [], count)
         path = [limit for limit in layout.phase.path_limits if bare_limit(limit, layout.phase) is None]
         groups += [*mine.groups, *_path_groups(layout, number, path, mine.stop)]
         linear += mine.linear
         parts.append((layout, path, count, mine.stop))
         count = mine.stop + len(path) * layout.mesh.borders.size
         linear.append(sparse.csr_matrix((count - mine.stop, places.size)))
-    total = count + len(problem.boundary)
-    boundary = np.arange(count, total)
-    groups += [
-        Rows("boundary", limit.name, -1, np.array([row]), np.array([np.nan]), limit.lower, limit.upper)
-        for row, limit in zip(boundary, problem.boundary, strict=True)
-    ]
-    linear.append(sparse.csr_matrix((boundary.size, places.size)))
-    terms = [b for part in parts for b in _terms(places, *part, total)]
-    if problem.boundary:
-        scatter = sparse.csr_matrix(
-            (np.ones(boundary.size), (boundary, boundary - count)), shape=(total, boundary.size)
-        )
-        terms.append(single_term(places, where, [limit.expression for limit in problem.boundary], scatter))
+    boundary, boundary_terms = boundary_part(places, where, count)
+    groups += boundary
+    total = count + len(boundary)
+    linear.append(sparse.csr_matrix((len(boundary), places.size)))
+    terms = [*(term for part in parts for term in _terms(places, *part, total)), *boundary_terms]
     objective = [single_term(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]]))]
-    objective += [b for layout, *_ in parts for b in _costs(places, layout)]
-    lower, upper = np.zeros(total), np.zeros(total)
-    for group in groups:
-        lower[group.rows], upper[group.rows] = group.lower / group.size, group.upper / group.size
-    lbw, ubw = _stage_bounds(places)
+    objective += [term for layout, *_ in parts for term in _costs(places, layout)]
     assembled = assemble(objective, terms, sparse.vstack(linear).tocsr(), 0)
-    return Program(problem, places, assembled, tuple(groups), lbw, ubw, lower, upper, tuple(where))
+    limits = *_stage_limits(places), *row_limits(groups, total)
+    return Program(problem, places, assembled, tuple(groups), *limits, tuple(where))
 
 
 def _places(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Shooting) -> Places:
@@ -295,9 +279,9 @@ def _costs(places: Places, layout: ShootingLayout) -> list[Term]:
     return found
 
 
-def _stage_bounds(places: Places) -> tuple[np.ndarray, np.ndarray]:
+def _stage_limits(places: Places) -> tuple[np.ndarray, np.ndarray]:
     """Limits of the scaled unknowns; within a step only those without which an equation has no meaning."""
-    lower, upper = _bounds(places)
+    lower, upper = unknown_limits(places)
     for layout in places.layouts:
         assert isinstance(layout, ShootingLayout)
         lower[layout.inside], upper[layout.inside] = -np.inf, np.inf

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, ModelError, Parameter, Real, der
 from gantrytau_optimica import Optimization, optimize
-from gantrytau_optimica.transcription.scheme import collocation, interpolation
+from gantrytau_optimica.transcription.scheme import collocation
 
 CASES = [(scheme, points) for scheme in ("radau", "gauss") for points in range(1, 6)]
 
@@ -35,12 +35,6 @@ def test_radau_points_end_with_the_element():
     np.testing.assert_allclose(
         collocation("gauss", 2).points, 0.5 + np.array([-1, 1]) / np.sqrt(12), rtol=1e-12
     )
-
-
-def test_interpolation_reproduces_polynomials():
-    nodes = collocation("radau", 4).nodes
-    at = np.linspace(0.0, 1.0, 7)
-    np.testing.assert_allclose(interpolation(nodes, at) @ nodes**4, at**4, atol=1e-13)
 
 
 class Decay(Model):

@@ -158,7 +158,7 @@ def _phase_content(
     """The header of one phase; its arrays are added to `arrays`."""
     own = phase.phase.name
     names = [n for n in names if not own or split_derivative(n)[0].startswith(f"{own}.")]
-    names, expressions = _known(optimum, phase, names)
+    names, expressions = _determined(optimum, phase, names)
     affine, matrix, offsets = _affine(phase, expressions)
     others = np.flatnonzero(~affine)
     nodes = _nodes(phase.layout.scheme.points)
@@ -200,7 +200,7 @@ def _polynomials(track: Track, phase: Trajectory, arrays: Arrays) -> tuple[np.nd
     return nodes, unknowns
 
 
-def _known(optimum: Optimum, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
+def _determined(optimum: Optimum, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
     """The names whose values the solution determines (the derivative of an input is none), and their expressions."""
     symbols = [s.symbol for s in (*phase.phase.signals, *phase.phase.courses, *phase.problem.free)]
     known = {s.element_hash() for s in (*symbols, phase.problem.time)}

@@ -19,7 +19,7 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.read_problem import SymbolicProblem
+from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")
 DIGITS = 16  # of a hash: two different problems meet by chance in one of 10^19 pairs

@@ -13,7 +13,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.build import Built, known
+from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.transcription.layout import lagrange
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -195,7 +195,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     phase, problem = trajectory.phase, trajectory.problem
     symbols = [s.symbol for s in phase.algebraics]
     forms = [built.closed.get(a.name) for a in phase.algebraics]
-    given = known([f for f in forms if f is not None], built.read, built.numbers)
+    given = with_values([f for f in forms if f is not None], built.read, built.numbers)
     forms = iter(given)
     closed = [(i, next(forms)) for i, a in enumerate(phase.algebraics) if a.name in built.closed]
     kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]

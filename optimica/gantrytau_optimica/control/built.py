@@ -1,0 +1,70 @@
+"""A control problem with what leads back from it to the names of the model."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau import ModelError
+from gantrytau.compiler.system import System
+from gantrytau.language.symbols import split_derivative, time
+from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.problem.optimization import Point
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """The control problem, and what leads back from it to the model's names."""
+
+    read: SymbolicProblem
+    problem: ControlProblem
+    system: System
+    numbers: Mapping[str, float]  # parameters that are neither free nor held
+    points: tuple[Point, ...]
+    constraints: tuple[ConstraintRow, ...]
+    closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
+
+    def expressed(self, names: Sequence[str]) -> ca.SX:
+        """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.
+
+        Raises ModelError for derivatives that the problem does not hold.
+        """
+        found = self.system.resolve([self.read.dae.expression(name) for name in names])
+        column = ca.vertcat(ca.SX(0, 1), *with_values(found, self.read, self.numbers))
+        problem = self.problem
+        own = [problem.time, problem.numbers, *(s.symbol for s in problem.signals)]
+        own += [c.symbol for phase in problem.phases for c in phase.courses]
+        inside = {e.element_hash() for e in ca.vertcat(*own).elements()}
+        for leaf in ca.symvar(column):
+            if leaf.element_hash() not in inside:
+                raise ModelError(
+                    f"{problem.name}: {', '.join(names[:3])} needs {leaf.name()}, which is not part of the problem; mention "
+                    "it there, in a constraint or an equation"
+                )
+        return column
+
+
+def with_values(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
+    """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
+    old = [read.dae.table.symbols[n] for n in numbers]
+    new = [ca.SX(x) for x in numbers.values()]
+    expressions = _with_courses(expressions, read)
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
+
+
+def _with_courses(expressions: list[ca.SX], read: SymbolicProblem) -> list[ca.SX]:
+    """Inputs and their derivatives replaced by courses that are expressions of time."""
+    courses = {name: course for name, course in read.courses.items() if isinstance(course, ca.SX)}
+    if not courses or not expressions:
+        return expressions
+    old, new = [], []
+    for leaf in ca.symvar(ca.vertcat(*(ca.vec(ca.densify(e)) for e in expressions))):
+        base, order = split_derivative(leaf.name())
+        if base in courses:
+            value = courses[base]
+            for _ in range(order):
+                value = ca.jacobian(value, time)
+            old.append(leaf)
+            new.append(ca.densify(value))
+    return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
