@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
+from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import with_guesses
@@ -25,7 +26,7 @@ from gantrytau_optimica.transcription.point_functions import places_of_points, s
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-Guesses = Mapping[str, Any] | Result | Optimum | SavedOptimum
+Guesses = Mapping[str, Any] | Result | Answer
 FEW = 30  # elements, from which on first guesses are tried on half as many
 STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh if its branch was lost
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
@@ -258,22 +259,22 @@ def _relocated(program: Program, w: np.ndarray, confined: bool) -> Program:
 
 def solution_given(guess: Any) -> bool:
     """Whether a guess is an optimum, on whose branch the search should stay."""
-    return isinstance(guess, (Optimum, SavedOptimum))
+    return isinstance(guess, Answer)
 
 
 def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
     """Guesses by name, from those of the caller or from another solution. Raises ModelError for unknown names."""
-    if isinstance(guess, (Result, Optimum)):
-        return guess_of(guess, read.dae)
     if isinstance(guess, SavedOptimum):
         return guess.guesses(read.dae)
+    if isinstance(guess, (Result, Answer)):
+        return guess_of(guess, read.dae)
     if guess is not None and not isinstance(guess, Mapping):
         raise ModelError(
             f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum"
         )
     found: dict[str, Any] = {}
     for name, value in (guess or {}).items():
-        if isinstance(value, (Result, Optimum)):
+        if isinstance(value, (Result, Answer)):
             found.update(guess_of(value, read.dae, name))
         else:
             read.dae.expand(name)

@@ -17,7 +17,7 @@ class Movement:
     """
 
     def __init__(self, optimum: Optimum, elements: Sequence[str], direction: np.ndarray):
-        self.trajectory = optimum._phase(elements[0])
+        self.trajectory = optimum.phases[optimum.path_of(elements[0])]
         self.direction = direction
         problem, phase = optimum.program.problem, self.trajectory.phase
         self.numbers = direction[optimum.program.places.free]

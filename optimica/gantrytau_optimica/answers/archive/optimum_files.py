@@ -22,9 +22,9 @@ from gantrytau import ModelError
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
 from gantrytau.whole_files import replacing
-from gantrytau_optimica.answers.archive.run_record import hashes, plain, versions
+from gantrytau_optimica.answers.archive.fingerprint import hashes, plain, versions
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum, SavedPhase
-from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.answers.outcome import Outcome
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -32,7 +32,7 @@ FORMAT, VERSION, SUFFIX = "gantrytau optimum", 1, ".optimum"
 Arrays = dict[str, np.ndarray]
 
 
-def save_optimum(optimum: Optimum, path: str | os.PathLike[str]) -> Path:
+def save_optimum(optimum: Outcome, path: str | os.PathLike[str]) -> Path:
     """Write all that is known of an optimum to a file `*.optimum`, and return its path.
 
     An existing file is replaced only when the new one is complete. Raises ModelError for another suffix or a folder
@@ -109,7 +109,7 @@ def _stored(info: zipfile.ZipInfo) -> zipfile.ZipInfo:
     return info
 
 
-def _content(optimum: Optimum) -> tuple[dict[str, Any], Arrays]:
+def _content(optimum: Outcome) -> tuple[dict[str, Any], Arrays]:
     dae, solution = optimum.dae, optimum.solution
     units, words = labels(dae)
     arrays: Arrays = {
@@ -118,8 +118,6 @@ def _content(optimum: Optimum) -> tuple[dict[str, Any], Arrays]:
         "bound_multipliers": solution.bound_multipliers,
     }
     first = next(iter(optimum.phases.values()))
-    names = list(dae.parameters)
-    values = first.values(optimum.built.expressed(names), first.time[:1])[:, 0] if names else np.zeros(0)
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -136,7 +134,7 @@ def _content(optimum: Optimum) -> tuple[dict[str, Any], Arrays]:
         "solve_time": optimum.solve_time,
         "text": optimum.report(),
         "free": dict(optimum.free),
-        "parameters": dict(zip(names, values.tolist(), strict=True)),
+        "parameters": optimum.parameters,
         "units": units,
         "descriptions": words,
         "vectors": {n: v.elements for n, v in dae.vectors.items() if tuple(v.elements) != (n,)},
@@ -153,7 +151,7 @@ def _derivatives(words: dict[str, str]) -> list[str]:
 
 
 def _phase_content(
-    optimum: Optimum, phase: Trajectory, place: str, names: list[str], arrays: Arrays
+    optimum: Outcome, phase: Trajectory, place: str, names: list[str], arrays: Arrays
 ) -> dict[str, Any]:
     """The header of one phase; its arrays are added to `arrays`."""
     own = phase.phase.name
@@ -200,7 +198,7 @@ def _polynomials(track: Track, phase: Trajectory, arrays: Arrays) -> tuple[np.nd
     return nodes, unknowns
 
 
-def _determined(optimum: Optimum, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
+def _determined(optimum: Outcome, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
     """The names whose values the solution determines (the derivative of an input is none), and their expressions."""
     symbols = [s.symbol for s in (*phase.phase.signals, *phase.phase.courses, *phase.problem.free)]
     known = {s.element_hash() for s in (*symbols, phase.problem.time)}

@@ -1,13 +1,11 @@
 """A record of a run as JSON: what was asked, with which versions, and what came out."""
 
-import hashlib
 import inspect
 import json
 import os
 import platform
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,13 +14,11 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.whole_files import replacing
+from gantrytau_optimica.answers.archive.fingerprint import hash_of, hashes, plain, versions
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
-PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")
-DIGITS = 16  # of a hash: two different problems meet by chance in one of 10^19 pairs
 ALIKE = 1e-9  # relative: numbers of two runs closer than this are the same
 PASSING = ("started", "durations")  # differ between any two runs
 
@@ -112,34 +108,6 @@ def compare_records(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
     return "\n".join(f"{where}: {first} -> {second}" for where, first, second in _differences("", a, b))
 
 
-def versions() -> dict[str, str]:
-    """Of the packages that compute, and of Python."""
-    return {**{name: version(name) for name in PACKAGES}, "python": platform.python_version()}
-
-
-def hashes(optimum: Optimum) -> dict[str, str]:
-    """Of the model's equations as they are written, and of the whole problem: objective, constraints, horizon.
-
-    Values of parameters and limits belong to the problem, guesses to neither.
-    """
-    read = optimum.built.read
-    equations = "\n".join(_equations(read))
-    return {"equations": _hash(equations), "problem": _hash(f"{equations}\n" + "\n".join(_statements(read)))}
-
-
-def plain(value: Any) -> Any:
-    """A value of dictionaries, lists, strings, booleans, None and finite numbers; others become words."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(v) for v in (sorted(value, key=str) if isinstance(value, (set, frozenset)) else value)]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float) and not np.isfinite(value):
-        return str(value)
-    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
-
-
 def _problem(optimum: Optimum, problem: Any) -> dict[str, Any]:
     kind = problem if isinstance(problem, type) else type(problem)
     given = kind if issubclass(kind, Optimization) else None
@@ -148,7 +116,7 @@ def _problem(optimum: Optimum, problem: Any) -> dict[str, Any]:
         "name": optimum.name,
         "class": None if given is None else f"{given.__module__}.{given.__qualname__}",
         "file": None if file is None else file.name,
-        "file_hash": None if file is None else _hash(file.read_bytes()),
+        "file_hash": None if file is None else hash_of(file.read_bytes()),
     }
 
 
@@ -210,52 +178,12 @@ def _between(optimum: Optimum) -> float | None:
     return float(optimum.playback.violation) if optimum.success and optimum.playback.complete else None
 
 
-def _equations(read: SymbolicProblem) -> Iterator[str]:
-    """The flat model in lines: declarations without numbers, equations, initial equations."""
-    flat = read.dae.flat
-    for quantity in (*flat.variables, *flat.parameters):
-        yield f"{quantity.kind} {quantity.name} {quantity.shape} [{quantity.unit}]"
-    yield from (f"{name} := {expression}" for name, expression in flat.definitions.items())
-    yield from (f"{equation.text}" for equation in flat.equations)
-    yield from (f"initially {equation.text}" for equation in flat.initial_equations)
-    yield f"known {', '.join(read.dae.inputs)}"
-
-
-def _statements(read: SymbolicProblem) -> Iterator[str]:
-    """Objective, constraints, horizon and values in lines."""
-    yield f"minimise {read.objective}"
-    for phase in read.phases:
-        yield f"phase {phase.name} from {phase.start_time} to {phase.final_time}, integrand {phase.integrand}"
-    yield from (f"point {p.symbol} of {p.expression} at {p.time}" for p in read.points)
-    yield from (f"{c.lower} <= {c.expression} <= {c.upper}" for c in read.constraints)
-    yield from (f"link {link.first} {link.second} {link.jump}" for link in read.links)
-    for target in read.targets:
-        yield f"samples {target.symbol} of {target.expression} {_samples(target.samples)} {target.integrated}"
-    for name, course in sorted(read.courses.items(), key=lambda item: item[0]):
-        words = f"{_samples(course[0])} column {course[1]}" if isinstance(course, tuple) else str(course)
-        yield f"course {name} = {words}"
-    for quantity in (*read.dae.flat.variables, *read.dae.flat.parameters):
-        start = quantity.start if quantity.fixed else None
-        yield f"{quantity.name} {quantity.fixed} {start} {quantity.min} {quantity.max} {quantity.free}"
-    free = {n for p in read.dae.flat.parameters if p.free for n in p.elements}
-    yield from (f"{n} = {x!r}" for n, x in sorted(read.dae.table.values.items()) if n not in free)
-
-
-def _samples(samples: Any) -> str:
-    return _hash(b"".join(np.ascontiguousarray(a).tobytes() for a in (samples.times, samples.values)))
-
-
-def _hash(content: str | bytes) -> str:
-    data = content.encode() if isinstance(content, str) else content
-    return hashlib.sha256(data).hexdigest()[:DIGITS]
-
-
 def _as_given(value: Any) -> Any:
     """An option as it was given, long or living things by what they are."""
     if isinstance(value, Mapping):
         return {str(k): _as_given(v) for k, v in value.items()}
     if isinstance(value, np.ndarray) and value.size > 32:
-        return f"array of shape {value.shape}, hash {_hash(np.ascontiguousarray(value).tobytes())}"
+        return f"array of shape {value.shape}, hash {hash_of(np.ascontiguousarray(value).tobytes())}"
     if callable(value):
         return f"function {getattr(value, '__qualname__', type(value).__name__)}"
     return value if isinstance(value, (str, np.ndarray, list, tuple)) else plain(value)

@@ -1,16 +1,17 @@
 """An optimum read from its file: it answers like the one that was saved, without the model."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from gantrytau import Dae, ModelError, Result
+from gantrytau import Dae, ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.guesses import Stretched, derivative_symbol
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -113,8 +114,8 @@ class _Course(Stretched):
         return self.phase.at(self.name, np.atleast_1d(fraction))
 
 
-@dataclass(frozen=True, eq=False)
-class SavedOptimum:
+@dataclass(frozen=True, eq=False, repr=False)
+class SavedOptimum(Answer):
     """What `load_optimum` read. It answers as an Optimum: `["name"]`, `.signal(name)`, `.time`, `.free`, `.report()`.
 
     States, algebraics, inputs and sums of them are exactly the polynomials that were found; other variables are
@@ -144,102 +145,6 @@ class SavedOptimum:
     phases: Mapping[str, SavedPhase]
     multipliers: np.ndarray
     bound_multipliers: np.ndarray
-
-    @property
-    def _only(self) -> SavedPhase:
-        if len(self.phases) > 1:
-            names = ", ".join(f"'{name}'" for name in self.phases)
-            raise ModelError(
-                f"{self.name} has phases with times of their own; ask one of .phases[...]: {names}"
-            )
-        return next(iter(self.phases.values()))
-
-    @property
-    def start_time(self) -> float:
-        """Start of the horizon in s; with phases, of the first."""
-        return next(iter(self.phases.values())).start_time
-
-    @property
-    def final_time(self) -> float:
-        """End of the horizon in s; with phases, of the last."""
-        return list(self.phases.values())[-1].final_time
-
-    @property
-    def time(self) -> np.ndarray:
-        """The start and all collocation points in s."""
-        return self._only.time
-
-    @property
-    def breaks(self) -> np.ndarray:
-        """Times in s at which inputs may jump: the borders between elements."""
-        return self._only.breaks
-
-    @property
-    def result(self) -> Result:
-        """All variables over `time`, to plot and save."""
-        return self._results[self._only.name]
-
-    @cached_property
-    def _results(self) -> dict[str, Result]:
-        found = {}
-        for path, phase in self.phases.items():
-            names = [n for n in phase.names if not split_derivative(n)[1]]
-            rows = dict(zip(names, phase.values(names, phase.time), strict=True))
-            title = f"{self.name}.{path}" if path else self.name
-            found[path] = Result(
-                phase.time, rows, units=self.units, descriptions=self.descriptions, title=title
-            )
-        return found
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All variables and free numbers; derivatives and parameters can be asked for as well."""
-        return (*(n for result in self._results.values() for n in result.names), *self.free)
-
-    def __repr__(self) -> str:
-        size = sum(phase.time.size for phase in self.phases.values())
-        return f"<SavedOptimum {self.name}: {self.status}, objective {self.objective:.8g}, {size} times>"
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.free or any(name in result for result in self._results.values())
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
-
-    def __getitem__(self, name: str) -> Any:
-        if name in self.free:
-            return self.free[name]
-        elements = self._expand(name)
-        phase = self._phase(elements[0])
-        result = self._results[phase.name if phase else next(iter(self.phases))]
-        return result[name] if name in result else self.signal(name)(result.time)
-
-    def final(self, name: str) -> Any:
-        """The value at the end of the horizon."""
-        return self[name][-1]
-
-    def signal(self, name: str):
-        """A variable or derivative as a vectorised function of time in s: (n,) -> (n,) or (n, k)."""
-        elements = self._expand(name)
-        phase = self._phase(elements[0])
-
-        def value(times: Any) -> np.ndarray:
-            times = np.asarray(times, dtype=float)
-            flat = np.atleast_1d(times)
-            if name == "time":
-                rows = flat[None, :]
-            elif phase is None:
-                rows = np.repeat([[self.parameters[n]] for n in elements], flat.size, axis=1)
-            else:
-                rows = phase.values(elements, flat)
-            found = rows[0] if elements == (name,) else rows.T
-            return found if times.ndim else found[0]
-
-        return value
-
-    def plot(self, *names: str, file: Any = None):
-        """Variables over time, as Result.plot."""
-        return self.result.plot(*names, file=file)
 
     def report(self) -> str:
         """How it ended, and what remained violated or bound, in the model's words."""
@@ -271,15 +176,26 @@ class SavedOptimum:
         found.update((n, value) for n, value in self.free.items() if n in dae.parameters)
         return found
 
-    def _expand(self, name: str) -> tuple[str, ...]:
+    def _elements(self, name: str) -> tuple[str, ...]:
         base, order = split_derivative(name)
         elements = tuple(derivative_name(n, order) for n in self.vectors.get(base, (base,)))
-        known = [e in self.parameters or e == "time" or self._phase(e) is not None for e in elements]
-        if not all(known):
+        known = (e in self.parameters or e in self.phases[self.path_of(e)].rows for e in elements)
+        if name != "time" and not all(known):
             choice = (*self.names, *self.vectors, *self.parameters)
             raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, choice)}")
         return elements
 
-    def _phase(self, name: str) -> SavedPhase | None:
-        """The phase of a variable, None for parameters."""
-        return next((phase for phase in self.phases.values() if name in phase.rows), None)
+    def _variables(self, path: str) -> list[str]:
+        return [n for n in self.phases[path].names if not split_derivative(n)[1]]
+
+    def _labels(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
+        return self.units, self.descriptions
+
+    def _rows(self, names: Sequence[str], path: str) -> Callable[[np.ndarray], np.ndarray]:
+        phase = self.phases[path]
+        if names == ("time",):
+            return lambda times: times[None, :]
+        if names and names[0] in self.parameters:
+            values = np.array([[self.parameters[n]] for n in names])
+            return lambda times: np.repeat(values, times.size, axis=1)
+        return lambda times: phase.values(names, times)

@@ -2,18 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.simulation.to_result import labels
+from gantrytau_optimica.answers.outcome import Outcome
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.answers.optimum import Optimum
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Playback:
     defects: all conditions at single times; objective: of the motion as played; multipliers: of the conditions.
     """
 
-    optimum: "Optimum"
+    optimum: Outcome
     phases: dict[str, Replayed]
     violations: tuple[Violation, ...]
     defects: tuple[Defect, ...]
@@ -123,7 +120,7 @@ class Playback:
         return "\n".join(["Played back:", *(f"  {line}" for line in self.lines())])
 
 
-def play_back(optimum: "Optimum") -> Playback:
+def play_back(optimum: Outcome) -> Playback:
     """Integrate the model with the inputs of an optimum, and look at all limits and conditions."""
     problem = optimum.built.problem
     phases = {name: replay(optimum.built, t) for name, t in optimum.phases.items()}
@@ -169,7 +166,7 @@ def _violations(problem: ControlProblem, played: Replayed) -> list[Violation]:
     return found
 
 
-def _at_points(optimum: "Optimum", phases: list[Replayed]) -> tuple[float, list[Defect], float]:
+def _at_points(optimum: Outcome, phases: list[Replayed]) -> tuple[float, list[Defect], float]:
     """Objective as played, defects of the conditions, and the error of the objective that follows from both."""
     problem, program, solution = optimum.built.problem, optimum.program, optimum.solution
     symbols, values = [problem.numbers], [ca.DM(phases[0].trajectory.numbers)]

@@ -1,0 +1,165 @@
+"""An answer of an optimisation, looked up by the model's own names: one just found, or one read from a file."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError, Result
+from gantrytau.language.symbols import split_derivative
+
+Signal = Callable[[Any], np.ndarray]
+
+
+class Answer(ABC):
+    """`answer["robot.tool.r"]` is a variable over `time`, free numbers are floats, vectors of them arrays.
+
+    A kind of answer says what stands below, and gives names, values and labels of its variables.
+    """
+
+    name: str
+    objective: Any  # a float, with all integrals
+    success: Any  # whether the solver met its tolerance
+    status: Any  # how it ended, in words
+    iterations: Any
+    build_time: Any  # s
+    solve_time: Any  # s
+    free: Any  # numbers that were chosen, by name
+    parameters: Any  # numbers of the model, by scalar name, the chosen ones included
+    phases: Any  # name -> start_time, final_time, time and breaks in s; "" where there is only one
+
+    @abstractmethod
+    def report(self) -> str:
+        """How it ended, and what remains violated or binds, in the model's words."""
+
+    @abstractmethod
+    def _elements(self, name: str) -> tuple[str, ...]:
+        """Scalar names of a variable, derivative or parameter. Raises ModelError for unknown names."""
+
+    @abstractmethod
+    def _variables(self, path: str) -> list[str]:
+        """Scalar names of the variables of a phase."""
+
+    @abstractmethod
+    def _labels(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
+        """Units and descriptions by name."""
+
+    @abstractmethod
+    def _rows(self, names: Sequence[str], path: str) -> Callable[[np.ndarray], np.ndarray]:
+        """Scalars of a phase as a function of times (n,): (names, n). Raises ModelError for what is not known."""
+
+    @property
+    def _only(self) -> Any:
+        if len(self.phases) > 1:
+            names = ", ".join(f"'{name}'" for name in self.phases)
+            raise ModelError(
+                f"{self.name} has phases with times of their own; ask one of .phases[...]: {names}"
+            )
+        return next(iter(self.phases.values()))
+
+    def path_of(self, element: str) -> str:
+        """Name of the phase of a variable; a parameter is the same in all."""
+        base = split_derivative(element)[0]
+        return next((path for path in self.phases if base.startswith(f"{path}.")), next(iter(self.phases)))
+
+    @property
+    def start_time(self) -> float:
+        """Start of the horizon in s; with phases, the earliest."""
+        return min(phase.start_time for phase in self.phases.values())
+
+    @property
+    def final_time(self) -> float:
+        """End of the horizon in s; with phases, the latest."""
+        return max(phase.final_time for phase in self.phases.values())
+
+    @property
+    def time(self) -> np.ndarray:
+        """The start and all collocation points in s."""
+        return self._only.time
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times in s at which inputs may jump: the borders between elements."""
+        return self._only.breaks
+
+    def time_of(self, name: str) -> np.ndarray:
+        """The times in s of a variable: those of its phase."""
+        return self.phases[self.path_of(self._elements(name)[0])].time
+
+    @property
+    def result(self) -> Result:
+        """All variables of the model over `time`, to plot and save."""
+        self._only  # noqa: B018 - with phases there is none
+        return next(iter(self._results.values()))
+
+    @cached_property
+    def _results(self) -> dict[str, Result]:
+        units, words = self._labels()
+        found = {}
+        for path, phase in self.phases.items():
+            names = self._variables(path)
+            rows = dict(zip(names, self._rows(names, path)(phase.time), strict=True))
+            title = f"{self.name}.{path}" if path else self.name
+            found[path] = Result(phase.time, rows, units=units, descriptions=words, title=title)
+        return found
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All variables and free numbers; vectors, derivatives and parameters can be asked for as well."""
+        return (*(n for result in self._results.values() for n in result.names), *self.free)
+
+    def __repr__(self) -> str:
+        size = sum(phase.time.size for phase in self.phases.values())
+        kind = type(self).__name__
+        return f"<{kind} {self.name}: {self.status}, objective {self.objective:.8g}, {size} times>"
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.free or any(name in result for result in self._results.values())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __getitem__(self, name: str) -> Any:
+        chosen = self._chosen(name)
+        if chosen is not None:
+            return chosen
+        result = self._results[self.path_of(self._elements(name)[0])]
+        return result[name] if name in result else self.signal(name)(result.time)
+
+    def final(self, name: str) -> Any:
+        """The value at the end of the horizon; of a free number its value."""
+        chosen = self._chosen(name)
+        return self[name][-1] if chosen is None else chosen
+
+    def _chosen(self, name: str) -> Any:
+        """A free number, or a vector of which some elements are free; else None."""
+        if name in self.free:
+            return self.free[name]
+        elements = self._elements(name)
+        some = any(element in self.free for element in elements)
+        return np.array([self.parameters[element] for element in elements]) if some else None
+
+    def signal(self, name: str) -> Signal:
+        """A variable or derivative as a vectorised function of time: (n,) -> (n,) or (n, k), from the polynomials
+        of the solution; between the collocation points they need not keep to limits.
+        """
+        elements = self._elements(name)
+        whole, rows = elements != (name,), self._rows(elements, self.path_of(elements[0]))
+
+        def value(times: Any) -> np.ndarray:
+            times = np.asarray(times, dtype=float)
+            values = rows(np.atleast_1d(times))
+            found = values.T if whole else values[0]
+            return found if times.ndim else found[0]
+
+        return value
+
+    def plot(self, *names: str, file: Any = None):
+        """Variables over time, as Result.plot."""
+        return self.result.plot(*names, file=file)
+
+    def save(self, path: Any):
+        """Save all variables over time, as Result.save."""
+        return self.result.save(path)
