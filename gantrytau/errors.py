@@ -15,7 +15,15 @@ HINTS = {
 
 
 class GantryTauError(Exception):
-    """Base class of all errors of this toolkit."""
+    """Base class of all errors of this toolkit.
+
+    argument: the argument of the called function that is wrong, by name, where it is one. Messages write arguments as
+    Python does, `loss='robust'`; a command line, which has options instead, names its own by these.
+    """
+
+    def __init__(self, message: str = "", *, argument: str | None = None):
+        super().__init__(message)
+        self.argument = argument
 
 
 class ModelError(GantryTauError):

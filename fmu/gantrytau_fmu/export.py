@@ -107,23 +107,29 @@ def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfac
         if one not in BOTH:
             raise ModelError(
                 f"export_fmu: found the interface {one!r}, expected model-exchange or co-simulation"
-                f"{did_you_mean(str(one), BOTH)}"
+                f"{did_you_mean(str(one), BOTH)}",
+                argument="interfaces",
             )
     if not found:
-        raise ModelError("export_fmu: found no interfaces, expected model-exchange, co-simulation or both")
+        raise ModelError(
+            "export_fmu: found no interfaces, expected model-exchange, co-simulation or both",
+            argument="interfaces",
+        )
     return tuple(one for one in BOTH if one in found)
 
 
 def _check(fmi: str, solver: str, tolerance: float) -> None:
     if fmi not in ("2.0", "3.0"):
-        raise ModelError(f"export_fmu: found fmi={fmi!r}, expected '3.0' or '2.0'")
+        raise ModelError(f"export_fmu: found fmi={fmi!r}, expected '3.0' or '2.0'", argument="fmi")
     if solver not in SOLVERS:
         raise ModelError(
-            f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models"
+            f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models",
+            argument="solver",
         )
     if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 1e-12 <= tolerance < 1:
         raise ModelError(
-            f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1"
+            f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1",
+            argument="tolerance",
         )
 
 
@@ -149,7 +155,9 @@ def _first_words(model: Model | Dae) -> str:
 def _shown(dae: Dae, find: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Scalar names of the outputs and of local variables."""
     if isinstance(find, str):
-        raise ModelError(f"export_fmu: found find='{find}', expected a list of names; write ['{find}']")
+        raise ModelError(
+            f"export_fmu: found find='{find}', expected a list of names; write ['{find}']", argument="find"
+        )
     if find:
         return tuple(dict.fromkeys(_found(dae, name) for given in find for name in dae.expand(given))), ()
     known = set(dae.inputs)
@@ -165,7 +173,8 @@ def _found(dae: Dae, name: str) -> str:
     if kind:
         raise ModelError(
             f"export_fmu: find: {name} is {kind} of this FMU, expected variables that it computes; leave it out, "
-            f"{kind.split()[1]}s are in the FMU anyway"
+            f"{kind.split()[1]}s are in the FMU anyway",
+            argument="find",
         )
     return name
 

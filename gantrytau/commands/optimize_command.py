@@ -25,11 +25,21 @@ from gantrytau.commands.printing.reporting import (
     note,
     reporting,
 )
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.errors import GantryTauError, SolveError, did_you_mean
 
 if TYPE_CHECKING:
     from gantrytau.flattening.flat_model import FlatModel
 
+SPELLING = Spelling(
+    ("optimize",),
+    {name: f"--{name}" for name in ("elements", "points", "scheme", "tolerance", "refine", "starts", "guess")}
+    | {"max_iterations": "--max-iterations", "max_time": "--max-time"},
+    exactly={
+        "What was reached so far is in .optimum.": "",
+        "look at .optimum": "look at what --save keeps",
+    },
+)
 ProblemName = Annotated[
     str,
     typer.Argument(
@@ -73,7 +83,7 @@ def optimize(
     """
     from gantrytau_optimica import Optimization
 
-    with reporting(json, source_of(problem)):
+    with reporting(json, source_of(problem), SPELLING):
         drawn = listed(plot)
         place = pictures.place(drawn, to)
         saving.rehearse(save)
@@ -166,7 +176,7 @@ def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> 
     if optimum is None:
         raise error
     pressed = optimum.status == "interrupted"
-    message, files = answers.in_options(str(error)), []
+    message, files = SPELLING.of(error), []
     if save is not None and optimum.iterations > 0:
         kept = save.with_name(f"{save.stem}.unfinished{save.suffix}")  # a solution saved before stays
         try:

@@ -21,11 +21,18 @@ from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing import picture_output as pictures
 from gantrytau.commands.printing import result_output as saving
 from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, busy, fail, reporting
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.errors import SolveError
 
 if TYPE_CHECKING:
     from gantrytau.dae import Dae
     from gantrytau.results.result import Result
+
+SPELLING = Spelling(
+    ("simulate",),
+    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points")}
+    | {"inputs": "--input", "parameters": "--set"},
+)
 
 
 def simulate(
@@ -55,7 +62,7 @@ def simulate(
 
     Ctrl-C stops early; what was computed until then is saved to --output.
     """
-    with reporting(json, source_of(model)):
+    with reporting(json, source_of(model), SPELLING):
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
         saving.rehearse(output)
         place = pictures.place(drawn, to)

@@ -84,14 +84,18 @@ def _check(start: float, stop: float, tolerance: float, points: int) -> None:
     numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
     if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
         raise ModelError(
-            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s"
+            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s",
+            argument="stop",
         )
     if not isinstance(tolerance, (float, np.floating)) or not 0 < tolerance < 1:
         raise ModelError(
-            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8"
+            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8",
+            argument="tolerance",
         )
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
-        raise ModelError(f"simulate: found points={points!r}, expected a whole number of at least 2")
+        raise ModelError(
+            f"simulate: found points={points!r}, expected a whole number of at least 2", argument="points"
+        )
 
 
 def _check_inputs(dae: Translated, signals: Mapping[str, Signal], start: float, stop: float) -> None:
@@ -99,10 +103,12 @@ def _check_inputs(dae: Translated, signals: Mapping[str, Signal], start: float, 
         if name not in dae.inputs:
             raise ModelError(
                 f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.inputs) or 'none'}); "
-                "to impose it, translate with given=..., to change a parameter use parameters="
+                "to impose it, translate with given=..., to change a parameter use parameters=",
+                argument="inputs",
             )
         if isinstance(signal, Samples) and (signal.times[0] > start or signal.times[-1] < stop):
             raise ModelError(
                 f"input {name}: samples cover {signal.times[0]:g} to {signal.times[-1]:g} s, expected "
-                f"{start:g} to {stop:g} s; add samples or simulate a shorter time"
+                f"{start:g} to {stop:g} s; add samples or simulate a shorter time",
+                argument="inputs",
             )

@@ -109,14 +109,18 @@ def prepare(
     _check_answers(refine, starts)
     shooting = scheme == "shooting"
     if shooting and refine is not None:
-        raise ModelError("refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'")
+        raise ModelError(
+            "refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'",
+            argument="refine",
+        )
     grid = collocation("radau" if shooting else scheme, points)
     mesh = mesh_of(elements, _free_lengths(lengths))
     wanted = controls.values() if isinstance(controls, Mapping) else ()
     ramps = refine is not None or any(one in ("ramps", {"kind": "ramps"}) for one in wanted)
     if points == 1 and ramps:
         raise ModelError(
-            "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points"
+            "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points",
+            argument="points",
         )
     read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
     begin = time.perf_counter()
@@ -157,17 +161,23 @@ def _with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
 
 def _check_answers(refine: Any, starts: Any) -> None:
     if refine is not None and (not isinstance(refine, float) or not 1e-9 <= refine < 1):
-        raise ModelError(f"refine={refine!r}: expected a relative accuracy from 1e-9 to below 1, as 1e-6")
+        raise ModelError(
+            f"refine={refine!r}: expected a relative accuracy from 1e-9 to below 1, as 1e-6",
+            argument="refine",
+        )
     if isinstance(starts, bool) or not isinstance(starts, (int, np.integer)) or starts < 1:
-        raise ModelError(f"starts={starts!r}: expected a whole number of at least 1")
+        raise ModelError(f"starts={starts!r}: expected a whole number of at least 1", argument="starts")
 
 
 def _check(tolerance: Any, max_iterations: Any, max_time: Any, progress: Any) -> None:
     if not isinstance(tolerance, float) or not 0 < tolerance < 1:
-        raise ModelError(f"tolerance={tolerance!r}: expected a number between 0 and 1")
+        raise ModelError(f"tolerance={tolerance!r}: expected a number between 0 and 1", argument="tolerance")
     if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
-        raise ModelError(f"max_iterations={max_iterations!r}: expected a whole number of at least 1")
+        raise ModelError(
+            f"max_iterations={max_iterations!r}: expected a whole number of at least 1",
+            argument="max_iterations",
+        )
     if not isinstance(max_time, (int, float)) or not max_time > 0:
-        raise ModelError(f"max_time={max_time!r}: expected seconds above 0")
+        raise ModelError(f"max_time={max_time!r}: expected seconds above 0", argument="max_time")
     if progress is not None and not callable(progress):
         raise ModelError(f"progress={progress!r}: expected a function of (iteration, objective)")

@@ -270,7 +270,8 @@ def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
         return guess_of(guess, read.dae)
     if guess is not None and not isinstance(guess, Mapping):
         raise ModelError(
-            f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum"
+            f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum",
+            argument="guess",
         )
     found: dict[str, Any] = {}
     for name, value in (guess or {}).items():

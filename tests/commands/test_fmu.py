@@ -247,7 +247,7 @@ def test_an_interruption_writes_nothing(fails, cart, tmp_path, monkeypatch):
 
 def test_errors_of_the_export_are_told(fails, cart, tmp_path, monkeypatch):
     def export(model, path, **policy):
-        raise ModelError("export_fmu: found tolerance=2.0, expected a number below 1")
+        raise ModelError("export_fmu: found tolerance=2.0, expected a number below 1", argument="tolerance")
 
     monkeypatch.setattr("gantrytau_fmu.export_fmu", export)
     message = fails(

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import gantrytau_optimica
-from gantrytau.commands.optimize_command import optimize
-from gantrytau.commands.printing.optimum_summary import in_options
+from gantrytau.commands.optimize_command import SPELLING, optimize
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 
@@ -278,13 +277,13 @@ def test_too_few_iterations_can_be_gone_on_from(unsolved, answer, move, tmp_path
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (("--scheme", "midpoint"), "scheme='midpoint': expected one of radau, gauss"),
-        (("--tolerance", "2"), "tolerance=2.0: expected a number between 0 and 1"),
-        (("--max-time", "-1"), "max_time=-1.0: expected seconds above 0"),
+        (("--scheme", "midpoint"), "--scheme midpoint: expected one of radau, gauss"),
+        (("--tolerance", "2"), "--tolerance 2.0: expected a number between 0 and 1"),
+        (("--max-time", "-1"), "--max-time -1.0: expected seconds above 0"),
     ],
 )
 def test_what_the_solver_does_not_take(fails, move, option, message):
-    assert message in fails(FAULT, "optimize", move, *option)
+    assert message in fails(MISUSE, "optimize", move, *option)
 
 
 def press_ctrl_c(monkeypatch):
@@ -477,7 +476,7 @@ def test_what_is_missing_to_read_netcdf_is_told(fails, move, tmp_path, monkeypat
 
 
 def test_remedies_speak_of_options():
-    assert in_options("Try another guess=, more elements=, or look at .optimum.") == (
+    assert SPELLING.words("Try another guess=, more elements=, or look at .optimum.") == (
         "Try another --guess, more --elements, or look at what --save keeps."
     )
-    assert in_options("more max_iterations=; `guess==2`") == "more --max-iterations; `guess==2`"
+    assert SPELLING.words("more max_iterations=; `guess==2`") == "more --max-iterations; `guess==2`"

@@ -198,14 +198,18 @@ def test_a_file_of_samples_that_is_no_text(fails, robots, tmp_path):
     ("options", "message"),
     [
         (("--stop", "-1"), "expected start < stop"),
-        (("--stop", "1", "--points", "1"), "found points=1, expected a whole number of at least 2"),
-        (("--stop", "1", "--tolerance", "2"), "found tolerance=2.0"),
-        (("--stop", "1", "--input", "x=1"), "x is not an input of Pendulum (inputs: none)"),
-        (("--stop", "1", "--plot", "xx", "--to", "a.png"), "has no variable or parameter 'xx'"),
+        (("--stop", "1", "--points", "1"), "--points 1: expected a whole number of at least 2"),
+        (("--stop", "1", "--tolerance", "2"), "--tolerance 2.0: expected"),
+        (("--stop", "1", "--input", "x=1"), "--input: x is not an input of Pendulum (inputs: none)"),
     ],
 )
-def test_what_the_model_does_not_have(fails, options, message):
-    assert message in fails(FAULT, "simulate", "Pendulum", *options)
+def test_what_cannot_be_simulated_is_told_by_its_option(fails, options, message):
+    assert message in fails(MISUSE, "simulate", "Pendulum", *options)
+
+
+def test_what_the_model_does_not_have(fails):
+    options = ("--stop", "1", "--plot", "xx", "--to", "a.png")
+    assert "has no variable or parameter 'xx'" in fails(FAULT, "simulate", "Pendulum", *options)
 
 
 def test_a_solution_without_end_leaves_what_was_found(fails, run, robots, tmp_path):
@@ -246,7 +250,7 @@ def test_ctrl_c_leaves_what_was_found(fails, run, tmp_path, monkeypatch):
 
 
 def test_nothing_is_left_in_the_folder_of_a_result_that_is_refused(run, tmp_path):
-    assert run("simulate", "Pendulum", "--stop", "-1", "--output", tmp_path / "a.csv").exit_code == FAULT
+    assert run("simulate", "Pendulum", "--stop", "-1", "--output", tmp_path / "a.csv").exit_code == MISUSE
     assert list(tmp_path.iterdir()) == []
 
 

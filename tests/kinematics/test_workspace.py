@@ -295,14 +295,17 @@ def test_figures(tmp_path):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: workspace(L1), "found strokes .* expected finite ones"),
+        (lambda: workspace(L1), "strokes: found .* expected finite ones"),
         (lambda: workspace(L1, box=[[0, 1], [0, 1]]), "found the box .* expected three finite pairs"),
         (lambda: workspace(L1, box=[[0, 1], [0, 1], [1, 0]]), "found the box .* expected three finite pairs"),
         (lambda: workspace(L1, box=BOX, spacing=0.0), "found spacing=0.0"),
         (lambda: workspace(L1, box=BOX, spacing=1e-5), "expected 2e.07 at most"),
         (lambda: workspace(L1, box=BOX, refine=0), "found refine=0"),
-        (lambda: workspace(L1, Limits(strokes=[[0, 1]] * 2), box=BOX), r"found strokes .* expected \(3, 2\)"),
-        (lambda: workspace(L1, Limits(strokes=(1, 0)), box=BOX), r"found strokes .* expected \(3, 2\)"),
+        (
+            lambda: workspace(L1, Limits(strokes=[[0, 1]] * 2), box=BOX),
+            r"strokes: found .* expected \(3, 2\)",
+        ),
+        (lambda: workspace(L1, Limits(strokes=(1, 0)), box=BOX), r"strokes: found .* expected \(3, 2\)"),
         (lambda: workspace(L1, Limits(ball_joint=0.5, cart_axes=[0, 0, 0]), box=BOX), "found cart_axes"),
         (
             lambda: workspace(L1, Limits(ball_joint=0.5, home=[9, 9, 9]), box=BOX),
@@ -315,7 +318,7 @@ def test_figures(tmp_path):
         (lambda: workspace(L1, box=BOX, spacing=WORD), "found spacing='far', expected a length"),
         (lambda: workspace(L1, box=BOX, refine=SHARE), "found refine=1.5, expected a whole number"),
         (lambda: workspace(L1, box=BOX, R=WORD), "found R = 'far'"),
-        (lambda: workspace(L1, Limits(strokes="long"), box=BOX), r"found strokes 'long', expected \(3, 2\)"),
+        (lambda: workspace(L1, Limits(strokes="long"), box=BOX), r"strokes: found 'long', expected \(3, 2\)"),
         (lambda: workspace(L1, Limits(ball_joint=0.5, home="here"), box=BOX), "home: found r = 'here'"),
         (lambda: workspace(L1, Limits(ball_joint=0.5, cart_axes="x"), box=BOX), "found cart_axes 'x'"),
         (lambda: workspace(L1, box=[[1, 1], [3, 3], [-2, 1]]).plot(), "expected a slice or a solid to draw"),

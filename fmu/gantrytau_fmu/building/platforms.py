@@ -86,7 +86,8 @@ def chosen(platforms: str | Sequence[str]) -> tuple[Platform, ...]:
         else:
             known = (*_GROUPS, *PLATFORMS, *ALIASES)
             raise ModelError(
-                f"platforms: found '{name}', expected one of {', '.join(known)}{_closest(name, known)}"
+                f"platforms: found '{name}', expected one of {', '.join(known)}{_closest(name, known)}",
+                argument="platforms",
             )
     order = {name: place for place, name in enumerate(PLATFORMS)}
     return tuple(sorted(found.values(), key=lambda platform: order.get(platform.name, len(order))))

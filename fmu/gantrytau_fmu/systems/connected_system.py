@@ -217,13 +217,13 @@ def _starts(
         scalars = [components[owner].scalars[scalar] for owner, scalar in places]
         if len(scalars) == 1 and scalars[0].kind == "text":
             if not isinstance(value, str):
-                raise ModelError(f"start {name}: found {value!r}, expected a text")
+                raise ModelError(f"start {name}: found {value!r}, expected a text", argument="start")
             values: Sequence[float | str] = [value]
         else:
-            values = _numbers(f"start {name}", value, len(places))
+            values = _numbers("start", name, value, len(places))
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
             if not known.has_start:
-                raise ModelError(_calculated(components[owner], known))
+                raise ModelError(_calculated(components[owner], known), argument="start")
             _check_start(f"{owner}.{scalar}", known, number)
             found[owner][scalar] = number
     return found
@@ -236,13 +236,13 @@ def _places_to_start(components: Mapping[str, Component], name: str, value: Any)
     except ModelError as error:
         short = name.removesuffix(".start") if isinstance(name, str) else name
         if short == name:
-            raise ModelError(f"start {name}: {error}") from error
+            raise ModelError(f"start {name}: {error}", argument="start") from error
         try:
             locate(components, short)
         except ModelError:
-            raise ModelError(f"start {name}: {error}") from error
+            raise ModelError(f"start {name}: {error}", argument="start") from error
         raise ModelError(
-            f"start {name}: found no such variable; in an FMU write start={{{short!r}: {value!r}}}"
+            f"start {name}: found no such variable; in an FMU it is called {short!r}", argument="start"
         ) from None
 
 
@@ -263,28 +263,36 @@ def _calculated(component: Component, scalar: Scalar) -> str:
 
 def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
     if not (numeric(scalar) or scalar.kind == "text") or scalar.causality == "structuralParameter":
-        raise ModelError(f"start {path}: a {scalar.causality} of type {scalar.type} cannot be set here")
+        raise ModelError(
+            f"start {path}: a {scalar.causality} of type {scalar.type} cannot be set here", argument="start"
+        )
     if isinstance(value, str):
         return
     if scalar.kind == "integer" and value != round(value):
-        raise ModelError(f"start {path}: found {value!r}, expected a whole number")
+        raise ModelError(f"start {path}: found {value!r}, expected a whole number", argument="start")
     low, high = scalar.min, scalar.max
     if (low is not None and value < low) or (high is not None and value > high):
         sides = (("at least", low), ("at most", high))
         limits = " and ".join(f"{words} {side:.9g}" for words, side in sides if side is not None)
         unit = f" {scalar.unit}" if scalar.unit not in ("", "1") else ""
         raise ModelError(
-            f"start {path}: found {value:.9g}, expected {limits}{unit}, as its FMU says; choose such a value"
+            f"start {path}: found {value:.9g}, expected {limits}{unit}, as its FMU says; choose such a value",
+            argument="start",
         )
 
 
-def _numbers(words: str, value: Any, count: int) -> list[float]:
+def _numbers(argument: str, name: str, value: Any, count: int) -> list[float]:
     try:
         numbers = np.asarray(value, dtype=float).ravel()
     except (TypeError, ValueError):
-        raise ModelError(f"{words}: found {value!r}, expected a number or an array") from None
+        raise ModelError(
+            f"{argument} {name}: found {value!r}, expected a number or an array", argument=argument
+        ) from None
     if numbers.size != count or not np.all(np.isfinite(numbers)):
-        raise ModelError(f"{words}: found {value!r}, expected {count} finite number{'s' * (count > 1)}")
+        raise ModelError(
+            f"{argument} {name}: found {value!r}, expected {count} finite number{'s' * (count > 1)}",
+            argument=argument,
+        )
     return [float(number) for number in numbers]
 
 
@@ -296,20 +304,21 @@ def _drives(
         try:
             places = locate(components, name, "input")
         except ModelError as error:
-            raise ModelError(f"inputs {name}: {error}") from error
+            raise ModelError(f"inputs {name}: {error}", argument="inputs") from error
         for owner, scalar in places:
             causality = components[owner].scalars[scalar].causality
             if causality != "input" or not numeric(components[owner].scalars[scalar]):
                 raise ModelError(
                     f"inputs {name}: found {_article(causality)}, expected an input that is a number; "
-                    "parameters are set with start="
+                    "parameters are set with start=",
+                    argument="inputs",
                 )
         if callable(value):
             drives = _functions(name, value, len(places), span[0])
         elif isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
             drives = _samples(name, value[0], value[1], len(places), span)
         else:
-            drives = [_constant(number) for number in _numbers(f"inputs {name}", value, len(places))]
+            drives = [_constant(number) for number in _numbers("inputs", name, value, len(places))]
         found.update(zip(places, drives, strict=True))
     return found
 
@@ -334,30 +343,36 @@ def _value(name: str, function: Callable[[float], Any], t: float, count: int) ->
     except Exception as error:  # whatever a function of the user raises
         raise ModelError(
             f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
-            "at every time of the simulation"
+            "at every time of the simulation",
+            argument="inputs",
         ) from error
-    return _numbers(f"inputs {name} at t = {t:.6g} s", value, count)
+    return _numbers("inputs", f"{name} at t = {t:.6g} s", value, count)
 
 
 def _samples(name: str, times: Any, values: Any, count: int, span: tuple[float, float]) -> list[Drive]:
     try:
         times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ModelError(f"inputs {name}: samples that are not numbers, expected (times, values)") from None
+        raise ModelError(
+            f"inputs {name}: samples that are not numbers, expected (times, values)", argument="inputs"
+        ) from None
     values = values[:, None] if values.ndim == 1 else values
     if values.shape != (times.size, count):
         raise ModelError(
             f"inputs {name}: samples have shapes {times.shape} and {values.shape}, "
-            f"expected ({times.size},) and ({times.size}, {count})"
+            f"expected ({times.size},) and ({times.size}, {count})",
+            argument="inputs",
         )
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))) or np.any(np.diff(times) <= 0):
         raise ModelError(
-            f"inputs {name}: expected finite samples at times that rise strictly; repair and sort them"
+            f"inputs {name}: expected finite samples at times that rise strictly; repair and sort them",
+            argument="inputs",
         )
     if not times.size or times[0] > span[0] or times[-1] < span[1]:
         cover = f"{times[0]:g} to {times[-1]:g} s" if times.size else "nothing"
         raise ModelError(
             f"inputs {name}: samples cover {cover}, expected {span[0]:g} to {span[1]:g} s; "
-            "add samples or simulate a shorter time"
+            "add samples or simulate a shorter time",
+            argument="inputs",
         )
     return [lambda t, k=k: float(np.interp(t, times, values[:, k])) for k in range(count)]

@@ -230,7 +230,8 @@ def _check_alone(components: Mapping[str, Component], isolate: Sequence[str]) ->
         if component.token in seen:
             raise ModelError(
                 f"{name}: {component.file} can be instantiated only once in a process, and {seen[component.token]} "
-                f"is the same; run one of them in its own: isolate=['{name}']"
+                f"is the same; run one of them in its own: isolate=['{name}']",
+                argument="isolate",
             )
         seen[component.token] = name
 
@@ -299,21 +300,27 @@ def check_times(begin: Any, stop: Any, step: Any) -> None:
     """ModelError unless these are times in s with begin < stop and 0 < step <= stop - begin."""
     for name, value in (("begin", begin), ("stop", stop), ("step", step)):
         if value is None:
-            raise ModelError(f"cosimulate: found no {name}, expected a time in s, as {name}=0.1")
+            raise ModelError(
+                f"cosimulate: found no {name}, expected a time in s, as {name}=0.1", argument=name
+            )
         if (
             isinstance(value, bool)
             or not isinstance(value, (int, float, np.number))
             or not np.isfinite(value)
         ):
-            raise ModelError(f"cosimulate: found {name}={value!r}, expected a finite number in s")
+            raise ModelError(
+                f"cosimulate: found {name}={value!r}, expected a finite number in s", argument=name
+            )
     if not stop > begin:
         raise ModelError(
-            f"cosimulate: found stop={stop:g}, expected a time after the beginning at {begin:g} s; choose a later one"
+            f"cosimulate: found stop={stop:g}, expected a time after the beginning at {begin:g} s; choose a later one",
+            argument="stop",
         )
     if not step > 0 or step > (stop - begin) * (1 + 1e-9):
         raise ModelError(
             f"cosimulate: found step={step:g}, expected more than 0 and at most the {stop - begin:g} s that are simulated; "
-            "choose such a step"
+            "choose such a step",
+            argument="step",
         )
 
 
@@ -321,13 +328,15 @@ def _check(order: Any, tolerance: Any, agreement: Any, iterations: Any) -> None:
     if order not in get_args(Order):
         raise ModelError(
             f"cosimulate: found order={order!r}, expected one of {', '.join(get_args(Order))}"
-            f"{did_you_mean(str(order), get_args(Order))}"
+            f"{did_you_mean(str(order), get_args(Order))}",
+            argument="order",
         )
     for name, value in (("tolerance", tolerance), ("agreement", agreement)):
         good = isinstance(value, (float, np.floating)) and 0 < value < 1
         if not good and not (name == "tolerance" and value is None):
             raise ModelError(
-                f"cosimulate: found {name}={value!r}, expected a number between 0 and 1, as 1e-8"
+                f"cosimulate: found {name}={value!r}, expected a number between 0 and 1, as 1e-8",
+                argument=name,
             )
     if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
         raise ModelError(

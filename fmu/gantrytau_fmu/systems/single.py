@@ -49,7 +49,8 @@ def run_fmu(
         stop = component.stop if stop is None else stop
         if stop is None:
             raise ModelError(
-                f"{path}: found no stop time, in the file neither; expected one in s, as stop=1.0"
+                f"{path}: found no stop time, in the file neither; expected one in s, as stop=1.0",
+                argument="stop",
             )
         if step is None:
             check_times(0.0, stop, stop)

@@ -13,7 +13,7 @@ from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
 from gantrytau.commands.calibrate import calibration_files as results
 from gantrytau.commands.calibrate import outcome as finishing
 from gantrytau.commands.calibrate import plan_command as planning
-from gantrytau.commands.calibrate.calibration_options import policy, rail_files
+from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
 from gantrytau.commands.calibrate.cell_example import EXAMPLES
 from gantrytau.commands.calibrate.cell_example import example as cell_of
 from gantrytau.commands.calibrate.measured_plan import Planned
@@ -123,7 +123,7 @@ def calibrate(
     measurements.csv gives the parameters, how sure they are, and the error that is left: a report (HTML and JSON), and
     calibrated.toml, which all commands take: --set calibrated.toml. The plan in its folder, or --robot, says of which robot.
     """
-    with reporting(json, source_of(robot) if robot else None):
+    with reporting(json, source_of(robot) if robot else None, SPELLING):
         if example:
             typer.echo(cell_of(None if file is None else str(file), robot), nl=False)
             return

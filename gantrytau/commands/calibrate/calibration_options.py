@@ -1,6 +1,5 @@
 """How `gantrytau calibrate measurements.csv` is to calibrate: its options as arguments of `calibrate`."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,29 +7,19 @@ from typing import Any
 from gantrytau.commands.arguments.options import listed
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError
+from gantrytau.commands.printing.spelling import Spelling
 
-MODELS = ("parallel", "1", "2", "3", "4", "5")
-WORDS = {
-    "method": ("gauss-newton", "ipopt"),
-    "start": ("nominal", "linear"),
-    "orientation": ("local", "unit", "free"),
-    "holdout": ("second", "none"),
-}
-_IN_OPTIONS = (
-    (r"([\w.\[\]]+)\[0\], \1\[1\], \1\[2\](, \1\[3\])?", r"\1"),  # vectors by their names
-    (r"give Measurements\(\.\.\., rails=\[\.\.\.\]\)", "give --rails rail1.csv,rail2.csv,rail3.csv"),
-    (r"loss='robust'", "--robust"),
-    (r"method='ipopt' with a prior or a robust loss", "--method ipopt with --prior or --robust"),
-    (r"holdout=None", "--holdout none"),
-    (r"\b(take|with|or|for|expected) model=None", r"\1 no --model"),
-    (r"found model=None", "found no --model"),
-    (r"expected None; those models", "expected no --model; those models"),
-    (r"\b(start|method|orientation|holdout|model)='?([\w-]+)'?", r"--\1 \2"),
-    (r"\bfound constraints with\b", "found --constraint with"),
-    (r"\bconstraint (on )?'", r"--constraint \1'"),
-    (r"\bgive a prior\b", "give --prior NAME=DEVIATION"),
-    (r"left out of \.error", "left out of the error"),
-    (r"^calibrate: ", ""),
+SPELLING = Spelling(
+    ("calibrate", "Measurements"),
+    {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior")}
+    | {"constraints": "--constraint", "rails": "--rails", "loss": "--robust"},
+    flags=("loss",),
+    exactly={
+        "model=None": "no --model",
+        "holdout=None": "--holdout none",
+        "prior={name: deviation}": "--prior NAME=DEVIATION",
+        "rails=[...] in Measurements": "--rails rail1.csv,rail2.csv,rail3.csv",
+    },
 )
 
 
@@ -44,15 +33,9 @@ def policy(
     constraints: Sequence[str],
     robust: bool,
 ) -> dict[str, Any]:
-    """Keywords of `calibrate`; CommandError for words that it does not know."""
-    for name, word in dict(method=method, start=start, orientation=orientation, holdout=holdout).items():
-        if word not in WORDS[name]:
-            raise CommandError(f"--{name} {word}: expected {' or '.join(WORDS[name])}")
-    if model is not None and model not in MODELS:
-        raise CommandError(
-            f"--model {model}: expected one of {', '.join(MODELS)}; without --model guideways are straight, each with a "
-            "direction of its own"
-        )
+    """Keywords of `calibrate`; CommandError for what cannot be read."""
+    if holdout not in ("second", "none"):
+        raise CommandError(f"--holdout {holdout}: expected second or none")
     return dict(
         model=int(model) if model is not None and model.isdigit() else model,
         method=method,
@@ -107,10 +90,3 @@ def _constraints(texts: Sequence[str]) -> dict[str, Any] | None:
 def rail_files(text: str | None) -> list[Path]:
     """The files of `--rails`."""
     return [Path(name) for name in listed([text] if text else None)]
-
-
-def in_options(message: str) -> str:
-    """What is said to those who write Python, said with the options of the command."""
-    for pattern, words in _IN_OPTIONS:
-        message = re.sub(pattern, words, message)
-    return message

@@ -1,6 +1,5 @@
 """`cell.toml`: a robot as the tape measure knows it, its surroundings, and the device that is to measure it."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -204,11 +203,7 @@ def _program(place: str, table: Any) -> dict[str, Any]:
     try:
         check_program(**values)
     except ModelError as error:
-        raise CommandError(
-            re.sub(
-                r"^program: found (\w+)=", rf"{place.removesuffix('program')}program.\1: found ", str(error)
-            )
-        ) from error
+        raise CommandError(f"{place.removesuffix('program')}{error}") from error
     return values
 
 

@@ -7,10 +7,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from gantrytau.commands.calibrate.calibration_options import in_options
+from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.calibrate.file_lines import in_lines, read
 from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail
-from gantrytau.errors import ModelError
 from gantrytau.language.model import Model
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
@@ -38,7 +37,7 @@ class Measured:
     def words(self, message: str, said: Sequence[Any]) -> str:
         """A message with lines in place of rows, and options in place of arguments."""
         rows = [one.rows for one in said if one.kind != OF_GUIDEWAYS]
-        return in_options(in_lines(message, rows, self.lines) if rows else message)
+        return SPELLING.words(in_lines(message, rows, self.lines) if rows else message)
 
 
 def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: bool) -> Any:
@@ -50,8 +49,6 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
             found = calibrate(robot, measured.data, **policy)
     except CalibrationError as error:
         _refuse(error, measured, json)
-    except ModelError as error:
-        raise ModelError(in_options(str(error))) from error
     if not found.success:
         fail(
             f"{measured.file}: the search for parameters did not settle within {found.iterations} steps; look at the "

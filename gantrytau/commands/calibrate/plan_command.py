@@ -23,6 +23,7 @@ from gantrytau.commands.printing.reporting import (
     note,
     write_text,
 )
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.errors import ModelError
 
 CELL = "plan.toml"  # in the folder of a plan: the cell that it was made for
@@ -39,16 +40,22 @@ STAGES = {
 }
 
 
-_IN_THE_FILE = (
-    (r"^plan_calibration: ", ""),
-    (r"^program: found (\w+)=", r"program.\1: found "),
-    (r"give home= in m and rad", "give plan.home in m and rad"),
-    (r"\(facing=\)", "(device.facing)"),
-    (r"\(tape=\)", "(robot.tape)"),
-    (r"^\w+: found strokes", "limits.strokes: found"),
-    (r"between (.*) and (obstacles)", r"between \1 and limits.\2"),
-    (r"between plate\[", "between limits.plate["),
-    (r"give Limits\(strokes=\.\.\.\)( or box=, a slice for example)?", "give limits.strokes"),
+SPELLING = Spelling(
+    ("plan_calibration", "Limits"),
+    {
+        "wanted": "goal.error",
+        "poses": "goal.poses",
+        "tape": "robot.tape",
+        "limits": "limits",
+        "device": "device",
+    }
+    | {"strokes": "limits.strokes", "facing": "device.facing"}
+    | {name: f"plan.{name}" for name in cells.PLAN},
+    exactly={
+        "obstacles[": "limits.obstacles[",
+        "plate[": "limits.plate[",
+        ", or box=, a slice for example": "",
+    },
 )
 
 
@@ -88,7 +95,7 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
     except ModelError as error:
         with suppress(OSError):  # a folder that was made for nothing
             folder.rmdir()
-        raise ModelError(_in_the_file(str(error), file)) from error
+        raise ModelError(f"{file}: {SPELLING.of(error)}") from error
     files = [str(path) for path in _files(folder, cell)]
     good, reasons = found.verdict.good, "\n".join(found.verdict.reasons)
     if json:
@@ -180,24 +187,6 @@ def _copy(cell: Cell) -> str:
     return f"# The cell of this plan, from {cell.file.name}.\n" + model.sub(
         lambda found: f"{found[1]}'{cell.name}'", text
     )
-
-
-def _in_the_file(message: str, file: Path) -> str:
-    """What plan_calibration says of its arguments, said of the file."""
-    places = {
-        "wanted": "goal.error",
-        "poses": "goal.poses",
-        "tape": "robot.tape",
-        "limits": "limits",
-        "device": "device",
-    }
-    places |= {name: f"plan.{name}" for name in cells.PLAN}
-    found = re.match(r"plan_calibration\.(\w+): ", message)
-    if found:
-        message = f"{places.get(found[1], found[1])}: {message[found.end() :]}"
-    for pattern, words in _IN_THE_FILE:
-        message = re.sub(pattern, words, message)
-    return f"{file}: {message}"
 
 
 @contextmanager

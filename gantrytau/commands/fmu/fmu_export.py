@@ -12,8 +12,8 @@ from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.fmu.fmu_info import counted
-from gantrytau.commands.fmu.fmu_words import speaking_of_options
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.errors import ModelError, did_you_mean
 
 INTERFACES = {
@@ -25,6 +25,10 @@ PLATFORMS = tuple(
     f"{processor}-{system}"
     for system in ("linux", "windows", "darwin")
     for processor in ("x86_64", "aarch64")
+)
+SPELLING = Spelling(
+    ("export_fmu", "translate"),
+    {name: f"--{name}" for name in ("platforms", "given", "find", "states", "tolerance", "solver", "fmi")},
 )
 VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
 SOLVERS = ("dopri5", "rodas4")
@@ -107,7 +111,7 @@ def export(
     Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
     inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
     """
-    with reporting(json, source_of(model)), speaking_of_options():
+    with reporting(json, source_of(model), SPELLING):
         policy: dict[str, Any] = {
             "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
             "interfaces": INTERFACES.get(interface) or _unknown("--interface", interface, INTERFACES),

@@ -11,7 +11,6 @@ import typer
 from gantrytau.commands.arguments.options import Json, Plotted, Saved, To, listed
 from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
-from gantrytau.commands.fmu.fmu_words import in_options, speaking_of_options
 from gantrytau.commands.printing import picture_output as pictures
 from gantrytau.commands.printing import result_output as saving
 from gantrytau.commands.printing.reporting import (
@@ -23,12 +22,19 @@ from gantrytau.commands.printing.reporting import (
     note,
     reporting,
 )
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.errors import SolveError, did_you_mean
 
 if TYPE_CHECKING:
     from gantrytau.results.result import Result
 
 ORDERS = ("gauss-seidel", "jacobi", "iterate")
+SPELLING = Spelling(
+    ("cosimulate", "run_fmu"),
+    {name: f"--{name}" for name in ("stop", "step", "order", "tolerance", "isolate")}
+    | {"start": "--set", "inputs": "--input"},
+    flags=("isolate",),
+)
 SHOWN = 24  # variables in the table; files and JSON have all
 
 
@@ -85,7 +91,7 @@ def run(
 
     Its binaries are code: trust them. Ctrl-C stops early; what was computed until then is saved to --output.
     """
-    with reporting(json), speaking_of_options():
+    with reporting(json, spelling=SPELLING):
         present(file)
         _check(file, order, me, isolate)
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
@@ -143,7 +149,7 @@ def _noted(told: list[str], json: bool) -> Iterator[None]:
         if not issubclass(kind, UnconnectedInputs):
             show(message, kind, *place, **more)
             return
-        told.append(in_options(str(message)))
+        told.append(SPELLING.words(str(message)))
         if not json:
             note(f"Note: {told[-1]}")
 
@@ -172,7 +178,7 @@ def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isol
 def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     """Save what was found until it stopped, say so, and leave."""
     pressed = isinstance(error.__context__, KeyboardInterrupt)
-    message = str(error).partition(";")[0] if pressed else in_options(str(error))
+    message = str(error).partition(";")[0] if pressed else SPELLING.of(error)
     files: list[str] = []
     if output is not None and error.result is not None:
         files = saving.save(error.result, output)

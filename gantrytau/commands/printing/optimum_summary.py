@@ -1,7 +1,6 @@
 """What `gantrytau optimize` prints of an optimum."""
 
 import platform
-import re
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +14,6 @@ from gantrytau.language.symbols import split_derivative
 if TYPE_CHECKING:
     from gantrytau.flattening.flat_model import FlatModel
     from gantrytau.results.result import Result
-
-_KEYWORD = re.compile(
-    r"\b(elements|points|scheme|tolerance|max_iterations|max_time|refine|starts|guess)=(?!=)"
-)
 
 
 def summary(chosen: Chosen, optimum: Any, files: list[str]) -> dict[str, Any]:
@@ -81,10 +76,3 @@ def _values(optimum: Any, name: str) -> Any:
         raise CommandError(
             f"--plot {name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
         ) from error
-
-
-def in_options(message: str) -> str:
-    """What is said to those who write Python, said with the options of the command line."""
-    message = _KEYWORD.sub(lambda found: f"--{found[1].replace('_', '-')}", message)
-    message = message.replace("\nWhat was reached so far is in .optimum.", "")
-    return message.replace("look at .optimum", "look at what --save keeps")

@@ -13,7 +13,8 @@ from typing import Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from gantrytau.errors import GantryTauError
+from gantrytau import GantryTauError
+from gantrytau.commands.printing.spelling import Spelling
 from gantrytau.interruption import heeding_interrupts
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
@@ -22,6 +23,9 @@ INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
+
+
+PLAIN = Spelling((), {})
 
 
 class CommandError(GantryTauError):
@@ -63,10 +67,11 @@ def _drop_output() -> None:
 
 
 @contextmanager
-def reporting(json: bool, source: Path | None = None) -> Iterator[None]:
+def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN) -> Iterator[None]:
     """Errors inside become a message and an exit code instead of a traceback.
 
-    json: print `{"error": ...}`; source: the user's file, of which the lines that failed are shown.
+    json: print `{"error": ...}`; source: the user's file, of which the lines that failed are shown; spelling: how
+    arguments are written here, of which one that is wrong means that the command was called wrongly.
     An error that comes neither from the toolkit nor from `source` is a bug of the toolkit and passes.
     """
     try:
@@ -75,7 +80,8 @@ def reporting(json: bool, source: Path | None = None) -> Iterator[None]:
         fail(str(error), MISUSE, json)
     except GantryTauError as error:
         place = "".join(f"\n  {line}" for line in places(error, source)[-1:])
-        fail(f"{error}{place}", FAULT, json, kind=type(error).__name__)
+        code = MISUSE if error.argument in spelling.options else FAULT
+        fail(f"{spelling.of(error)}{place}", code, json, kind=type(error).__name__)
     except KeyboardInterrupt:
         fail("Interrupted; nothing was written", INTERRUPTED, json)
     except (SystemExit, typer.Exit):

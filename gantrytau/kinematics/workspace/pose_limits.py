@@ -287,7 +287,8 @@ def _strokes(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
         found = np.vstack([found, kinematics.limits[carts:]])
     if found.shape != (actuators, 2) or not (found[:, 0] < found[:, 1]).all():
         raise ModelError(
-            f"{kinematics.dae.name}: found strokes {told(strokes)}, expected ({actuators}, 2) of (least, largest) "
-            "coordinates in m and rad, or one such pair for all carts"
+            f"Limits.strokes: found {told(strokes)}, expected ({actuators}, 2) of (least, largest) coordinates of "
+            f"{kinematics.dae.name} in m and rad, or one such pair for all carts",
+            argument="strokes",
         )
     return found

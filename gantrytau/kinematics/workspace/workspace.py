@@ -143,8 +143,9 @@ def _bounds(examiner: Examiner) -> np.ndarray:
     strokes, arm = examiner.strokes[: examiner.carts], examiner.geometry.arm
     if not np.isfinite(strokes).all():
         raise ModelError(
-            f"{examiner.name}: found strokes {strokes.tolist()}, expected finite ones to bound the workspace; give "
-            "Limits(strokes=...) or box=, a slice for example"
+            f"Limits.strokes: found {strokes.tolist()} of {examiner.name}, expected finite ones to bound the workspace; "
+            "give strokes=, or box=, a slice for example",
+            argument="strokes",
         )
     direction = examiner.geometry.direction[arm]
     ends = examiner.around[:, None] + strokes[arm][:, :, None] * direction[:, None]  # (m, 2, 3)

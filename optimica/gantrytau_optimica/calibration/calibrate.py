@@ -55,7 +55,8 @@ def calibrate(
     _check_words(method=method, start=start, orientation=orientation, loss=loss)
     if constraints and method != "ipopt":
         raise ModelError(
-            "calibrate: found constraints with method='gauss-newton', which keeps none; take method='ipopt'"
+            "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
+            argument="constraints",
         )
     geometry = read_geometry(robot)
     _check_columns(geometry, measurements)
@@ -108,7 +109,8 @@ def _check_words(**words: str) -> None:
     for name, word in words.items():
         if word not in known[name]:
             raise ModelError(
-                f"calibrate: found {name}={word!r}, expected {' or '.join(map(repr, known[name]))}"
+                f"calibrate: found {name}={word!r}, expected {' or '.join(map(repr, known[name]))}",
+                argument=name,
             )
 
 
@@ -130,7 +132,9 @@ def _split(rows: np.ndarray, holdout: Any, measurements: Measurements) -> tuple[
         return rows, rows
     if isinstance(holdout, str):
         if holdout != "second":
-            raise ModelError(f"calibrate: found holdout={holdout!r}, expected 'second', None, or rows")
+            raise ModelError(
+                f"calibrate: found holdout={holdout!r}, expected 'second', None, or rows", argument="holdout"
+            )
         return rows[::2], rows[1::2]
     mask = np.zeros(len(measurements), dtype=bool)
     try:
@@ -138,6 +142,7 @@ def _split(rows: np.ndarray, holdout: Any, measurements: Measurements) -> tuple[
     except (IndexError, ValueError):
         raise ModelError(
             f"calibrate: found holdout={holdout!r}, expected rows from 0 to {len(measurements) - 1} or a mask of "
-            f"{len(measurements)}"
+            f"{len(measurements)}",
+            argument="holdout",
         ) from None
     return rows[~mask[rows]], rows[mask[rows]]

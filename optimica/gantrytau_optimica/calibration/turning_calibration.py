@@ -294,7 +294,8 @@ def calibrate_turning(
     if start == "linear":
         raise ModelError(
             f"calibrate: found start='linear' for {geometry.name}, expected 'nominal'; closure is linear in the "
-            "parameters of linear guideways only"
+            "parameters of linear guideways only",
+            argument="start",
         )
     arms = read_arms(geometry.robot, orientation, values=geometry.values)
     fitted, held_out = split

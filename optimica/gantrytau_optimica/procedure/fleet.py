@@ -177,7 +177,8 @@ def _others(
             return one, wide
     raise ModelError(
         f"plan_calibration.tape: found {tape:g} m, with which {DRAWS} of {DRAWS} robots could not be put together; "
-        "expected an error that lets the links meet; measure joints and lengths better by hand"
+        "expected an error that lets the links meet; measure joints and lengths better by hand",
+        argument="tape",
     )
 
 
@@ -205,5 +206,6 @@ def check_home(fleet: Fleet, home: np.ndarray) -> None:
         raise ModelError(
             f"plan_calibration.home: found {missing} at home = {np.round(home, 4).tolist()}{which}; expected a place "
             "from which all robots can set out; give home= in m and rad, in the middle of the free space, smaller "
-            "margins and radii, or measure the robot better by hand (tape=)"
+            "margins and radii, or measure the robot better by hand (tape=)",
+            argument="home",
         )

@@ -232,7 +232,8 @@ def _home(fleet: Fleet, home: Any) -> np.ndarray:
     if found.shape != (len(joints),) or not np.isfinite(found).all():
         raise ModelError(
             f"plan_calibration.home: found {home!r}, expected {len(joints)} finite numbers in m and rad, for "
-            f"{', '.join(joints)}"
+            f"{', '.join(joints)}",
+            argument="home",
         )
     return commanded(found[None])[0]
 
@@ -242,28 +243,33 @@ def _check_numbers(*, wanted: Any, tape: Any, margin: Any, robots: Any) -> None:
         if not (isinstance(value, (int, float)) and 0 < value <= most):
             raise ModelError(
                 f"plan_calibration.{name}: found {value!r}, expected a length in m above 0 and up to {most:g}; write 5 "
-                "mm as 0.005, 200 um as 200e-6"
+                "mm as 0.005, 200 um as 200e-6",
+                argument=name,
             )
     if not (isinstance(margin, (int, float)) and 0 < margin < LARGEST_TAPE):
         raise ModelError(
             f"plan_calibration.margin: found {margin!r}, expected a length in m above 0 and below {LARGEST_TAPE:g}; "
-            "without one no way can be shown to be clear"
+            "without one no way can be shown to be clear",
+            argument="margin",
         )
     if not (isinstance(robots, int) and robots >= 1):
         raise ModelError(
-            f"plan_calibration.robots: found {robots!r}, expected a whole number from 1; 20 are usual"
+            f"plan_calibration.robots: found {robots!r}, expected a whole number from 1; 20 are usual",
+            argument="robots",
         )
 
 
 def _check_kinds(limits: Any, device: Any) -> None:
     if not isinstance(limits, Limits):
         raise ModelError(
-            f"plan_calibration.limits: found {type(limits).__name__}, expected gantrytau.kinematics.Limits(strokes=..., ...)"
+            f"plan_calibration.limits: found {type(limits).__name__}, expected Limits(strokes=..., ...) of kinematics",
+            argument="limits",
         )
     if not isinstance(device, Device):
         raise ModelError(
             f"plan_calibration.device: found {type(device).__name__}, expected a device such as LaserTracker((4.0, 3.0, "
-            "0.0))"
+            "0.0))",
+            argument="device",
         )
 
 
@@ -274,5 +280,6 @@ def _check_poses(fleet: Fleet, poses: Any) -> None:
     if not (isinstance(poses, int) and poses >= needed):
         raise ModelError(
             f"plan_calibration.poses: found {poses!r}, expected a whole number from {needed} for a robot with "
-            f"{fleet.kind}; 40 are usual"
+            f"{fleet.kind}; 40 are usual",
+            argument="poses",
         )

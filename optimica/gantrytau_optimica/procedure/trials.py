@@ -140,12 +140,14 @@ def check_device(fleet: Fleet, device: Device) -> None:
     if found.r is None:
         raise ModelError(
             f"plan_calibration.device: found {type(device).__name__}, which finds no position, expected one that does; "
-            "take a LaserTracker, a TMac or cameras"
+            "take a LaserTracker, a TMac or cameras",
+            argument="device",
         )
     if fleet.nominal.turns and found.R is None:
         raise ModelError(
             f"plan_calibration.device: found {type(device).__name__} for a robot with {fleet.kind}, expected one that finds "
-            "orientations too; take a TMac or cameras, or plan for the robot with three links"
+            "orientations too; take a TMac or cameras, or plan for the robot with three links",
+            argument="device",
         )
 
 

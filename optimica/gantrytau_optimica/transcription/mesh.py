@@ -73,7 +73,8 @@ def mesh_of(elements: Any, free_lengths: bool = False) -> Mesh:
             lengths = np.array([np.nan])
         if lengths.ndim != 1 or lengths.size < 1 or not np.all(np.isfinite(lengths)) or np.any(lengths <= 0):
             raise ModelError(
-                f"elements={elements!r}: expected a whole number of at least 1, or the lengths of the elements, all above 0"
+                f"elements={elements!r}: expected a whole number of at least 1, or the lengths of the elements, all above 0",
+                argument="elements",
             )
         borders = np.concatenate([[0.0], np.cumsum(lengths / lengths.sum())])
         borders[-1] = 1.0
@@ -81,7 +82,8 @@ def mesh_of(elements: Any, free_lengths: bool = False) -> Mesh:
         borders = np.linspace(0.0, 1.0, int(elements) + 1)
     else:
         raise ModelError(
-            f"elements={elements!r}: expected a whole number of at least 1, or a list of lengths"
+            f"elements={elements!r}: expected a whole number of at least 1, or a list of lengths",
+            argument="elements",
         )
     return Mesh(borders, tuple(range(1, borders.size - 1)) if free_lengths else ())
 

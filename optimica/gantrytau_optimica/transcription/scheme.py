@@ -31,9 +31,13 @@ class Collocation:
 def collocation(scheme: str, count: int) -> Collocation:
     """The scheme "radau" or "gauss" with `count` points per element. Raises ModelError for others."""
     if scheme not in SCHEMES:
-        raise ModelError(f"scheme={scheme!r}: expected one of {', '.join((*SCHEMES, 'shooting'))}")
+        raise ModelError(
+            f"scheme={scheme!r}: expected one of {', '.join((*SCHEMES, 'shooting'))}", argument="scheme"
+        )
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POINTS:
-        raise ModelError(f"points={count!r}: expected a whole number from 1 to {MOST_POINTS}")
+        raise ModelError(
+            f"points={count!r}: expected a whole number from 1 to {MOST_POINTS}", argument="points"
+        )
     points = np.array(ca.collocation_points(count, SCHEMES[scheme]))
     nodes = np.concatenate([[0.0], points])
     powers = np.arange(count + 1)

@@ -282,7 +282,7 @@ def test_wrong_connections_are_refused(halves, wires, words):
         ),
         (
             dict(start={"a.k.start": 1.0}),
-            r"start a\.k\.start: found no such variable; in an FMU write start=\{'a\.k': 1\.0\}",
+            r"start a\.k\.start: found no such variable; in an FMU it is called 'a\.k'",
         ),
         (dict(start={"a.q.start": 1.0}), r"start a\.q\.start: a has no variable 'q\.start'"),
         (dict(inputs={"a.qq": 1.0}), r"inputs a\.qq: a has no variable 'qq'; its inputs are f\."),

@@ -106,7 +106,7 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
     ("arguments", "words"),
     [
         (["--set", "q=1"], "--set q: lag.fmu has no variable 'q'; there is u, k, y."),
-        (["--set", "k.start=1"], "--set k.start: found no such variable; in an FMU write --set k=1\n"),
+        (["--set", "k.start=1"], "--set k.start: found no such variable; in an FMU it is called 'k'\n"),
         (
             ["--set", "y=1"],
             "--set y is a continuous output that is calculated, expected a parameter, an input",
@@ -151,7 +151,7 @@ def test_files_that_cannot_be_run(lag, tmp_path):
         )
     path = write_ssp(tmp_path / "one.ssp", {"a": lag}, [], stop=1.0, step=0.1)
     assert "--order seidel: expected" in run(path, "--order", "seidel").output
-    assert run(lag).exit_code == FAULT
+    assert run(lag).exit_code == MISUSE
     assert "expected one in s, as --stop 1.0" in run(lag).output
 
 

@@ -49,8 +49,9 @@ def check_constraints(arms: Sequence[Arm], constraints: Any) -> None:
     for key, value in constraints.items():
         if isinstance(value, str) and not any(_belongs(arm, key) and _belongs(arm, value) for arm in arms):
             raise ModelError(
-                f"calibrate: constraint '{key}': '{value}' is between two arms, expected numbers of one arm of a robot with "
-                "turntables, whose arms are fitted one by one"
+                f"calibrate: constraints: '{key}': '{value}' is between two arms, expected numbers of one arm of a robot "
+                "with turntables, whose arms are fitted one by one",
+                argument="constraints",
             )
 
 
@@ -68,12 +69,14 @@ def full_prior(arms: Sequence[Arm], prior: Mapping[str, Any] | None) -> dict[str
         matches = [n for n in (*vectors, *elements) if n == key or n.rpartition(".")[2] == key]
         if not matches:
             raise ModelError(
-                f"calibrate: prior for '{key}', which is not identified{did_you_mean(key, vectors)}"
+                f"calibrate: prior for '{key}', which is not identified{did_you_mean(key, vectors)}",
+                argument="prior",
             )
         if not isinstance(deviation, (int, float)) or not deviation > 0:
             raise ModelError(
                 f"calibrate: found the deviation {deviation!r} for '{key}' in prior, expected one number above 0, about the "
-                "nominal value"
+                "nominal value",
+                argument="prior",
             )
         found |= dict.fromkeys(matches, float(deviation))
     return found

@@ -41,7 +41,8 @@ def read_constraints(given: Any, names: Sequence[str]) -> list[Constraint]:
     """The constraints on numbers of these names. ModelError for names that are not identified and what is no constraint."""
     if not isinstance(given, Mapping):
         raise ModelError(
-            f"calibrate: found constraints={given!r}, expected a dict as {{'|arms[0].direction|': 1.0}}, by names"
+            f"calibrate: found constraints={given!r}, expected a dict as {{'|arms[0].direction|': 1.0}}, by names",
+            argument="constraints",
         )
     return [_read(key, value, names) for key, value in given.items()]
 
@@ -53,7 +54,8 @@ def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
         others = _places(value, names)
         if squared or len(others) != len(places):
             raise ModelError(
-                f"calibrate: constraint '{key}': '{value}', expected two names of numbers or of vectors"
+                f"calibrate: constraints: '{key}': '{value}', expected two names of numbers or of vectors",
+                argument="constraints",
             )
         return Constraint(places, others, np.zeros(len(places)), np.zeros(len(places)))
     try:
@@ -64,8 +66,9 @@ def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
         low = high = np.array(np.nan)
     if not np.all(low <= high) or (squared and not np.all(low >= 0)):
         raise ModelError(
-            f"calibrate: constraint '{key}': found {value!r}, expected a value, a pair of limits (least, most), or the name "
-            "of what it equals"
+            f"calibrate: constraints: '{key}': found {value!r}, expected a value, a pair of limits (least, most), or the "
+            "name of what it equals",
+            argument="constraints",
         )
     if squared:
         low, high = np.array([low**2]), np.array([high**2])
@@ -77,6 +80,7 @@ def _places(name: str, names: Sequence[str]) -> tuple[int, ...]:
     if not found:
         known = sorted({*names, *(n.rpartition("[")[0] for n in names if n.endswith("]"))})
         raise ModelError(
-            f"calibrate: constraint on '{name}', which is not identified{did_you_mean(name, known)}"
+            f"calibrate: constraints: '{name}' is not identified{did_you_mean(name, known)}",
+            argument="constraints",
         )
     return found

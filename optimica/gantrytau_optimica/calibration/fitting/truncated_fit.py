@@ -167,7 +167,8 @@ def with_prior(groups: Sequence[Group], expected: Prior) -> list[Group]:
     if not isinstance(prior, Mapping):
         raise ModelError(
             f"calibrate: found prior={prior!r}, expected a dict as {{'arms[1].links[0].plate_offset': 0.001}}, deviations "
-            "in m by name"
+            "in m by name",
+            argument="prior",
         )
     known = {n for g in groups for n, free in zip(g.names, g.free, strict=True) if free}
     found = [dict(g.prior) for g in groups]
@@ -175,7 +176,8 @@ def with_prior(groups: Sequence[Group], expected: Prior) -> list[Group]:
         matches = [n for n in known if _is_called(n, name)]
         if not matches:
             raise ModelError(
-                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, sorted(known))}"
+                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, sorted(known))}",
+                argument="prior",
             )
         value, deviation = given if isinstance(given, tuple) else (None, given)
         for group, mine in zip(groups, found, strict=True):
@@ -203,6 +205,7 @@ def _positive(name: str, deviation: Any, k: int) -> float:
     found = _element(deviation, k)
     if not found > 0:
         raise ModelError(
-            f"calibrate: found the deviation {found:g} for '{name}' in prior, expected one above 0"
+            f"calibrate: found the deviation {found:g} for '{name}' in prior, expected one above 0",
+            argument="prior",
         )
     return found

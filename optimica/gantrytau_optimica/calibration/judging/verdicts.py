@@ -129,9 +129,7 @@ def judged(found: Calibration) -> list[Finding]:
         one = len(others) == 1
         advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
         if found.loss == "robust":
-            advice = (
-                f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of .error"
-            )
+            advice = f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error"
         words = (
             f"{rows_in_words(others, len(found.measurements))} {agreeing(others, 'close')} worse than {OUTLIER:g} standard "
             f"deviations; {advice}"
@@ -204,11 +202,14 @@ def _slipped(found: Calibration) -> Iterator[Finding]:
 def _in_doubt(found: Calibration) -> Iterator[Finding]:
     lost = found.held_out[~np.isfinite(found.errors)]
     if lost.size:
-        left = f"{agreeing(lost, 'they are')} left out of .error"
+        left = f"{agreeing(lost, 'they are')} left out of the error"
         words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; {left}"
         yield Finding("no pose", lost, words)
     if not found.success:
-        words = "the fit did not converge; its numbers are those of the last step; measure more poses, or give a prior"
+        words = (
+            "the fit did not converge; its numbers are those of the last step; measure more poses, or give "
+            "prior={name: deviation}"
+        )
         yield Finding("not converged", found.rows, words)
     if found.undetermined:
         advice = (
@@ -217,7 +218,7 @@ def _in_doubt(found: Calibration) -> Iterator[Finding]:
         names = ", ".join(_whole_vectors(found.undetermined))
         words = (
             f"data do not hold {names} (rank {found.rank} of {len(found.names)}); they stay near their start values; "
-            f"{advice}, or give a prior"
+            f"{advice}, or give prior={{name: deviation}}"
         )
         yield Finding("undetermined", found.rows, words)
 

@@ -56,27 +56,34 @@ def six_links(model: object, geometry: Geometry) -> bool:
 def check_model(model: object, geometry: Geometry, measurements: Measurements) -> None:
     """ModelError if there is no such model, or the robot or the measurements lack what it needs."""
     if isinstance(model, bool) or model not in MODELS:
-        raise ModelError(f"calibrate: found model={model!r}, expected one of {', '.join(map(repr, MODELS))}")
+        raise ModelError(
+            f"calibrate: found model={model!r}, expected model=None, 'parallel', or 1 to 5",
+            argument="model",
+        )
     if geometry.kind == "turning" and model is not None:
         raise ModelError(
-            f"calibrate: found model={model!r} for {geometry.name}, expected None; those models have no turntables"
+            f"calibrate: found model={model!r} for {geometry.name}, expected model=None; those models have no turntables",
+            argument="model",
         )
     if model in (3, 4, 5) and geometry.kind != "six":
         raise ModelError(
             f"calibrate: found {geometry.name} for model={model}, expected a robot with all six links; take "
-            "SixLinkGantryTau, or model=1"
+            "SixLinkGantryTau, or model=1",
+            argument="model",
         )
     if (six_links(model, geometry) or geometry.kind == "turning") and measurements.R is None:
         raise ModelError(
             "calibrate: found measurements without R for six links, expected orientations of the plate; measure poses, or "
-            "take model=1"
+            "take model=1",
+            argument="model",
         )
     if needs_rails(model) and (measurements.rails is None or len(measurements.rails) != len(geometry.arms)):
         found = "no rails" if measurements.rails is None else f"{len(measurements.rails)} rails"
         raise ModelError(
             f"calibrate: found measurements with {found} for model={model}, expected measured points of all "
-            f"{len(geometry.arms)} guideways; give Measurements(..., rails=[...]), or take "
-            f"model={1 if model == 2 else 3}"
+            f"{len(geometry.arms)} guideways; give rails=[...] in Measurements, or take "
+            f"model={1 if model == 2 else 3}",
+            argument="model",
         )
 
 

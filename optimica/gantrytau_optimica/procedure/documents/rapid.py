@@ -79,7 +79,8 @@ def check_program(
     """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
     if carts not in ("robax", "extax"):
         raise ModelError(
-            f"program: found carts={carts!r}, expected 'robax' or 'extax', the axes of a joint target that move"
+            f"program.carts: found {carts!r}, expected 'robax' or 'extax', the axes of a joint target that move",
+            argument="carts",
         )
     names = [
         ("name", name),
@@ -91,7 +92,7 @@ def check_program(
     for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
         if not (np.isfinite(value) and value >= least):
             unit = "m/s above 0" if what == "speed" else "s, not negative"
-            raise ModelError(f"program: found {what}={value!r}, expected a number in {unit}")
+            raise ModelError(f"program.{what}: found {value!r}, expected a number in {unit}", argument=what)
 
 
 def _procedure(name: str) -> str:
@@ -101,8 +102,9 @@ def _procedure(name: str) -> str:
 def _check_name(what: str, word: str) -> None:
     if not NAME.fullmatch(word) or word.lower() in RESERVED:
         raise ModelError(
-            f"program: found {what}={word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
-            "characters at most, no reserved word"
+            f"program.{what}: found {word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
+            "characters at most, no reserved word",
+            argument=what,
         )
 
 

@@ -66,7 +66,8 @@ def ordered(
         raise ModelError(
             f"plan_calibration.home: found no clear way from home to any of {len(choice.rows)} chosen poses, which all "
             "robots within twice the tape error could go; expected one; take a home in the free space where the poses are, "
-            "smaller margins, or give smaller obstacles"
+            "smaller margins, or give smaller obstacles",
+            argument="home",
         )
     q = roadmap.q[tour.nodes]
     return Order(q, ~tour.via & (tour.nodes > 0), places[stops - 1], np.array(sorted(set(lost)), dtype=int))

@@ -146,7 +146,7 @@ def test_gross_errors_that_were_left_out_do_not_count(tmp_path):
     assert robust.left_out.tolist() == [11, 40, 41]
     assert robust.error < 3 * NOISE  # of three noisy coordinates
     assert robust.errors.max() > 0.01  # they are there, but not in the mean
-    assert any("are left out of .error" in finding.message for finding in robust.findings)
+    assert any("are left out of the error" in finding.message for finding in robust.findings)
     numbers = report.report_numbers(robust)
     assert numbers["left_out_rows"] == [11, 40, 41]
     assert numbers["error_m"]["max"] < 7 * NOISE
