@@ -7,6 +7,7 @@ from functools import cached_property
 import casadi as ca
 
 from gantrytau.language.declarations import StateSelect
+from gantrytau.language.rods import Rods
 from gantrytau.language.statements import Equation, Requirement
 
 
@@ -111,7 +112,8 @@ class FlatModel:
     are no unknowns but `definitions`: expressions, by scalar name, of variables and of definitions before
     them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
     scalars known from outside; absent: declared names that this model has no use for, and why;
-    requirements: conditions on parameters; sampled, frictions: scalars that are set at instants, no unknowns either.
+    requirements: conditions on parameters; sampled, frictions: scalars that are set at instants, no unknowns either;
+    rods: what a robot says of its links, by name.
     """
 
     name: str
@@ -130,6 +132,7 @@ class FlatModel:
     requirements: tuple[Requirement, ...]
     sampled: tuple[Sampled, ...] = ()
     frictions: tuple[StickSlip, ...] = ()
+    rods: Rods | None = None
 
     def find(self, name: str) -> FlatVariable | None:
         """The variable, parameter or propagated quantity of that name."""

@@ -18,6 +18,7 @@ from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
 from gantrytau.language.declarations import Parameter, evaluate
 from gantrytau.language.events import Sampling, Sticking
 from gantrytau.language.model import Model
+from gantrytau.language.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.language.symbols import scalars, split_derivative, time, writing
 
@@ -112,6 +113,7 @@ def write_out(instance: Instance) -> FlatModel:
         requirements=(*stated.requirements, *events.requirements),
         sampled=sampled,
         frictions=frictions,
+        rods=rods_of(instance.root),
     )
 
 

@@ -4,8 +4,8 @@
     q = kinematics.ik([[0.5, 3.0, -0.6], [0.6, 3.0, -0.6]])          # (2, 3), NaN rows out of reach
     r, R = kinematics.fk(q)
 
-Gantry-Tau robots are known by the names of their parameters, and by their own equations: a closed form is taken only if
-the start of the model, which those equations decide, fits its links. Any other model answers through its equations.
+Robots on rods say what they are made of, as `rods()` of a Gantry-Tau does; a closed form is taken only if the start of the
+model, which its equations decide, fits its links. Any other model answers through its equations.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,8 +19,8 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
 from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose
-from gantrytau.kinematics.rods.linked import Home, LinkedRobot, SixLinks, ThreeLinks, TurningLinks
 from gantrytau.kinematics.rods.rod_geometry import geometry_of
+from gantrytau.kinematics.rods.rod_robots import Home, RodRobot, SixRods, TurningRods, robot_on
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau.language.model import Model
 
@@ -50,7 +50,7 @@ class Kinematics:
         self.dae = robot if isinstance(robot, Dae) else translate(robot, units=False)
         self._tool = tool
         self._tolerance = _length(tolerance)
-        joints = (joints,) if isinstance(joints, str) else joints
+        joints = None if joints is None else (joints,) if isinstance(joints, str) else tuple(joints)
         self._values = dict(self.dae.table.values)
         if f"{tool}.r" not in self.dae.vectors:
             raise ModelError(
@@ -203,32 +203,32 @@ class Kinematics:
         found = Kinematics.__new__(Kinematics)
         found.__dict__.update(self.__dict__)
         found._values = dict(parameter_table(flat).values)
-        geometry = geometry_of(found._values)
-        assert geometry is not None  # names do not change
+        assert flat.rods is not None  # of a robot on rods
+        geometry = geometry_of(flat.rods, found._values)
         found._solver = type(robot)(geometry, robot.home, robot.tolerance)
         # what decides the branch is taken over, as the old home is no pose of the new robot
         found._solver.__dict__.update(sides=robot.sides, ahead=robot.ahead)
         found.iterations_by_pose = np.zeros(0, dtype=int)
         return found
 
-    def linked(self, what: str = "links") -> LinkedRobot:
+    def linked(self, what: str = "links") -> RodRobot:
         """The robot as guideways and links; ModelError for a model that is not made of them."""
-        if isinstance(self._solver, LinkedRobot):
+        if isinstance(self._solver, RodRobot):
             return self._solver
         raise ModelError(
-            f"Kinematics.{what}: found {self.dae.name}, expected a Gantry-Tau robot, whose links are known by name; use "
-            "ik, fk and jacobian, or start values of another branch"
+            f"Kinematics.{what}: found {self.dae.name}, expected a Gantry-Tau robot, or another that says by rods() "
+            "what its links are; use ik, fk and jacobian, or start values of another branch"
         )
 
-    def _with_turntables(self, what: str) -> TurningLinks:
-        if isinstance(self._solver, TurningLinks):
+    def _with_turntables(self, what: str) -> TurningRods:
+        if isinstance(self._solver, TurningRods):
             return self._solver
         raise ModelError(
             f"Kinematics.{what}: found {self.dae.name}, expected a robot with turntables such as "
             "F1GantryTau(prototypes.F1); use ik and fk"
         )
 
-    def _whole(self, robot: LinkedRobot, r: Any, R: Any, q: Any, place: str):
+    def _whole(self, robot: RodRobot, r: Any, R: Any, q: Any, place: str):
         """Poses with the q and R that follow where they are not given."""
         at = poses(r, R, place)
         if q is None:
@@ -242,7 +242,7 @@ class Kinematics:
                 )
         if at.R is not None:
             return at, q, at.R
-        following = isinstance(robot, SixLinks)
+        following = isinstance(robot, SixRods)
         return at, q, robot.follow(at.r, robot.sides)[1] if following else robot.repeated(len(at.r))
 
     def _near(self, near: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -255,20 +255,17 @@ class Kinematics:
         R = self.home.R if at.R is None else at.R
         return np.broadcast_to(at.r, (count, 3)), np.broadcast_to(R, (count, 3, 3))
 
-    def _recognised(self, joints: Sequence[str] | None) -> LinkedRobot | None:
-        """The robot as guideways and links, if its names and its start say that it is one."""
-        geometry = geometry_of(self._values)
-        known = set(self.dae.variables)
-        if geometry is None or not known.issuperset(geometry.names) or self._tool != "tool":
+    def _recognised(self, joints: Sequence[str] | None) -> RodRobot | None:
+        """The robot as guideways and links, if it says that it is one and its start fits them."""
+        rods = self.dae.flat.rods
+        if rods is None or self._tool != "tool" or joints not in (None, rods.joints):
             return None
-        if joints is not None and tuple(joints) != geometry.names:
-            return None
-        kind = TurningLinks if geometry.turntables else SixLinks if len(geometry.length) == 6 else ThreeLinks
+        rods.check(self.dae.name, (*self.dae.variables, *self.dae.vectors, *self._values))
+        geometry = geometry_of(rods, self._values)
         home = home_of(self.dae.evaluate(), self._tool, geometry.names)
         length = geometry.slopes(home.q[None], home.r[None], home.R[None])[0]
-        return (
-            kind(geometry, home, self._tolerance) if np.abs(length - geometry.length).max() < FITS else None
-        )
+        fits = np.abs(length - geometry.length).max() < FITS
+        return robot_on(geometry, home, self._tolerance) if fits else None
 
     def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
@@ -297,12 +294,12 @@ def driven_joints(dae: Dae) -> tuple[str, ...]:
 
 
 def _directions(
-    robot: LinkedRobot, q: np.ndarray, r: np.ndarray, R: np.ndarray
+    robot: RodRobot, q: np.ndarray, r: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors of links in the axes of what carries them, and in plate axes, (N, m, 3)."""
     _, u, _, _ = robot.geometry.slopes(q, r, R)
     on_cart = np.empty_like(u)
-    for arm in range(3):
+    for arm in robot.geometry.arms:
         links = robot.geometry.links_of(arm)
         on_cart[:, links] = u[:, links] @ robot.geometry.frames(arm, q)[1]
     return on_cart, u @ R

@@ -14,7 +14,7 @@ from gantrytau.dae import Dae
 from gantrytau.errors import ModelError
 from gantrytau.interruption import on_interrupt
 from gantrytau.kinematics.rods.lengths_by_newton import limited, solved
-from gantrytau.kinematics.rods.linked import Home
+from gantrytau.kinematics.rods.rod_robots import Home
 from gantrytau.kinematics.rotations import of_quaternion, quaternions, rotations, skewed
 
 BLOCK = 8  # poses of one call: they take longer than the call, and Ctrl-C is heard in a second where none is in reach

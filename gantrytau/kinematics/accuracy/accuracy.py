@@ -21,7 +21,7 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, told, vectors
-from gantrytau.kinematics.rods.linked import ThreeLinks
+from gantrytau.kinematics.rods.rod_robots import ThreeRods
 from gantrytau.kinematics.rotations import angle_between, cross
 from gantrytau.language.model import Model
 
@@ -151,7 +151,7 @@ def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> A
     """
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
     linked, name = kinematics.linked("accuracy"), kinematics.dae.name
-    if not isinstance(linked, ThreeLinks):
+    if not isinstance(linked, ThreeRods):
         raise ModelError(
             f"{name}: found {len(linked.geometry.length)} links, expected three that end in the tool; ask for the accuracy "
             "of the three-link robot, as GantryTau(prototypes.D1)"

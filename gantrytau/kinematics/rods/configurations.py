@@ -10,7 +10,7 @@ from gantrytau.kinematics.modes.assembly_modes import assembly_modes
 from gantrytau.kinematics.poses import Poses, answered
 from gantrytau.kinematics.rods.closed_form import meeting
 from gantrytau.kinematics.rods.lengths_by_newton import solve_lengths
-from gantrytau.kinematics.rods.linked import LinkedRobot, SixLinks, ThreeLinks, TurningLinks
+from gantrytau.kinematics.rods.rod_robots import RodRobot, SixRods, ThreeRods, TurningRods
 
 SAME = 1e-6  # m or rad between solutions that are one
 GRID = 24  # starts around a turn of each turntable
@@ -31,9 +31,9 @@ class Configuration:
     feasible: np.ndarray
 
 
-def of_joints(robot: LinkedRobot, q: np.ndarray, one: bool, limits: np.ndarray) -> list[Configuration]:
+def of_joints(robot: RodRobot, q: np.ndarray, one: bool, limits: np.ndarray) -> list[Configuration]:
     """All poses of actuator coordinates; those of the branch at home first."""
-    if isinstance(robot, ThreeLinks):
+    if isinstance(robot, ThreeRods):
         R = robot.repeated(len(q))
         foot, height, margin = meeting(robot.spheres(q, R)[0], robot.geometry.length)
         lost = ~(margin >= 0.0)
@@ -57,13 +57,13 @@ def of_joints(robot: LinkedRobot, q: np.ndarray, one: bool, limits: np.ndarray) 
     return [configuration(robot, q, r[k][None], R[k][None], one, limits) for k in np.argsort(away)]
 
 
-def of_pose(robot: LinkedRobot, at: Poses, limits: np.ndarray) -> list[Configuration]:
+def of_pose(robot: RodRobot, at: Poses, limits: np.ndarray) -> list[Configuration]:
     """All actuator coordinates of a pose, those with the arms on the sides they have at home first."""
-    if isinstance(robot, TurningLinks):
+    if isinstance(robot, TurningRods):
         return _of_turntables(robot, at, limits)
     found = []
     for sides in SIDES * robot.sides:
-        if isinstance(robot, SixLinks) and at.R is None:
+        if isinstance(robot, SixRods) and at.R is None:
             q, R, _ = robot.follow(at.r, sides)
         else:
             q, _ = robot.ik(at.r, at.R, sides)
@@ -72,7 +72,7 @@ def of_pose(robot: LinkedRobot, at: Poses, limits: np.ndarray) -> list[Configura
     return found
 
 
-def configuration(robot: LinkedRobot, q, r, R, one: bool, limits: np.ndarray) -> Configuration:
+def configuration(robot: RodRobot, q, r, R, one: bool, limits: np.ndarray) -> Configuration:
     """A solution with what can be said of it."""
     with np.errstate(invalid="ignore"):
         inside = ((q >= limits[:, 0]) & (q <= limits[:, 1])).all(axis=1)
@@ -80,14 +80,14 @@ def configuration(robot: LinkedRobot, q, r, R, one: bool, limits: np.ndarray) ->
     return Configuration(*answered(one, q, np.array(r), np.array(R), feasible))
 
 
-def _of_turntables(robot: TurningLinks, at: Poses, limits: np.ndarray) -> list[Configuration]:
+def _of_turntables(robot: TurningRods, at: Poses, limits: np.ndarray) -> list[Configuration]:
     """All q of one pose of the F1: what each arm can do, found from many starts, in all combinations."""
     if len(at.r) > 1 or at.R is None:
         raise ModelError(
             f"Kinematics.configurations: found {len(at.r)} positions and {'no' if at.R is None else 'an'} orientation, "
             "expected one pose of a robot with turntables; ask for one after the other, with R"
         )
-    arms = [_of_arm(robot, arm, at.r, at.R) for arm in range(3)]
+    arms = [_of_arm(robot, arm, at.r, at.R) for arm in robot.geometry.arms]
     found = []
     for parts in itertools.product(*arms):
         q = np.zeros((1, 6))
@@ -97,7 +97,7 @@ def _of_turntables(robot: TurningLinks, at: Poses, limits: np.ndarray) -> list[C
     return found
 
 
-def _of_arm(robot: TurningLinks, arm: int, r: np.ndarray, R: np.ndarray) -> list[np.ndarray]:
+def _of_arm(robot: TurningRods, arm: int, r: np.ndarray, R: np.ndarray) -> list[np.ndarray]:
     """Coordinates of an arm for one pose, the solution of the robot's own branch first."""
     columns = robot.geometry.columns_of(arm)
     turns = np.linspace(-np.pi, np.pi, GRID, endpoint=False)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau.kinematics.rods.rod_geometry import Geometry
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import turned
 
 ROUNDING = 1e-13  # of lengths, relative to the size of coordinates: some hundred times a rounding
@@ -20,7 +20,7 @@ LONGEST = 0.5  # m or rad of one step; only far away, where the linear model say
 
 
 def solve_lengths(
-    geometry: Geometry,
+    geometry: RodGeometry,
     q: np.ndarray,
     r: np.ndarray,
     R: np.ndarray,
@@ -40,7 +40,7 @@ def solve_lengths(
 
 
 def _solve_block(
-    geometry: Geometry,
+    geometry: RodGeometry,
     at: tuple[np.ndarray, np.ndarray, np.ndarray],
     iterations: np.ndarray,
     free: list[int],

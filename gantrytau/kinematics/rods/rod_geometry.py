@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau.kinematics.rotations import about, cross, of_quaternion
+from gantrytau.language.rods import Rods
 
 
 @dataclass(frozen=True, eq=False)
-class Turntable:
+class TurntableFrame:
     """A turntable on an arm: its place and orientation in what carries it, its axis in its own frame."""
 
     arm: int
@@ -26,32 +27,33 @@ class Turntable:
 
 
 @dataclass(frozen=True, eq=False)
-class Geometry:
+class RodGeometry:
     """Where guideways, turntables and joints are.
 
-    offset, direction: (3, 3), carts at s = 0 and guideways, a row an arm. The rest has a row a link: arm (m,), length
-    (m,), on_cart (m, 3) in the frame of the outermost turntable or of the cart, on_plate (m, 3) in plate axes.
+    names: of the actuator coordinates, carts first, then turntables, a column of q each; offset, direction: (arms, 3), carts
+    at s = 0 and guideways. The rest has a row a link: arm (m,), length (m,), on_cart (m, 3) in the frame of the outermost
+    turntable or of the cart, on_plate (m, 3) in plate axes.
     """
 
+    names: tuple[str, ...]
     offset: np.ndarray
     direction: np.ndarray
     arm: np.ndarray
     length: np.ndarray
     on_cart: np.ndarray
     on_plate: np.ndarray
-    turntables: tuple[Turntable, ...] = ()
+    turntables: tuple[TurntableFrame, ...] = ()
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the actuator coordinates, carts first."""
-        turns = (f"turntables[{k}].phi" for k in range(len(self.turntables)))
-        return (*(f"carts[{i}].s" for i in range(3)), *turns)
+    def arms(self) -> range:
+        """Numbers of the arms, which are the columns of their carts in q."""
+        return range(len(self.offset))
 
     def links_of(self, arm: int) -> np.ndarray:
         """Numbers of the links of an arm."""
         return np.flatnonzero(self.arm == arm)
 
-    def of_arm(self, arm: int) -> "Geometry":
+    def of_arm(self, arm: int) -> "RodGeometry":
         """The same robot with the links of one arm only."""
         links = self.links_of(arm)
         parts = {n: getattr(self, n)[links] for n in ("arm", "length", "on_cart", "on_plate")}
@@ -59,7 +61,10 @@ class Geometry:
 
     def columns_of(self, arm: int) -> list[int]:
         """Numbers of the actuator coordinates that move an arm."""
-        return [arm, *(3 + k for k, turntable in enumerate(self.turntables) if turntable.arm == arm)]
+        return [
+            arm,
+            *(len(self.arms) + k for k, turntable in enumerate(self.turntables) if turntable.arm == arm),
+        ]
 
     def plate_joints(self, r: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Joints on the plate, (N, m, 3)."""
@@ -68,7 +73,7 @@ class Geometry:
     def cart_joints(self, q: np.ndarray) -> np.ndarray:
         """Joints on carts and turntables, (N, m, 3)."""
         A = np.empty((len(q), len(self.length), 3))
-        for arm in range(3):
+        for arm in self.arms:
             links = self.links_of(arm)
             if links.size == 0:
                 continue
@@ -85,7 +90,7 @@ class Geometry:
                 place = place + R @ turntable.offset
                 R = R @ turntable.R
                 turns.append((R @ turntable.axis, place))
-                R = R @ about(turntable.axis, q[:, 3 + k])
+                R = R @ about(turntable.axis, q[:, len(self.arms) + k])
         return place, R, turns
 
     def slopes(
@@ -134,52 +139,34 @@ class Geometry:
         return ((away**2).sum(-1) <= reach**2 * (1 + 1e-12)).all(axis=1)
 
     def mean_arms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Each arm as one link: mean joint on the plate (3, 3), mean length (3,)."""
-        on_plate = np.stack([self.on_plate[self.links_of(arm)].mean(axis=0) for arm in range(3)])
-        return on_plate, np.array([self.length[self.links_of(arm)].mean() for arm in range(3)])
+        """Each arm as one link: mean joint on the plate (arms, 3), mean length (arms,)."""
+        on_plate = np.stack([self.on_plate[self.links_of(arm)].mean(axis=0) for arm in self.arms])
+        return on_plate, np.array([self.length[self.links_of(arm)].mean() for arm in self.arms])
 
     def mean_joints(self, q: np.ndarray) -> np.ndarray:
-        """Mean joint of each arm on its cart or turntable, (N, 3, 3)."""
+        """Mean joint of each arm on its cart or turntable, (N, arms, 3)."""
         A = self.cart_joints(q)
-        return np.stack([A[:, self.links_of(arm)].mean(axis=1) for arm in range(3)], axis=1)
+        return np.stack([A[:, self.links_of(arm)].mean(axis=1) for arm in self.arms], axis=1)
 
 
-def geometry_of(values: Mapping[str, float]) -> Geometry | None:
-    """The geometry that parameters of a model describe, by their names; None where they describe none of these robots.
+def geometry_of(rods: Rods, values: Mapping[str, float]) -> RodGeometry:
+    """The geometry that a robot says of itself, with numbers of all scalar parameters by name."""
 
-    `arms[i].length`: three links; `arms[i].links[j].length`: six; `turntables[k].axis` besides: the F1, whose turntables
-    stand on arms 2, 3 and on the one before.
-    """
+    def vector(name: str | None, size: int = 3) -> np.ndarray:
+        return np.zeros(size) if name is None else np.array([values[f"{name}[{k}]"] for k in range(size)])
 
-    def vector(name: str, size: int = 3) -> np.ndarray:
-        return np.array([values[f"{name}[{k}]"] for k in range(size)])
-
-    def has(name: str) -> bool:
-        return name in values or f"{name}[0]" in values
-
-    arms = [f"arms[{i}]" for i in range(3)]
-    if has("arms[3].direction") or not all(has(f"{a}.direction") and has(f"{a}.offset") for a in arms):
-        return None
-    offset, direction = (np.stack([vector(f"{a}.{part}") for a in arms]) for part in ("offset", "direction"))
-    if all(has(f"{a}.length") for a in arms):
-        zero = np.zeros((3, 3))
-        length = np.array([values[f"{a}.length"] for a in arms])
-        return Geometry(offset, direction, np.arange(3), length, zero, zero)
-    links = [
-        (i, f"{a}.links[{j}]") for i, a in enumerate(arms) for j in range(6) if has(f"{a}.links[{j}].length")
-    ]
-    turns = [f"turntables[{k}]" for k in range(6) if has(f"turntables[{k}].axis")]
-    if len(links) != 6 or {i for i, _ in links} != {0, 1, 2} or len(turns) not in (0, 3):
-        return None
-    turntables = tuple(
-        Turntable(
-            arm, vector(f"{t}.offset"), of_quaternion(vector(f"{t}.orientation", 4)), vector(f"{t}.axis")
-        )
-        for arm, t in zip((1, 2, 2), turns, strict=False)
+    links = [(i, rod) for i, arm in enumerate(rods.arms) for rod in arm.rods]
+    return RodGeometry(
+        names=rods.joints,
+        offset=np.stack([vector(arm.offset) for arm in rods.arms]),
+        direction=np.stack([vector(arm.direction) for arm in rods.arms]),
+        arm=np.array([i for i, _ in links]),
+        length=np.array([values[rod.length] for _, rod in links]),
+        on_cart=np.stack([vector(rod.offset) for _, rod in links]),
+        on_plate=np.stack([vector(rod.plate_offset) for _, rod in links]),
+        turntables=tuple(
+            TurntableFrame(i, vector(t.offset), of_quaternion(vector(t.orientation, 4)), vector(t.axis))
+            for i, arm in enumerate(rods.arms)
+            for t in arm.turntables
+        ),
     )
-    arm = np.array([i for i, _ in links])
-    if turntables and arm.tolist() != [0, 1, 1, 2, 2, 2]:
-        return None
-    length = np.array([values[f"{name}.length"] for _, name in links])
-    on_cart, on_plate = (np.stack([vector(f"{n}.{p}") for _, n in links]) for p in ("offset", "plate_offset"))
-    return Geometry(offset, direction, arm, length, on_cart, on_plate, turntables)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, real, told
-from gantrytau.kinematics.rods.linked import SixLinks
-from gantrytau.kinematics.rods.rod_geometry import Geometry
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
+from gantrytau.kinematics.rods.rod_robots import SixRods
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau.kinematics.workspace.obstacles import Capsule, between_segments, segment_distance
 from gantrytau.language.model import Model
@@ -122,7 +122,7 @@ class Examiner:
             )
         self.limits = limits
         self.linked = self.kinematics.linked("workspace")
-        self.geometry: Geometry = self.linked.geometry
+        self.geometry: RodGeometry = self.linked.geometry
         self.carts = len(self.geometry.offset)
         self.strokes = _strokes(self.kinematics, self.carts, limits.strokes)
         self.around, self.reach = self.geometry.reach()
@@ -187,7 +187,7 @@ class Examiner:
 
     def _joints_and_orientation(self, r: np.ndarray, R: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Actuators (N, n), NaN rows out of reach, and the orientation (N, 3, 3) that is given or follows."""
-        if R is None and isinstance(self.linked, SixLinks):
+        if R is None and isinstance(self.linked, SixRods):
             q, R, _ = self.linked.follow(r, self.linked.sides)
             return q, R
         R_home = self.linked.repeated(len(r))
@@ -264,7 +264,7 @@ def _in_blocks(r: np.ndarray, block: Callable[[slice], dict[str, np.ndarray]]) -
     return Examined(r=r, **{name: np.concatenate([each[name] for each in blocks]) for name in blocks[0]})
 
 
-def touching_links(geometry: Geometry) -> list[tuple[int, int]]:
+def touching_links(geometry: RodGeometry) -> list[tuple[int, int]]:
     """Links of different arms that end in different joints of the plate: those that could touch."""
     arm, joint, count = geometry.arm, geometry.on_plate, len(geometry.length)
     return [

@@ -3,7 +3,10 @@
 Dressler (2012), sections 4.4 and 4.5.
 """
 
+from collections.abc import Sequence
+
 from gantrytau import Array, Model, Parameter, StateSelect, connect
+from gantrytau.language.rods import RodArm, RodTurntable, SingleRod
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, Prismatic, SphericalSpherical
 from gantrytau.mechanics.translational import Flange
 
@@ -71,3 +74,20 @@ class ThreeLinks(Arm):
     """An arm of three links."""
 
     links = Array(Link, 3)
+
+
+def arm_of_rods(arm: int, count: int, turntables: Sequence[int] = ()) -> RodArm:
+    """What `rods()` says of an arm of so many links, with turntables under them, from the cart outwards."""
+    name = f"arms[{arm}]"
+    links = [f"{name}.links[{j}]" for j in range(count)]
+    return RodArm(
+        name,
+        f"carts[{arm}].s",
+        f"{name}.direction",
+        f"{name}.offset",
+        [SingleRod(f"{link}.length", f"{link}.offset", f"{link}.plate_offset") for link in links],
+        [
+            RodTurntable(*(f"turntables[{k}].{part}" for part in ("phi", "axis", "offset", "orientation")))
+            for k in turntables
+        ],
+    )

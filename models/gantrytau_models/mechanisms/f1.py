@@ -11,11 +11,12 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
 from gantrytau.errors import ModelError
+from gantrytau.language.rods import Rods
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion
 from gantrytau.mechanics.rotational import Torque
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks
+from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts
 from gantrytau_models.mechanisms.six_link import Plate, quaternion
 from gantrytau_models.prototypes import RotatingArm, RotatingPrototype
@@ -133,6 +134,14 @@ class F1GantryTau(Model):
         yield connect(three.frame_cart, q5.frame_a)
         yield connect(q5.frame_b, q6.frame_a)
         yield connect(q6.frame_b, three.frame_links)
+
+    def rods(self) -> Rods:
+        """The links and the turntables that carry them. Where the joint on cart 1 (4.20) and the turntables on carts 2 and 3
+        (4.21) are is given, as it stands in the offsets of the guideways.
+        """
+        arms = [arm_of_rods(0, 1), arm_of_rods(1, 2, [0]), arm_of_rods(2, 3, [1, 2])]
+        on_carts = [arms[0].rods[0].offset, arms[1].turntables[0].offset, arms[2].turntables[0].offset]
+        return Rods(arms, given=on_carts)
 
 
 def _check_prototype(prototype: RotatingPrototype, robot: str) -> None:

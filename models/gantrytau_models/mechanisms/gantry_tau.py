@@ -8,6 +8,7 @@ prismatic joints in series.
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
+from gantrytau.language.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
     Frame,
@@ -135,6 +136,13 @@ class GantryTau(Model):
             yield connect(arm.frame_cart, cart.frame)
             yield connect(arm.axis, cart.axis)
             yield connect(arm.frame_b, self.tool.frame)
+
+    def rods(self) -> Rods:
+        """The links, one on each arm: their joints on the plate are in its tool point, as offsets say (4.7)."""
+        names = [(f"arms[{i}]", f"carts[{i}].s") for i in range(3)]
+        return Rods(
+            [RodArm(a, s, f"{a}.direction", f"{a}.offset", [SingleRod(f"{a}.length")]) for a, s in names]
+        )
 
 
 def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Friction:

@@ -8,9 +8,10 @@ import numpy as np
 
 from gantrytau import Array, Model, Real, StateSelect, connect
 from gantrytau.errors import ModelError
+from gantrytau.language.rods import Rods
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks
+from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
 from gantrytau_models.prototypes import Arm as Record
 from gantrytau_models.prototypes import Prototype
@@ -72,6 +73,11 @@ class SixLinkGantryTau(Model):
             yield connect(arm.axis, cart.axis)
             yield connect(arm.frame_b, self.tool.frame_a)
 
+    def rods(self) -> Rods:
+        """The links; joints on a cart have places of their own, so that of the cart is given (4.14)."""
+        arms = [arm_of_rods(i, i + 1) for i in range(3)]
+        return Rods(arms, given=[f"{arm.name}.offset" for arm in arms])
+
 
 def _arm(arm: Record) -> dict:
     links = [
@@ -83,7 +89,7 @@ def _arm(arm: Record) -> dict:
         )
         for link in arm.links
     ]
-    return dict(direction=list(arm.direction), links=links)
+    return dict(offset=[0.0, 0.0, 0.0], direction=list(arm.direction), links=links)
 
 
 def quaternion(R: np.ndarray) -> list[float]:

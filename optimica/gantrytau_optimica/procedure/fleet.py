@@ -14,7 +14,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics import Kinematics, Limits
-from gantrytau.kinematics.rods.linked import SixLinks, ThreeLinks, TurningLinks
+from gantrytau.kinematics.rods.rod_robots import SixRods, ThreeRods, TurningRods
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Examiner
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.devices.sight import Bars
@@ -43,7 +43,7 @@ class Member:
     @property
     def turns(self) -> bool:
         """Whether the plate can turn at all, so that poses have orientations."""
-        return not isinstance(self.linked, ThreeLinks)
+        return not isinstance(self.linked, ThreeRods)
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where this robot goes when told q (N, n): r (N, 3), R (N, 3, 3), NaN where its links do not meet."""
@@ -107,18 +107,14 @@ class Fleet:
     @property
     def turntables(self) -> bool:
         """Whether the robot needs to be told its orientation."""
-        return isinstance(self.nominal.linked, TurningLinks)
+        return isinstance(self.nominal.linked, TurningRods)
 
     @property
     def kind(self) -> str:
         """In words: "three links", "six links" or "turntables"."""
         linked = self.nominal.linked
         return (
-            "six links"
-            if isinstance(linked, SixLinks)
-            else "turntables"
-            if self.turntables
-            else "three links"
+            "six links" if isinstance(linked, SixRods) else "turntables" if self.turntables else "three links"
         )
 
     def with_limits(self, limits: Limits) -> Self:

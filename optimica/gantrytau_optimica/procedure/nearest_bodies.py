@@ -5,18 +5,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau.kinematics import Limits
-from gantrytau.kinematics.rods.rod_geometry import Geometry
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.workspace.obstacles import between_segments, segment_distance
 from gantrytau.kinematics.workspace.pose_limits import touching_links
 
 
-def nearest_bodies(geometry: Geometry, limits: Limits, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> str:
+def nearest_bodies(geometry: RodGeometry, limits: Limits, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> str:
     """The two bodies that are nearest to each other in one pose, q (n,), r (3,), R (3, 3): "link 1 of arm 0 and ..."."""
     return min(_pairs(geometry, limits, q[None], r[None], R[None]))[1]
 
 
 def _pairs(
-    geometry: Geometry, limits: Limits, q: np.ndarray, r: np.ndarray, R: np.ndarray
+    geometry: RodGeometry, limits: Limits, q: np.ndarray, r: np.ndarray, R: np.ndarray
 ) -> Iterator[tuple[float, str]]:
     """Distance in m and names of all pairs that count."""
     start, end = geometry.cart_joints(q), geometry.plate_joints(r, R)
@@ -34,7 +34,7 @@ def _pairs(
             yield float(apart) - 2 * limits.link_radius, f"{links[j]} and {links[i]}"
 
 
-def _link(geometry: Geometry, k: int) -> str:
+def _link(geometry: RodGeometry, k: int) -> str:
     """The name of a link, as parameters have it."""
     arm = int(geometry.arm[k])
     own = np.flatnonzero(geometry.arm == arm)

@@ -27,7 +27,7 @@ from gantrytau import Model
 from gantrytau.errors import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses, vectors
-from gantrytau.kinematics.rods.rod_geometry import Geometry
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, rotation_vector
 
@@ -210,7 +210,7 @@ def orientation_causes(robot: Model | Kinematics, q: Any, r: Any, R: Any, *, deg
     return _by_closure(geometry, joints, found.r, found.R, degree)
 
 
-def _by_closure(geometry: Geometry, q: Array, r: Array, R: Array, degree: int) -> Causes:
+def _by_closure(geometry: RodGeometry, q: Array, r: Array, R: Array, degree: int) -> Causes:
     length, u, by_pose, _ = geometry.slopes(q, r, R)
     missed = length - geometry.length
     first, second = np.zeros(

@@ -18,7 +18,7 @@ from gantrytau.kinematics.rods.closed_form import (
     slopes_of_three_links,
 )
 from gantrytau.kinematics.rods.lengths_by_newton import solve_lengths, solved
-from gantrytau.kinematics.rods.rod_geometry import Geometry
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import best_rotation
 
 NO_TURN = 1e-9  # of an element of R - I that a plate without rotation may be asked for
@@ -34,14 +34,14 @@ class Home:
 
 
 @dataclass(frozen=True, eq=False)
-class LinkedRobot:
+class RodRobot:
     """What all of them have.
 
     home: a pose of the branch; tolerance: m by which a link may miss its length where an orientation is given to a robot
     that cannot choose it.
     """
 
-    geometry: Geometry
+    geometry: RodGeometry
     home: Home
     tolerance: float = 1e-6
 
@@ -76,7 +76,9 @@ class LinkedRobot:
         """(N, 3), 1 where an arm points along its guideway, -1 against, 0 across it, where it is singular."""
         _, u, _, _ = self.geometry.slopes(q, r, R)
         along = np.sum(u * self.geometry.direction[self.geometry.arm], axis=2)
-        return np.sign(np.stack([along[:, self.geometry.links_of(i)].mean(axis=1) for i in range(3)], axis=1))
+        return np.sign(
+            np.stack([along[:, self.geometry.links_of(i)].mean(axis=1) for i in self.geometry.arms], axis=1)
+        )
 
     def ahead_of(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
         """(N,), the side of the plane through the single joints of the arms (4.26) on which the tool is."""
@@ -137,14 +139,14 @@ class LinkedRobot:
 
     def mean_carts(self, each: np.ndarray) -> np.ndarray:
         """(N, 3), the means over the links of each arm."""
-        return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in range(3)], axis=1)
+        return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in self.geometry.arms], axis=1)
 
     def repeated(self, count: int, R: np.ndarray | None = None) -> np.ndarray:
         """The orientation at home so many times."""
         return np.array(np.broadcast_to(self.home.R if R is None else R, (count, 3, 3)))
 
 
-class ThreeLinks(LinkedRobot):
+class ThreeRods(RodRobot):
     """Three links and a plate that keeps its orientation: closed forms (4.9) both ways."""
 
     @cached_property
@@ -178,7 +180,7 @@ class ThreeLinks(LinkedRobot):
         return slopes_of_three_links(self.geometry.offset, self.geometry.direction, r, q)
 
 
-class SixLinks(LinkedRobot):
+class SixRods(RodRobot):
     """Six links on three carts: the plate turns a little as the links make it (4.14)."""
 
     def ik(self, r, R=None, sides=None):
@@ -231,10 +233,10 @@ class SixLinks(LinkedRobot):
         q, _ = self.ik(r, R)
         _, _, by_pose, by_joints = self.geometry.slopes(q, r, R)
         each = -by_pose / by_joints.sum(axis=2)[:, :, None]
-        return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in range(3)], axis=1)
+        return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in self.geometry.arms], axis=1)
 
 
-class TurningLinks(LinkedRobot):
+class TurningRods(RodRobot):
     """The F1: turntables on two carts give the plate six degrees of freedom (section 4.5)."""
 
     def ik(self, r, R=None, sides=None):
@@ -258,7 +260,7 @@ class TurningLinks(LinkedRobot):
     def _arm_by_arm(self, q, r, R, sides):
         """Coordinates q and iterations of (4.27) from a start; NaN rows where an arm is not on its side."""
         iterations = np.zeros(len(r), dtype=int)
-        for arm in range(3):
+        for arm in self.geometry.arms:
             free = [6 + k for k in self.geometry.columns_of(arm)]
             q, _, _, count = solve_lengths(self.geometry.of_arm(arm), q, r, R, free)
             iterations = np.maximum(iterations, count)
@@ -268,38 +270,36 @@ class TurningLinks(LinkedRobot):
 
     def turned_as_at_home(self, r, R, sides):
         """Coordinates q (N, 6) with turntables as at home, and carts where each arm, one link, meets the plate."""
-        q = np.zeros((len(r), 6))
-        q[:, 3:] = self.home.q[3:]
+        q = np.array(np.broadcast_to(self.home.q, (len(r), 6)))
         return self.with_carts(q, r, R, sides)
 
     def five_degrees(self, r, R, sides):
         """Coordinates q (N, 6) as if the links of an arm were parallel and of one length (4.25)."""
         q = np.zeros((len(r), 6))
-        q[:, 3:] = self.angles(R)
+        q[:, len(self.geometry.arms) :] = self.angles(R)
         return self.with_carts(q, r, R, sides)
 
     def with_carts(self, q, r, R, sides):
         """Coordinates with the carts where each arm, one link, meets the plate."""
-        q = np.array(q)
-        q[:, :3] = 0.0
-        q[:, :3] = self.mean_carts(self.carts(r, R, self.geometry.cart_joints(q), sides))
+        q, carts = np.array(q), slice(len(self.geometry.arms))
+        q[:, carts] = 0.0
+        q[:, carts] = self.mean_carts(self.carts(r, R, self.geometry.cart_joints(q), sides))
         return q
 
     def angles(self, R):
         """Angles (N, 3) of the turntables at which joints on the arms are parallel to those on a plate at R: f_ik,rot."""
         g = self.geometry
         first, second, third = g.turntables
-        b, c = ((x[2] - x[1]) for x in (g.on_plate, g.on_cart))
-        links = g.links_of(2)
-        differences = [x[links] - x[links].mean(axis=0) for x in (g.on_plate, g.on_cart)]
-        wanted = R @ best_rotation(*(d[None] for d in differences))[0]  # of the outer turntable of arm 3
+        pair, three = g.links_of(first.arm), g.links_of(third.arm)
+        b, c = (x[pair[1]] - x[pair[0]] for x in (g.on_plate, g.on_cart))
+        differences = [x[three] - x[three].mean(axis=0) for x in (g.on_plate, g.on_cart)]
+        wanted = R @ best_rotation(*(d[None] for d in differences))[0]  # of the outer turntable
         phi_0 = _turn(first.axis, c, (R @ b) @ first.R)
         phi_1 = _turn(second.axis, third.R @ third.axis, wanted @ third.axis @ second.R)
         q = np.zeros((len(R), 6))
-        q[:, 4] = phi_1
-        rest = (
-            np.swapaxes(self.geometry.frames(2, q)[1], 1, 2) @ wanted
-        )  # rotation left for the outer turntable
+        q[:, g.columns_of(second.arm)[1]] = phi_1
+        # rotation left for the outer turntable
+        rest = np.swapaxes(g.frames(third.arm, q)[1], 1, 2) @ wanted
         w = np.stack(
             [rest[:, 2, 1] - rest[:, 1, 2], rest[:, 0, 2] - rest[:, 2, 0], rest[:, 1, 0] - rest[:, 0, 1]]
         )
@@ -316,7 +316,7 @@ class TurningLinks(LinkedRobot):
         """The pose in which arms are nearest to parallelograms (4.26): differences of joints fitted, then spheres."""
         g, A = self.geometry, self.geometry.cart_joints(q)
         own, arm = np.zeros_like(A), np.zeros_like(g.on_plate)
-        for links in (g.links_of(1), g.links_of(2)):
+        for links in map(g.links_of, {table.arm for table in g.turntables}):
             own[:, links] = A[:, links] - A[:, links].mean(axis=1, keepdims=True)
             arm[links] = g.on_plate[links] - g.on_plate[links].mean(axis=0)
         R = best_rotation(own, np.broadcast_to(arm, own.shape))
@@ -328,6 +328,21 @@ class TurningLinks(LinkedRobot):
         assert R is not None  # else ik raised
         _, _, by_pose, by_joints = self.geometry.slopes(q, r, R)
         return -solved(by_joints, by_pose)
+
+
+def robot_on(geometry: RodGeometry, home: Home, tolerance: float) -> RodRobot | None:
+    """The kinematics of three rods to a plate that keeps its orientation, or of six without turntables or with those of
+    an F1: one under the two rods of an arm, two under the three of the next. None for other structures.
+    """
+    rods = [len(geometry.links_of(arm)) for arm in geometry.arms]
+    if geometry.turntables:
+        carried = [sum(table.arm == arm for table in geometry.turntables) for arm in geometry.arms]
+        kind = TurningRods if (rods, carried) == ([1, 2, 3], [0, 1, 2]) else None
+    elif rods == [1, 1, 1]:
+        kind = None if geometry.on_plate.any() or geometry.on_cart.any() else ThreeRods
+    else:
+        kind = SixRods if len(rods) == 3 and sum(rods) == 6 and min(rods) > 0 else None
+    return None if kind is None else kind(geometry, home, tolerance)
 
 
 def _turn(axis: np.ndarray, moved: np.ndarray, wanted: np.ndarray) -> np.ndarray:
