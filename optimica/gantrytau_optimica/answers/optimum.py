@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau_optimica.answers.archive.optimum_files import SUFFIX, save_optimum
-from gantrytau_optimica.answers.outcome import Outcome
 from gantrytau_optimica.answers.playback.playback import Playback, play_back
+from gantrytau_optimica.answers.program_answer import ProgramAnswer
 from gantrytau_optimica.failures.failure_report import report
 from gantrytau_optimica.failures.relaxation import Relaxed, relax
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Optimum(Outcome):
+class Optimum(ProgramAnswer):
     """What `optimize` found. `optimum["robot.tool.r"]` is a variable over `time`, free numbers are floats.
 
     `time` holds the start and all collocation points, in s; build_time and solve_time are in s.

@@ -1,182 +1,17 @@
-"""The answer of an estimation: parameters, how sure they are, and what is left of the data."""
+"""`Estimate`: the answer of an estimation."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from gantrytau import ModelError
-from gantrytau.errors import did_you_mean
-from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.estimation.parameter_fit import ParameterFit
 from gantrytau_optimica.estimation.report import draw_fit, report_fit
 
-STRONG = 0.99  # correlation from which on two parameters are hardly told apart
-COARSE = 0.2  # deviations by which a halved mesh may move a parameter
 
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """What `estimate` found. `fit.parameters["k"]` is a float in the model's unit.
-
-    parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;
-    jacobian: slopes of the residuals in deviations, (N, k), for the parameters `names` that are at no limit; errors:
-    these residuals, model less measured, (N,); scales: the deviations, (N,), 1 where none was given; known: whether
-    the deviations were given; weights: (N,) of a robust fit, else ones; mesh_shift: by how much the parameters
-    would move on half as long elements, about, by name (NaN: not found); optimum: the solved problem, whose objective
-    is a multiple of the sum of squares.
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(ParameterFit):
+    """What `estimate` found. `fit.parameters["k"]` is a float in the model's unit; `.deviations`, `.covariance(names)` and
+    `.intervals(0.95)` say how sure it is, `.residuals` and `.probability` how well model and data agree.
     """
-
-    name: str
-    experiments: tuple[Experiment, ...]
-    parameters: dict[str, float]
-    at_bounds: dict[str, float]
-    names: tuple[str, ...]
-    jacobian: np.ndarray
-    errors: np.ndarray
-    scales: np.ndarray
-    weights: np.ndarray
-    mesh_shift: dict[str, float]
-    known: bool
-    loss: str
-    optimum: Optimum
-
-    @property
-    def freedom(self) -> int:
-        """Measured values less determined parameters."""
-        return self.errors.size - len(self.names)
-
-    @property
-    def chi_square(self) -> float:
-        """Sum of the squares of all residuals, divided by their deviations where these were given."""
-        return float(self.errors @ self.errors)
-
-    @property
-    def variance(self) -> float:
-        """chi_square by degrees of freedom: that of the noise, or about 1 where true deviations were given; else NaN."""
-        return self.chi_square / self.freedom if self.freedom > 0 else np.nan
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the residuals, of a robust fit 1.4826 times the median of their amounts."""
-        if self.loss == "robust":
-            return 1.4826 * float(np.median(np.abs(self.errors)))
-        return float(np.sqrt(self.variance))
-
-    @property
-    def probability(self) -> float:
-        """That noise of the given deviations leaves as large a chi_square; NaN where none were given."""
-        from scipy import stats
-
-        return (
-            float(stats.chi2.sf(self.chi_square, self.freedom)) if self.known and self.freedom > 0 else np.nan
-        )
-
-    @cached_property
-    def _covariance(self) -> np.ndarray:
-        """(k, k) of `names`, by the singular values of the normed slopes."""
-        norms = np.linalg.norm(self.jacobian, axis=0)
-        _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
-        root = right.T / singular / norms[:, None]
-        return root @ root.T * self._factor
-
-    @property
-    def _factor(self) -> float:
-        """Of the inverse of J'J: variance of the noise, for a robust fit that of Huber (1981), section 7.6."""
-        if self.loss == "squares":
-            return 1.0 if self.known else self.variance
-        inside = self.weights == 1.0
-        share = float(np.mean(inside))
-        correction = 1 + len(self.names) / self.errors.size * (1 - share) / share
-        clipped = float(np.sum((self.weights * self.errors) ** 2)) / self.freedom
-        return correction**2 * clipped / share**2
-
-    def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
-        """Covariance of parameters (k, k) in their order, default that of `names`. Raises ModelError."""
-        if isinstance(names, str):
-            raise ModelError(f"covariance: found '{names}', expected a list of names; write ['{names}']")
-        rows = [self._place(n) for n in (self.names if names is None else names)]
-        return self._covariance[np.ix_(rows, rows)]
-
-    def _place(self, name: str) -> int:
-        if name in self.names:
-            return self.names.index(name)
-        if name in self.at_bounds:
-            raise ModelError(
-                f"{self.name}: {name} stands at its limit {self.at_bounds[name]:g} and has no deviation; widen the "
-                "limit or leave the parameter out"
-            )
-        raise ModelError(f"{self.name}: {name} was not estimated{did_you_mean(name, self.names)}")
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations by name."""
-        return dict(zip(self.names, np.sqrt(np.diag(self._covariance)).tolist(), strict=True))
-
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlations of `names`, (k, k)."""
-        size = np.sqrt(np.diag(self._covariance))
-        return self._covariance / np.outer(size, size)
-
-    def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Confidence intervals by name, of Student's t, or the normal distribution where deviations were given.
-
-        They are those of the model linearised at the answer. Raises ModelError.
-        """
-        from scipy import stats
-
-        if not isinstance(confidence, float) or not 0 < confidence < 1:
-            raise ModelError(f"intervals: found confidence={confidence!r}, expected a number between 0 and 1")
-        wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)
-        half = float(wide.ppf((1 + confidence) / 2))
-        return {
-            n: (self.parameters[n] - half * d, self.parameters[n] + half * d)
-            for n, d in self.deviations.items()
-        }
-
-    @cached_property
-    def residuals(self) -> dict[tuple[str, str], np.ndarray]:
-        """Measured less model by experiment and name, (n,) or (n, k), in the unit of the measured."""
-        found, begin = {}, 0
-        for experiment in self.experiments:
-            for name, samples in experiment.measured.items():
-                n, k = samples.values.shape
-                mine = -(self.errors * self.scales)[begin : begin + n * k].reshape(k, n).T
-                found[experiment.name, name] = mine[:, 0] if k == 1 else mine
-                begin += n * k
-        return found
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to hold in mind before the numbers are used."""
-        found = [
-            f"{name} stands at its limit {bound:.6g}: it has no deviation, and those of the others hold it there"
-            for name, bound in self.at_bounds.items()
-        ]
-        correlation = self.correlation
-        found += [
-            f"{a} and {b} are strongly correlated ({correlation[i, j]:+.4f}): their deviations are large, although a "
-            "combination of them is well determined"
-            for i, a in enumerate(self.names)
-            for j, b in enumerate(self.names[:i])
-            if abs(correlation[i, j]) > STRONG
-        ]
-        deviations = self.deviations
-        worst = max(self.names, key=lambda n: abs(self.mesh_shift[n]) / deviations[n], default="")
-        if worst and not abs(self.mesh_shift[worst]) <= COARSE * deviations[worst]:
-            found.append(
-                f"the mesh is coarse: on twice the elements {worst} moves by "
-                f"{self.mesh_shift[worst] / deviations[worst]:.2g} of its deviations; raise elements="
-            )
-        if self.known and self.loss == "squares" and self.probability < 1e-3:
-            found.append(
-                f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
-                "small, or the model is wrong"
-            )
-        return tuple(found)
 
     def report(self) -> str:
         """Parameters with deviations and intervals, correlations, fit and warnings."""
@@ -185,11 +20,3 @@ class Estimate:
     def plot(self, file: Any = None):
         """Measured values and the model over time; returns the figure, and saves it to `file`."""
         return draw_fit(self, file)
-
-    def __repr__(self) -> str:
-        deviations: Mapping[str, float] = self.deviations
-        words = ", ".join(
-            f"{n} = {v:.5g}" + (f" ± {deviations[n]:.2g}" if n in deviations else " (limit)")
-            for n, v in self.parameters.items()
-        )
-        return f"<Estimate {self.name}: {words}>"

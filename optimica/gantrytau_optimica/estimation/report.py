@@ -1,14 +1,14 @@
 """An estimate as text and as a figure."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from gantrytau_optimica.estimation.estimation import Estimate
+from gantrytau.results.figures import finished
+from gantrytau_optimica.estimation.parameter_fit import ParameterFit
 
 
-def report_fit(fit: "Estimate") -> str:
+def report_fit(fit: ParameterFit) -> str:
     """Parameters with deviations and 95 % intervals, correlations, residuals and warnings."""
     deviations = fit.deviations
     intervals = fit.intervals(0.95)
@@ -36,7 +36,7 @@ def report_fit(fit: "Estimate") -> str:
     return "\n".join(lines)
 
 
-def _fit_words(fit: "Estimate") -> str:
+def _fit_words(fit: ParameterFit) -> str:
     if fit.loss == "robust":
         return (
             f"{int(np.sum(fit.weights < 1))} values count less than others, the least {np.min(fit.weights):.2g}; deviation "
@@ -53,7 +53,7 @@ def _fit_words(fit: "Estimate") -> str:
     )
 
 
-def _correlations(fit: "Estimate") -> list[str]:
+def _correlations(fit: ParameterFit) -> list[str]:
     """The largest correlations, by amount."""
     matrix = fit.correlation
     pairs = [(matrix[i, j], fit.names[j], fit.names[i]) for i in range(len(fit.names)) for j in range(i)]
@@ -63,11 +63,9 @@ def _correlations(fit: "Estimate") -> list[str]:
     return ["correlations: " + ", ".join(f"{a}, {b} {c:+.3f}" for c, a, b in pairs[:8])]
 
 
-def draw_fit(fit: "Estimate", file: Any):
+def draw_fit(fit: ParameterFit, file: Any):
     """One axis for every measured name (rows) and experiment (columns): dots measured, lines the model."""
     import matplotlib.pyplot as plt
-
-    from gantrytau.results.figures import finished
 
     names = list(dict.fromkeys(name for e in fit.experiments for name in e.measured))
     size = (4.5 * len(fit.experiments) + 1.5, 2.2 * len(names) + 0.8)
@@ -85,13 +83,13 @@ def draw_fit(fit: "Estimate", file: Any):
     return finished(figure, file)
 
 
-def _label(fit: "Estimate", name: str) -> str:
+def _label(fit: ParameterFit, name: str) -> str:
     full = f"{fit.experiments[0].name}.model.{name}"
     quantity = next((v for v in fit.optimum.dae.flat.variables if full in (v.name, *v.elements)), None)
     return f"{name} [{quantity.unit}]" if quantity is not None and quantity.unit else name
 
 
-def _one(fit: "Estimate", axis: Any, number: int, name: str) -> None:
+def _one(fit: ParameterFit, axis: Any, number: int, name: str) -> None:
     """The samples of one name and the course of the model."""
     experiment = fit.experiments[number]
     samples = experiment.measured[name]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.answers.outcome import Outcome
+from gantrytau_optimica.answers.program_answer import ProgramAnswer
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")
@@ -20,12 +20,12 @@ def versions() -> dict[str, str]:
     return {**{name: version(name) for name in PACKAGES}, "python": platform.python_version()}
 
 
-def hashes(outcome: Outcome) -> dict[str, str]:
+def hashes(answer: ProgramAnswer) -> dict[str, str]:
     """Of the model's equations as they are written, and of the whole problem: objective, constraints, horizon.
 
     Values of parameters and limits belong to the problem, guesses to neither.
     """
-    read = outcome.built.read
+    read = answer.built.read
     equations = "\n".join(_equations(read))
     return {
         "equations": hash_of(equations),

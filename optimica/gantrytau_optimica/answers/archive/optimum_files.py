@@ -24,7 +24,7 @@ from gantrytau.simulation.to_result import labels
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.archive.fingerprint import hashes, plain, versions
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum, SavedPhase
-from gantrytau_optimica.answers.outcome import Outcome
+from gantrytau_optimica.answers.program_answer import ProgramAnswer
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -32,7 +32,7 @@ FORMAT, VERSION, SUFFIX = "gantrytau optimum", 1, ".optimum"
 Arrays = dict[str, np.ndarray]
 
 
-def save_optimum(optimum: Outcome, path: str | os.PathLike[str]) -> Path:
+def save_optimum(optimum: ProgramAnswer, path: str | os.PathLike[str]) -> Path:
     """Write all that is known of an optimum to a file `*.optimum`, and return its path.
 
     An existing file is replaced only when the new one is complete. Raises ModelError for another suffix or a folder
@@ -109,7 +109,7 @@ def _stored(info: zipfile.ZipInfo) -> zipfile.ZipInfo:
     return info
 
 
-def _content(optimum: Outcome) -> tuple[dict[str, Any], Arrays]:
+def _content(optimum: ProgramAnswer) -> tuple[dict[str, Any], Arrays]:
     dae, solution = optimum.dae, optimum.solution
     units, words = labels(dae)
     arrays: Arrays = {
@@ -151,7 +151,7 @@ def _derivatives(words: dict[str, str]) -> list[str]:
 
 
 def _phase_content(
-    optimum: Outcome, phase: Trajectory, place: str, names: list[str], arrays: Arrays
+    optimum: ProgramAnswer, phase: Trajectory, place: str, names: list[str], arrays: Arrays
 ) -> dict[str, Any]:
     """The header of one phase; its arrays are added to `arrays`."""
     own = phase.phase.name
@@ -198,7 +198,7 @@ def _polynomials(track: Track, phase: Trajectory, arrays: Arrays) -> tuple[np.nd
     return nodes, unknowns
 
 
-def _determined(optimum: Outcome, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
+def _determined(optimum: ProgramAnswer, phase: Trajectory, names: list[str]) -> tuple[list[str], ca.SX]:
     """The names whose values the solution determines (the derivative of an input is none), and their expressions."""
     symbols = [s.symbol for s in (*phase.phase.signals, *phase.phase.courses, *phase.problem.free)]
     known = {s.element_hash() for s in (*symbols, phase.problem.time)}

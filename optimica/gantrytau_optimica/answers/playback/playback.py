@@ -8,8 +8,8 @@ import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.simulation.to_result import labels
-from gantrytau_optimica.answers.outcome import Outcome
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
+from gantrytau_optimica.answers.program_answer import ProgramAnswer
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 
 
@@ -46,7 +46,7 @@ class Playback:
     defects: all conditions at single times; objective: of the motion as played; multipliers: of the conditions.
     """
 
-    optimum: Outcome
+    optimum: ProgramAnswer
     phases: dict[str, Replayed]
     violations: tuple[Violation, ...]
     defects: tuple[Defect, ...]
@@ -120,7 +120,7 @@ class Playback:
         return "\n".join(["Played back:", *(f"  {line}" for line in self.lines())])
 
 
-def play_back(optimum: Outcome) -> Playback:
+def play_back(optimum: ProgramAnswer) -> Playback:
     """Integrate the model with the inputs of an optimum, and look at all limits and conditions."""
     problem = optimum.built.problem
     phases = {name: replay(optimum.built, t) for name, t in optimum.phases.items()}
@@ -166,7 +166,7 @@ def _violations(problem: ControlProblem, played: Replayed) -> list[Violation]:
     return found
 
 
-def _at_points(optimum: Outcome, phases: list[Replayed]) -> tuple[float, list[Defect], float]:
+def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, list[Defect], float]:
     """Objective as played, defects of the conditions, and the error of the objective that follows from both."""
     problem, program, solution = optimum.built.problem, optimum.program, optimum.solution
     symbols, values = [problem.numbers], [ca.DM(phases[0].trajectory.numbers)]

@@ -17,7 +17,7 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outcome(Answer):
+class ProgramAnswer(Answer):
     """A solved program, or one that was not solved, as an answer; build_time in s.
 
     refinement: how it was refined, if it was; search: the branches found from several first guesses, if there were.
@@ -34,7 +34,7 @@ class Outcome(Answer):
     @property
     def dae(self) -> Dae:
         """The translated model."""
-        return self.built.system.dae
+        return self.built.read.dae
 
     @property
     def objective(self) -> float:
