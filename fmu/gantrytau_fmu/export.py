@@ -4,6 +4,7 @@ import hashlib
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import astuple, replace
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
@@ -17,9 +18,10 @@ from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
 from gantrytau_fmu.code.model_code import ModelCode, model_code
 from gantrytau_fmu.describing.documentation import documentation, licenses
+from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.describing.xml_description import build_description, model_description
-from gantrytau_fmu.description import Experiment, Interface, Interfaces
+from gantrytau_fmu.describing.xml_description import COMPILED, build_description, model_description
+from gantrytau_fmu.description import AboutFmu, Experiment, FmuDescription, FmuInterface, Interfaces
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
@@ -65,40 +67,23 @@ def export_fmu(
     complete. Raises ModelError for wrong arguments, unwritable paths and failed compilations, and what `translate`
     raises. FMI 2.0.4 and 3.0.2.
     """
-    wanted_interfaces = _interfaces(interfaces)
+    kinds = _interfaces(interfaces)
     _check(fmi, solver, tolerance)
     targets = chosen(platforms)
     check_target(path)
     dae = _translated(model, given, find, states)
     contents = contents_of(dae, *_shown(dae, find))
-    name = dae.name
-    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    words = description or _first_words(model) or f"{dae.name}, a model of gantrytau"
+    about = AboutFmu(words, author, copyright, license, version)
     token = _token(contents, fmi, solver, tolerance)
-    code = _code(contents, name, token, wanted_interfaces, tolerance)
-    interface = Interface(
-        name=name,
-        identifier=identifier,
-        token=token,
-        variables=contents.variables,
-        outputs=contents.outputs,
-        derivatives=contents.derivatives,
-        initial_unknowns=contents.initial_unknowns,
-        indicators=contents.indicators,
-        interfaces=wanted_interfaces,
-        experiment=experiment or Experiment(tolerance=tolerance),
-        description=description or _first_words(model) or contents.description,
-        author=author,
-        copyright=copyright,
-        license=license,
-        version=version,
-        generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        terminals=contents.terminals,
-        solver=solver,
-        watches=bool(contents.formulas.roots or contents.formulas.blocks),
-    )
+    fmu = _described(contents, about, token, kinds, experiment or Experiment(tolerance=tolerance))
+    code = _code(contents, fmu, tolerance)
     texts = source_files(code.text, solver)
-    binaries = _compiled(texts, targets, identifier, code.operations)
-    return write_fmu(path, _members(interface, fmi, texts, binaries, sources or not binaries))
+    binaries = _compiled(texts, targets, fmu.identifier, code.operations)
+    fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
+    if sources or not binaries:
+        fmu = replace(fmu, sources=(f"sources/{COMPILED}",))
+    return write_fmu(path, _members(fmu, solver, texts, binaries))
 
 
 def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfaces, ...]:
@@ -181,24 +166,42 @@ def _found(dae: Dae, name: str) -> str:
 
 def _token(contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
     """The same for the same model: a hash of its formulas and variables, in the form of a UUID."""
-    text = (
-        f"{contents.variables}{fmi}{solver}{tolerance}{contents.formulas.rates}{contents.formulas.residuals}"
-    )
-    digits = hashlib.sha256(text.encode()).hexdigest()
+    variables = [astuple(variable) for variable in contents.variables]
+    formulas = f"{contents.formulas.rates}{contents.formulas.residuals}"
+    digits = hashlib.sha256(f"{variables}{fmi}{solver}{tolerance}{formulas}".encode()).hexdigest()
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 
 
-def _code(
-    contents: Contents, name: str, token: str, interfaces: Sequence[Interfaces], tolerance: float
-) -> ModelCode:
-    return model_code(
-        contents.formulas,
+def _described(
+    contents: Contents, about: AboutFmu, token: str, kinds: Sequence[str], experiment: Experiment
+) -> FmuDescription:
+    """The record of the FMU, in the words of FMI 3, before its binaries are there."""
+    name, formulas = contents.formulas.dae.name, contents.formulas
+    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    # singular poses are looked for at the end of each step, also of an importer's integrator
+    watches = {"model-exchange": {"needsCompletedIntegratorStep": bool(formulas.roots or formulas.blocks)}}
+    return FmuDescription(
+        **vars(about),
         name=name,
         token=token,
+        interfaces=tuple(FmuInterface(kind, identifier, watches.get(kind, {})) for kind in kinds),
+        variables=contents.variables,
+        structure=contents.structure,
+        experiment=experiment,
+        terminals=contents.terminals,
+        generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+    )
+
+
+def _code(contents: Contents, fmu: FmuDescription, tolerance: float) -> ModelCode:
+    return model_code(
+        contents.formulas,
+        name=fmu.name,
+        token=fmu.token,
         variables=contents.entries,
         constants=contents.constants,
         nominals=contents.nominals,
-        interfaces=interfaces,
+        interfaces=[each.kind for each in fmu.interfaces],
         tolerance=tolerance,
         outputs=contents.wanted,
         graph=contents.graph,
@@ -229,23 +232,19 @@ def _compiled(
 
 
 def _members(
-    interface: Interface,
-    fmi: Literal["3.0", "2.0"],
-    texts: dict[str, str],
-    binaries: dict[Platform, bytes],
-    sources: bool,
+    fmu: FmuDescription, solver: str, texts: dict[str, str], binaries: dict[Platform, bytes]
 ) -> dict[str, bytes]:
     """The files in the archive by their names there."""
-    names = sorted(texts) if sources else []
-    members = {"modelDescription.xml": model_description(interface, fmi, names)}
-    members |= binary_members(binaries, fmi, interface.identifier)
+    names = sorted(texts) if fmu.sources else []
+    members = {"modelDescription.xml": model_description(fmu)}
+    members |= binary_members(binaries, fmu.fmi, fmu.identifier)
     members |= {f"sources/{n}": texts[n].encode() for n in names}
-    members |= licenses(interface)
-    members["documentation/index.html"] = documentation(interface, fmi)
-    if fmi == "2.0":
+    members |= licenses(fmu)
+    members["documentation/index.html"] = documentation(fmu, solver)
+    if fmu.fmi == "2.0":
         return {**members, "model.png": icon()}
     if names:
-        members["sources/buildDescription.xml"] = build_description(interface, fmi, names)
+        members["sources/buildDescription.xml"] = build_description(fmu, names)
     folder = "terminalsAndIcons/"
-    members |= {f"{folder}terminalsAndIcons.xml": terminals_and_icons(interface), f"{folder}icon.png": icon()}
+    members |= {f"{folder}terminalsAndIcons.xml": terminals_and_icons(fmu), f"{folder}icon.png": icon()}
     return {**members, f"{folder}icon.svg": icon_svg()}

@@ -6,7 +6,6 @@ import struct
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
 
 from gantrytau.errors import ModelError
 from gantrytau.whole_files import replacing
@@ -15,15 +14,13 @@ from gantrytau_fmu.building.platforms import PLATFORMS, Platform
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows; the same content gives the same bytes
 
 
-def binary_path(platform: Platform, fmi: Literal["2.0", "3.0"], identifier: str) -> str:
+def binary_path(platform: Platform, fmi: str, identifier: str) -> str:
     """Where the library of a platform stands in an FMU."""
     folder = platform.folder_2 if fmi == "2.0" else platform.folder_3
     return f"binaries/{folder}/{identifier}{platform.suffix}"
 
 
-def binary_members(
-    libraries: Mapping[Platform, bytes], fmi: Literal["2.0", "3.0"], identifier: str
-) -> dict[str, bytes]:
+def binary_members(libraries: Mapping[Platform, bytes], fmi: str, identifier: str) -> dict[str, bytes]:
     """The members that hold the libraries.
 
     For arm64 the standard of FMI 2 says e.g. `aarch64-darwin`, but FMPy and OpenModelica look into `darwin64`

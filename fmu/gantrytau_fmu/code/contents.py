@@ -14,24 +14,20 @@ from gantrytau_fmu.code.arrays import column, numbers_of
 from gantrytau_fmu.code.expressions import Graph
 from gantrytau_fmu.code.formulas import Formulas, formulas_of
 from gantrytau_fmu.code.model_code import Entry, output_places
-from gantrytau_fmu.description import Unknown, Variable
+from gantrytau_fmu.description import FmuTerminal, FmuVariable, ModelStructure, Unknown
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """Variables and model structure of an FMU (see Interface), and the tables of the runtime, in the same order."""
+    """Variables and model structure of an FMU (see FmuDescription), and the tables of the runtime, in the same order."""
 
     formulas: Formulas
-    variables: tuple[Variable, ...]
+    variables: tuple[FmuVariable, ...]
     entries: tuple[Entry, ...]
     constants: tuple[float, ...]
     nominals: tuple[float, ...]
-    outputs: tuple[Unknown, ...]
-    derivatives: tuple[Unknown, ...]
-    initial_unknowns: tuple[Unknown, ...]
-    indicators: tuple[int, ...]
-    terminals: dict[str, dict[str, int]]
-    description: str
+    structure: ModelStructure
+    terminals: tuple[FmuTerminal, ...]
     wanted: tuple[ca.SX, ...]
     graph: Graph
 
@@ -48,7 +44,7 @@ class _Builder:
     formulas: Formulas
     places: dict[str, int]
     outputs: frozenset[str]
-    variables: list[Variable] = field(default_factory=list)
+    variables: list[FmuVariable] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     constants: list[float] = field(default_factory=list)
     places_of: dict[str, int] = field(default_factory=dict)
@@ -88,7 +84,7 @@ class _Builder:
             width += 1
             found = f"der({base},{order:0{width}})" if order else found + "_"
         self.taken.add(found)
-        self.variables.append(Variable(name=found, reference=reference, **more))
+        self.variables.append(FmuVariable(name=found, reference=reference, **more))
         self.entries.append(Entry(kind, index, fixed, found))
         self.places_of.setdefault(name, reference)
         return reference
@@ -138,17 +134,14 @@ def contents_of(dae: Dae, outputs: Sequence[str], others: Sequence[str] = ()) ->
     _states(builder)
     _outputs(builder, [*outputs, *others])
     indicators = _frictions(builder)
-    structure = _structure(builder, Dependencies(formulas, wanted), outputs)
     return Contents(
         formulas=formulas,
         variables=tuple(builder.variables),
         entries=tuple(builder.entries),
         constants=tuple(builder.constants),
         nominals=tuple(_nominal(builder, n) for n in formulas.states),
-        **structure,
-        indicators=indicators,
+        structure=_structure(builder, Dependencies(formulas, wanted), outputs, indicators),
         terminals=_terminals(builder),
-        description=f"{dae.name}, a model of gantrytau",
         wanted=tuple(wanted),
         graph=graph,
     )
@@ -208,6 +201,7 @@ def _inputs(builder: _Builder) -> None:
             limited=True,
             causality="input",
             variability="continuous",
+            initial="exact",
             start=float(start[place]),
         )
 
@@ -243,7 +237,7 @@ def _states(builder: _Builder) -> None:
                 causality=builder.causality(rate) if own else "local",
                 variability="continuous",
                 initial="calculated",
-                derivative=references[place],
+                derivative=builder.variables[references[place]].name,
             )
         )
 
@@ -271,34 +265,33 @@ def _outputs(builder: _Builder, names: Sequence[str]) -> None:
         builder.places_of[name] = len(builder.variables) - 1
 
 
-def _frictions(builder: _Builder) -> tuple[int, ...]:
-    """Mode and event indicator of each friction with exact stick-slip; references of the indicators."""
+def _frictions(builder: _Builder) -> tuple[str, ...]:
+    """Mode and event indicator of each friction with exact stick-slip; names of the indicators."""
     indicators = []
     for place, name in enumerate(builder.formulas.frictions):
         owner = name.rpartition(".")[0]
         prefix = f"{owner}." if owner else ""
         words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
         more: dict[str, Any] = dict(
-            causality="local", variability="discrete", initial="calculated", type="integer"
+            causality="local", variability="discrete", initial="calculated", type="Int32"
         )
         builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
         more = dict(causality="local", variability="continuous", initial="calculated")
-        indicators.append(
-            builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
-        )
+        reference = builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        indicators.append(builder.variables[reference].name)
     return tuple(indicators)
 
 
-def _terminals(builder: _Builder) -> dict[str, dict[str, int]]:
+def _terminals(builder: _Builder) -> tuple[FmuTerminal, ...]:
     """Components that have inputs, each with its own inputs and outputs by their names there."""
-    found: dict[str, dict[str, int]] = {}
+    found: dict[str, dict[str, str]] = {}
     owners = {n.rpartition(".")[0] for n in builder.formulas.inputs if not n.startswith("der(")}
     for variable in builder.variables:
         owner, _, member = variable.name.rpartition(".")
         if owner in owners and owner and variable.causality in ("input", "output"):
-            found.setdefault(owner, {})[member] = variable.reference
-    return found
+            found.setdefault(owner, {})[member] = variable.name
+    return tuple(FmuTerminal(owner, members) for owner, members in found.items())
 
 
 class Dependencies:
@@ -357,22 +350,22 @@ def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
 
 
 def _structure(
-    builder: _Builder, depends: Dependencies, outputs: Sequence[str]
-) -> dict[str, tuple[Unknown, ...]]:
+    builder: _Builder, depends: Dependencies, outputs: Sequence[str], indicators: tuple[str, ...]
+) -> ModelStructure:
     """Outputs, derivatives and initial unknowns, each with what it depends on."""
-    formulas, found = builder.formulas, builder.places_of
+    formulas, found, variables = builder.formulas, builder.places_of, builder.variables
     count = 1 + len(formulas.states) + len(formulas.inputs)
     names = ("time", *formulas.states, *formulas.inputs, *formulas.parameters)
     references = np.array([found[n] for n in names], dtype=int)
     solved = {formulas.states[k] for k in formulas.starts.solved}
     first = np.array([n not in solved for n in names], dtype=bool)
-    shown = [n for n in outputs if builder.variables[found[n]].causality == "output"]
+    shown = [n for n in outputs if variables[found[n]].causality == "output"]
     rows = {found[n]: _row(builder, depends, n) for n in shown}
     rates = dict(zip(builder.rates, depends.rates, strict=True))
 
     def unknown(reference: int, chosen: np.ndarray) -> Unknown:
-        known = tuple(sorted(references[np.flatnonzero(chosen)].tolist()))
-        return Unknown(reference, known, ("dependent",) * len(known))
+        known = sorted(references[np.flatnonzero(chosen)].tolist())
+        return Unknown(variables[reference].name, tuple(variables[k].name for k in known))
 
     def limited(row: np.ndarray) -> np.ndarray:
         return row & (np.arange(row.size) < count)
@@ -382,9 +375,10 @@ def _structure(
         r: (row | first) if (row & ~first).any() else row & first for r, row in {**rows, **rates}.items()
     }
     at_start |= {found[n]: first for n in solved}
-    calculated = [r for r in at_start if builder.variables[r].initial == "calculated"]
-    return dict(
+    calculated = [r for r in at_start if variables[r].initial == "calculated"]
+    return ModelStructure(
         outputs=tuple(unknown(r, limited(row)) for r, row in rows.items()),
         derivatives=tuple(unknown(r, limited(row)) for r, row in rates.items()),
         initial_unknowns=tuple(unknown(r, at_start[r] & first) for r in sorted(calculated)),
+        indicators=indicators,
     )

@@ -12,7 +12,7 @@ from itertools import groupby
 from gantrytau_fmu.describing.interface_checks import initial_of, limit
 from gantrytau_fmu.describing.license import BSD_3_CLAUSE
 from gantrytau_fmu.describing.xml_text import plain
-from gantrytau_fmu.description import Interface, Variable
+from gantrytau_fmu.description import FmuDescription, FmuVariable
 
 MANY = 300  # outputs; more of them are grouped by component and folded
 STYLE = """:root{color-scheme:light dark}
@@ -30,36 +30,37 @@ FIXED = "set before the start"  # of parameters that are fixed afterwards
 KINDS = {"model-exchange": "Model Exchange", "co-simulation": "Co-Simulation"}
 
 
-def documentation(interface: Interface, fmi: str) -> bytes:
-    """documentation/index.html: what the model is, what it needs, its variables, how to use it; no scripts."""
-    name = _text(interface.name)
+def documentation(fmu: FmuDescription, solver: str = "dopri5") -> bytes:
+    """documentation/index.html: what the model is, what it needs, its variables, how to use it; no scripts.
+
+    solver: of Co-Simulation, as `export_fmu` calls it.
+    """
+    name = _text(fmu.name)
     parts = [
         f"<h1>{name}</h1>",
-        f"<p>{_text(interface.description)}</p>" if interface.description else "",
-        _facts(interface, fmi),
+        f"<p>{_text(fmu.description)}</p>" if fmu.description else "",
+        _facts(fmu),
         _needs(),
-        _variables(interface),
-        _solution(interface),
-        _use(interface, fmi),
-        _license(interface),
+        _variables(fmu),
+        _solution(fmu, solver),
+        _use(fmu),
+        _license(fmu),
     ]
     head = f'<meta charset="utf-8"><title>{name}</title><style>{STYLE}</style>'
     text = f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(filter(None, parts))
     return (text + "\n</body></html>\n").encode()
 
 
-def licenses(interface: Interface) -> dict[str, bytes]:
+def licenses(fmu: FmuDescription) -> dict[str, bytes]:
     """Licence texts by their path in the archive, the same in FMI 2 and 3.
 
     The entry, license.txt, tells the licence of the model, which is its author's, from that of the runtime.
     """
-    model = interface.license or "none was stated; ask the author of the model"
-    owner = [
-        line for line in (interface.author and f"Author: {interface.author}", interface.copyright) if line
-    ]
+    model = fmu.license or "none was stated; ask the author of the model"
+    owner = [line for line in (fmu.author and f"Author: {fmu.author}", fmu.copyright) if line]
     text = "\n".join(
         [
-            f"Licences of the FMU {plain(interface.name)}",
+            f"Licences of the FMU {plain(fmu.name)}",
             "",
             "1. The model",
             *owner,
@@ -81,15 +82,15 @@ def _text(text: str) -> str:
     return escape(plain(text), quote=False)
 
 
-def _facts(interface: Interface, fmi: str) -> str:
-    kinds = " and ".join(KINDS[kind] for kind in interface.interfaces)
+def _facts(fmu: FmuDescription) -> str:
+    kinds = " and ".join(KINDS[each.kind] for each in fmu.interfaces)
     rows = {
-        "FMI": f"{fmi}, {kinds}",
-        "Version": interface.version,
-        "Author": interface.author,
-        "Copyright": interface.copyright,
-        "Made with": ", ".join(filter(None, (_tool(interface.tool), interface.generated))),
-        "Token": interface.token,
+        "FMI": f"{fmu.fmi}, {kinds}",
+        "Version": fmu.version,
+        "Author": fmu.author,
+        "Copyright": fmu.copyright,
+        "Made with": ", ".join(filter(None, (_tool(fmu.tool), fmu.generated))),
+        "Token": fmu.token,
     }
     return _table((), ((_text(name), _text(value)) for name, value in rows.items() if value))
 
@@ -110,13 +111,8 @@ def _needs() -> str:
     )
 
 
-def _variables(interface: Interface) -> str:
-    variables = interface.variables
-    states = [
-        variables[place]
-        for u in interface.derivatives
-        if (place := variables[u.reference].derivative) is not None
-    ]
+def _variables(fmu: FmuDescription) -> str:
+    variables, states = fmu.variables, [fmu.by_name[name] for name in fmu.states]
     outputs = [v for v in variables if v.causality == "output"]
     hidden = sum(v.causality == "local" for v in variables) - sum(v.causality == "local" for v in states)
     parts = [
@@ -131,15 +127,15 @@ def _variables(interface: Interface) -> str:
     return "\n".join(filter(None, parts))
 
 
-def _section(title: str, variables: list[Variable]) -> str:
+def _section(title: str, variables: list[FmuVariable]) -> str:
     if not variables:
         return ""
     return f"<h2>{title} ({len(variables)})</h2>\n" + _variable_table((v.name, v) for v in variables)
 
 
-def _grouped(title: str, variables: list[Variable]) -> str:
+def _grouped(title: str, variables: list[FmuVariable]) -> str:
     """Outputs by component, elements of a vector on one row, folded."""
-    groups: dict[str, list[Variable]] = {}
+    groups: dict[str, list[FmuVariable]] = {}
     for variable in variables:
         groups.setdefault(_component(variable.name), []).append(variable)
     parts = [f"<h2>{title} ({len(variables)}), by component</h2>"]
@@ -155,7 +151,7 @@ def _component(name: str) -> str:
     return inner.split(".")[0] if "." in inner and "'" not in inner else "the model itself"
 
 
-def _folded(variables: list[Variable]) -> Iterable[tuple[str, Variable]]:
+def _folded(variables: list[FmuVariable]) -> Iterable[tuple[str, FmuVariable]]:
     """Neighbours that differ by their last index only, as one row: "tool.r[0] ... [2]"."""
     for _, group in groupby(
         variables, lambda v: (_base(v.name), v.unit, v.description, v.type, v.variability)
@@ -173,25 +169,25 @@ def _base(name: str) -> str:
     return name[:place] if place > 0 and name.rstrip(")").endswith("]") else name
 
 
-def _variable_table(rows: Iterable[tuple[str, Variable]]) -> str:
+def _variable_table(rows: Iterable[tuple[str, FmuVariable]]) -> str:
     head = ("Name", "Unit", "Start", "Limits", "Description")
     return _table(head, ((_text(name), _text(v.unit), _start(v), _limits(v), _note(v)) for name, v in rows))
 
 
-def _start(variable: Variable) -> str:
+def _start(variable: FmuVariable) -> str:
     if variable.start is None or initial_of(variable) == "calculated":
         return ""
     return f"{variable.start:.9g}" + (" (guess)" if initial_of(variable) == "approx" else "")
 
 
-def _limits(variable: Variable) -> str:
+def _limits(variable: FmuVariable) -> str:
     low, high = limit(variable.min), limit(variable.max)
     if low is None:
         return "" if high is None else f"&le; {high:.9g}"
     return f"&ge; {low:.9g}" if high is None else f"{low:.9g} to {high:.9g}"
 
 
-def _note(variable: Variable) -> str:
+def _note(variable: FmuVariable) -> str:
     fixed = FIXED if (variable.causality, variable.variability) == ("parameter", "fixed") else ""
     return "; ".join(filter(None, (_text(variable.description), fixed)))
 
@@ -202,27 +198,26 @@ def _table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> str:
     return "<table>\n" + (f"<tr>{top}\n" if top else "") + body + "\n</table>"
 
 
-def _solution(interface: Interface) -> str:
-    told = interface.experiment
-    solver = _text(SOLVERS.get(interface.solver, interface.solver))
-    count = len(interface.derivatives)
-    parts = [f"States: {count}; event indicators: {len(interface.indicators)}."]
-    if "co-simulation" in interface.interfaces and count:
+def _solution(fmu: FmuDescription, solver: str) -> str:
+    told = fmu.experiment
+    count = len(fmu.states)
+    parts = [f"States: {count}; event indicators: {fmu.indicators}."]
+    if fmu.has("co-simulation") and count:
         parts.append(
-            f"Co-Simulation integrates with {solver}; relative tolerance {told.tolerance:g} unless the importer sets "
-            "another. Inputs are held during a step."
+            f"Co-Simulation integrates with {SOLVERS[solver]}; relative tolerance {told.tolerance:g} unless the "
+            "importer sets another. Inputs are held during a step."
         )
     parts.append("Directional derivatives are exact; states can be saved, restored and serialised.")
     return "<h2>Solution</h2>\n<p>" + " ".join(parts) + "</p>"
 
 
-def _use(interface: Interface, fmi: str) -> str:
-    told, file = interface.experiment, f"{interface.identifier}.fmu"
-    adjustable = any(v.causality == "parameter" and v.variability == "tunable" for v in interface.variables)
+def _use(fmu: FmuDescription) -> str:
+    told, file = fmu.experiment, f"{fmu.identifier}.fmu"
+    adjustable = any(v.causality == "parameter" and v.variability == "tunable" for v in fmu.variables)
     listed = [
-        f"Import <code>{file}</code> in a tool that reads FMI {fmi}, such as Simulink, Dymola, OpenModelica or FMPy.",
+        f"Import <code>{file}</code> in a tool that reads FMI {fmu.fmi}, such as Simulink, Dymola, OpenModelica or FMPy.",
         f"Default experiment: {told.start:g} s to {told.stop:g} s"
-        + (f", step {told.step:g} s." if "co-simulation" in interface.interfaces else "."),
+        + (f", step {told.step:g} s." if fmu.has("co-simulation") else "."),
         "Parameters are set before initialisation"
         + (
             f"; all but those that are marked &ldquo;{FIXED}&rdquo; may be changed at any time later, too."
@@ -233,26 +228,24 @@ def _use(interface: Interface, fmi: str) -> str:
         "<code>logStatusWarning</code>; <code>logEvents</code> and <code>logCalls</code> tell more.",
     ]
     items = "".join(f"<li>{item}\n" for item in listed)
-    return f"<h2>How to use it</h2>\n<ul>\n{items}</ul>\n<pre>{escape(_script(interface), quote=False)}</pre>"
+    return f"<h2>How to use it</h2>\n<ul>\n{items}</ul>\n<pre>{escape(_script(fmu), quote=False)}</pre>"
 
 
-def _script(interface: Interface) -> str:
+def _script(fmu: FmuDescription) -> str:
     """A run in FMPy, with the first parameter set and the first input given, which is held over the run."""
-    told = interface.experiment
-    known = next((v for v in interface.variables if v.causality == "input" and v.type == "real"), None)
-    chosen = next(
-        (v for v in interface.variables if v.causality == "parameter" and v.start is not None), None
-    )
+    told = fmu.experiment
+    known = next((v for v in fmu.variables if v.causality == "input" and v.real), None)
+    chosen = next((v for v in fmu.variables if v.causality == "parameter" and v.start is not None), None)
     lines = ["from fmpy import simulate_fmu"]
-    arguments = [f"{f'{interface.identifier}.fmu'!r}", f"stop_time={told.stop:g}"]
+    arguments = [f"{f'{fmu.identifier}.fmu'!r}", f"stop_time={told.stop:g}"]
     if told.start:
         arguments.insert(1, f"start_time={told.start:g}")
-    if "co-simulation" in interface.interfaces:
+    if fmu.has("co-simulation"):
         arguments.append(f"output_interval={told.step:g}")
     if chosen:
         arguments.append(f"start_values={{{chosen.name!r}: {chosen.start!r}}}")
     if known:
-        value = float(known.start or 0)
+        value = limit(known.start) or 0.0
         lines += [
             "import numpy as np",
             f"given = np.array([({told.start:g}, {value!r}), ({told.stop:g}, {value!r})],  # times in s and values",
@@ -263,7 +256,7 @@ def _script(interface: Interface) -> str:
     return "\n".join([*lines, f"result = simulate_fmu({call})"])
 
 
-def _license(interface: Interface) -> str:
-    model = _text(interface.license) or "none stated"
+def _license(fmu: FmuDescription) -> str:
+    model = _text(fmu.license) or "none stated"
     link = '<a href="licenses/license.txt">licenses/license.txt</a>'
     return f"<h2>Licence</h2>\n<p>Model: {model}. Runtime: BSD-3-Clause. See {link}.</p>"

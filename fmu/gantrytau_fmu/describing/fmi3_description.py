@@ -3,39 +3,35 @@
 FMI 3.0.2, sections 2.4, 3.3 and 4.3.
 """
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Mapping
 
-from gantrytau_fmu.describing.interface_checks import initial_of, limit
-from gantrytau_fmu.describing.structure import Row, Structure
 from gantrytau_fmu.describing.unit_definitions import DeclaredType
+from gantrytau_fmu.describing.variable_attributes import named, numbers
 from gantrytau_fmu.describing.xml_text import Attribute, element
-from gantrytau_fmu.description import Interface, Variable
+from gantrytau_fmu.description import FmuDescription, FmuVariable, ModelStructure, Unknown
+
+COMMON: dict[str, Attribute] = {
+    "needsExecutionTool": False,
+    "canBeInstantiatedOnlyOncePerProcess": False,
+    "canGetAndSetFMUState": True,
+    "canSerializeFMUState": True,
+    "providesDirectionalDerivatives": True,
+    "providesAdjointDerivatives": True,
+}
+CAPABILITIES: dict[str, dict[str, Attribute]] = {
+    "model-exchange": {**COMMON, "needsCompletedIntegratorStep": False},
+    "co-simulation": {**COMMON, "canHandleVariableCommunicationStepSize": True, "hasEventMode": False},
+}
 
 
-def root_attributes(interface: Interface) -> dict[str, Attribute]:
+def root_attributes(fmu: FmuDescription) -> dict[str, Attribute]:
     """The attributes of the root that only FMI 3 has."""
-    return {"instantiationToken": interface.token}
+    return {"instantiationToken": fmu.token}
 
 
-def interface_types(interface: Interface, compiled: Sequence[str]) -> str:
-    """`ModelExchange` and `CoSimulation`; the source files stand in sources/buildDescription.xml."""
-    common: dict[str, Attribute] = {
-        "modelIdentifier": interface.identifier,
-        "needsExecutionTool": False,
-        "canBeInstantiatedOnlyOncePerProcess": False,
-        "canGetAndSetFMUState": True,
-        "canSerializeFMUState": True,
-        "providesDirectionalDerivatives": True,
-        "providesAdjointDerivatives": True,
-    }
-    simulation = {**common, "canHandleVariableCommunicationStepSize": True, "hasEventMode": False}
-    text = ""
-    if "model-exchange" in interface.interfaces:
-        text += element("ModelExchange", {**common, "needsCompletedIntegratorStep": interface.watches})
-    if "co-simulation" in interface.interfaces:
-        text += element("CoSimulation", simulation)
-    return text
+def sources_of(fmu: FmuDescription) -> str:
+    """Nothing: the source files stand in sources/buildDescription.xml."""
+    return ""
 
 
 def type_definition(declared: DeclaredType) -> str:
@@ -51,53 +47,43 @@ def type_definition(declared: DeclaredType) -> str:
     )
 
 
-def variable(told: Variable, declared: DeclaredType | None, reinit: bool) -> str:
-    """`Float64` or `Int32`; reinit: a state that events may set."""
-    initial = initial_of(told)
-    start = told.start if initial in ("exact", "approx") else None
+def variable(told: FmuVariable, declared: DeclaredType | None, state: int | None, reinit: bool) -> str:
+    """`Float64` or `Int32`; state: reference, if this is a derivative; reinit: whether events may set it."""
+    if told.integer:
+        return element("Int32", named(told) | numbers(told))
     attributes: dict[str, Attribute] = {
-        "name": told.name,
-        "valueReference": told.reference,
-        "description": told.description or None,
-        "causality": told.causality,
-        "variability": told.variability,
-        "initial": None if told.causality in ("input", "independent") else initial,
+        **named(told),
+        "declaredType": declared and declared.name,
+        "unit": declared and declared.unit,
+        **numbers(told),
+        "derivative": state,
+        "reinit": reinit or None,
     }
-    if told.type == "integer":
-        for name, value in (("min", limit(told.min)), ("max", limit(told.max)), ("start", start)):
-            attributes[name] = None if value is None else int(value)
-        return element("Int32", attributes)
-    attributes["declaredType"] = declared and declared.name
-    attributes["unit"] = declared and declared.unit
-    for name, value in (("min", told.min), ("max", told.max), ("nominal", told.nominal), ("start", start)):
-        value = limit(value)
-        attributes[name] = None if value is None else float(value)
-    attributes["derivative"] = told.derivative
-    attributes["reinit"] = reinit or None
     return element("Float64", attributes)
 
 
-def model_structure(interface: Interface, lists: Structure) -> str:
+def model_structure(lists: ModelStructure, references: Mapping[str | None, int]) -> str:
     """`ModelStructure`; it is there even when it is empty."""
     inside = "".join(
-        _unknown(name, row)
-        for name, rows in (
+        _unknown(name, unknown, references)
+        for name, unknowns in (
             ("Output", lists.outputs),
             ("ContinuousStateDerivative", lists.derivatives),
             ("InitialUnknown", lists.initial_unknowns),
-            ("EventIndicator", [Row(place) for place in interface.indicators]),
         )
-        for row in rows
+        for unknown in unknowns
     )
+    inside += "".join(element("EventIndicator", {"valueReference": references[n]}) for n in lists.indicators)
     return element("ModelStructure", {}, inside and "\n" + inside)
 
 
-def _unknown(name: str, row: Row) -> str:
-    places = None if row.dependencies is None else _listed(row.dependencies)
-    kinds = None if row.kinds is None else " ".join(row.kinds)
-    return element(name, {"valueReference": row.reference, "dependencies": places, "dependenciesKind": kinds})
-
-
-@lru_cache(maxsize=16)  # the same long list stands at every unknown that may depend on all
-def _listed(places: tuple[int, ...]) -> str:
-    return " ".join(map(str, places))
+def _unknown(name: str, unknown: Unknown, references: Mapping[str | None, int]) -> str:
+    known = unknown.dependencies
+    places = None if known is None else " ".join([str(references[name]) for name in known])
+    kinds = None if unknown.kinds is None else " ".join(unknown.kinds)
+    attributes = {
+        "valueReference": references[unknown.name],
+        "dependencies": places,
+        "dependenciesKind": kinds,
+    }
+    return element(name, attributes)

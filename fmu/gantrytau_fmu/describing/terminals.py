@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from gantrytau_fmu.describing.xml_text import HEAD, element, parent
-from gantrytau_fmu.description import Interface
+from gantrytau_fmu.description import FmuDescription, FmuTerminal
 
 SIZE = 64  # pixels of the icon, each way
 RAIL, LINK, CART, PLATE = (110, 118, 129), (31, 78, 121), (60, 60, 60), (217, 119, 6)
@@ -29,7 +29,7 @@ STROKES = (
 CONNECTABLE = ("input", "output", "parameter")  # what may be a member of a terminal
 
 
-def terminals_and_icons(interface: Interface) -> bytes:
+def terminals_and_icons(fmu: FmuDescription) -> bytes:
     """terminalsAndIcons/terminalsAndIcons.xml of FMI 3.0: where the icon stands, and the terminals.
 
     Members are inputs, outputs and parameters; others of a component are left out, and terminals without members.
@@ -40,21 +40,22 @@ def terminals_and_icons(interface: Interface) -> bytes:
         element("CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": 0.1}),
         element("Icon", corners),
     ]
-    terminals = [_terminal(interface, name) for name in interface.terminals]
+    terminals = [_terminal(fmu, terminal) for terminal in fmu.terminals]
     children = [parent("GraphicalRepresentation", graphics), parent("Terminals", terminals)]
     return (HEAD + parent("fmiTerminalsAndIcons", children, {"fmiVersion": "3.0"})).encode()
 
 
-def _terminal(interface: Interface, name: str) -> str:
+def _terminal(fmu: FmuDescription, terminal: FmuTerminal) -> str:
     members = [
         element(
             "TerminalMemberVariable",
             {"variableName": variable.name, "memberName": member, "variableKind": "signal"},
         )
-        for member, place in interface.terminals[name].items()
-        if (variable := interface.variables[place]).causality in CONNECTABLE
+        for member, name in terminal.members.items()
+        if (variable := fmu.by_name[name]).causality in CONNECTABLE
     ]
-    return parent("Terminal", members, {"name": name, "matchingRule": "bus"})
+    attributes = {"name": terminal.name, "matchingRule": "bus", "terminalKind": terminal.kind or None}
+    return parent("Terminal", members, attributes | {"description": terminal.description or None})
 
 
 @cache

@@ -10,7 +10,7 @@ from math import pi
 from gantrytau.errors import ModelError
 from gantrytau.language.units import BASE, FACTOR, dimension
 from gantrytau_fmu.describing.xml_text import element, parent
-from gantrytau_fmu.description import Variable
+from gantrytau_fmu.description import FmuVariable
 
 # Names as in Modelica.Units.SI, where one unit has one meaning.
 QUANTITIES = {
@@ -94,7 +94,7 @@ def radians(unit: str) -> int:
     return total
 
 
-def declared_types(variables: Sequence[Variable]) -> dict[str, DeclaredType]:
+def declared_types(variables: Sequence[FmuVariable]) -> dict[str, DeclaredType]:
     """The type of each unit of real variables, in the order of their first use; "" and "1" have none.
 
     Names of types differ from each other and from those of all variables, as both standards demand. Raises
@@ -104,7 +104,7 @@ def declared_types(variables: Sequence[Variable]) -> dict[str, DeclaredType]:
     types: dict[str, DeclaredType] = {}
     for variable in variables:
         unit = variable.unit
-        if unit in types or unit in ("", "1") or variable.type != "real":
+        if unit in types or unit in ("", "1") or not variable.real:
             continue
         try:
             dimension(unit)

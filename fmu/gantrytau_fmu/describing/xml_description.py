@@ -1,20 +1,20 @@
 """The XML files of an FMU that say what it is: modelDescription.xml and sources/buildDescription.xml.
 
-One record, `Interface`, is written for FMI 2.0 or 3.0; what differs between them stands in `description_2` and
+One record, `FmuDescription`, is written for FMI 2.0 or 3.0; what differs between them stands in `description_2` and
 `description_3`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
 from pathlib import PurePosixPath
-from typing import Literal
 
 from gantrytau_fmu.describing import fmi2_description as description_2
 from gantrytau_fmu.describing import fmi3_description as description_3
-from gantrytau_fmu.describing.interface_checks import check_interface
-from gantrytau_fmu.describing.structure import structure
+from gantrytau_fmu.describing.interface_checks import check_description
+from gantrytau_fmu.describing.structure import written_structure
 from gantrytau_fmu.describing.unit_definitions import declared_types, unit_definitions
 from gantrytau_fmu.describing.xml_text import HEAD, Attribute, element, parent
-from gantrytau_fmu.description import Interface
+from gantrytau_fmu.description import FmuDescription
 
 COMPILED = "fmu.c"  # the only translation unit; it includes the others
 # the categories of the C runtime (core.h), in its order
@@ -29,54 +29,57 @@ WITHOUT_MATH_LIBRARY = (
     "aarch64-windows",
 )  # there the C runtime holds the functions of math.h
 
-Version = Literal["2.0", "3.0"]
+TAGS = {"model-exchange": "ModelExchange", "co-simulation": "CoSimulation"}
 
 
-def model_description(interface: Interface, fmi: Version, sources: Sequence[str] = ()) -> bytes:
-    """modelDescription.xml, UTF-8.
-
-    sources: names of the files in sources/, if the FMU carries them. Raises ModelError for an interface that no valid
-    FMU can have, such as a name that is there twice.
-    """
-    check_interface(interface, fmi)
-    version = description_2 if fmi == "2.0" else description_3
-    types = declared_types(interface.variables)
-    lists = structure(interface, fmi)
-    reset = set(lists.states) if interface.indicators and "model-exchange" in interface.interfaces else set()
+def model_description(fmu: FmuDescription) -> bytes:
+    """modelDescription.xml, UTF-8. Raises ModelError for what no valid FMU can have, as a name that is there twice."""
+    check_description(fmu)
+    version = description_2 if fmu.fmi == "2.0" else description_3
+    types = declared_types(fmu.variables)
+    lists = written_structure(fmu)
+    reset = set(fmu.states) if fmu.indicators and fmu.has("model-exchange") else set()
+    references: dict[str | None, int] = {v.name: v.reference for v in fmu.variables}
+    variables = [
+        version.variable(
+            v, types.get(v.unit) if v.real else None, references.get(v.derivative), v.name in reset
+        )
+        for v in fmu.variables
+    ]
     children = [
-        version.interface_types(interface, (COMPILED,) if sources else ()),
+        *_interfaces(fmu, version.CAPABILITIES, version.sources_of(fmu)),
         unit_definitions(types.values()),
         parent("TypeDefinitions", map(version.type_definition, types.values())),
         _log_categories(),
-        _default_experiment(interface),
-        parent(
-            "ModelVariables",
-            [
-                version.variable(
-                    told, types.get(told.unit) if told.type == "real" else None, told.reference in reset
-                )
-                for told in interface.variables
-            ],
-        ),
-        version.model_structure(interface, lists),
+        _default_experiment(fmu),
+        parent("ModelVariables", variables),
+        version.model_structure(lists, references),
     ]
-    text = HEAD + parent(
-        "fmiModelDescription", children, _root(interface, fmi) | version.root_attributes(interface)
-    )
+    text = HEAD + parent("fmiModelDescription", children, _root(fmu) | version.root_attributes(fmu))
     return text.encode()
 
 
-def _root(interface: Interface, fmi: Version) -> dict[str, Attribute]:
+def _interfaces(
+    fmu: FmuDescription, capabilities: Mapping[str, Mapping[str, Attribute]], inside: str
+) -> Iterator[str]:
+    """`ModelExchange` and `CoSimulation`: what the runtime can do, unless the description says something else."""
+    for kind, tag in TAGS.items():
+        for each in (each for each in fmu.interfaces if each.kind == kind):
+            told = {name: each.capabilities.get(name, value) for name, value in capabilities[kind].items()}
+            yield element(tag, {"modelIdentifier": each.identifier, **told}, inside and "\n" + inside)
+
+
+def _root(fmu: FmuDescription) -> dict[str, Attribute]:
     return {
-        "fmiVersion": fmi,
-        "modelName": interface.name,
-        "description": interface.description or None,
-        "author": interface.author or None,
-        "version": interface.version or None,
-        "copyright": interface.copyright or None,
-        "license": interface.license or None,
-        "generationTool": interface.tool or None,
-        "generationDateAndTime": interface.generated or None,
+        "fmiVersion": fmu.fmi,
+        "modelName": fmu.name,
+        "description": fmu.description or None,
+        "author": fmu.author or None,
+        "version": fmu.version or None,
+        "copyright": fmu.copyright or None,
+        "license": fmu.license or None,
+        "generationTool": fmu.tool or None,
+        "generationDateAndTime": fmu.generated or None,
         "variableNamingConvention": "structured",
     }
 
@@ -86,28 +89,18 @@ def _log_categories() -> str:
     return parent("LogCategories", [element("Category", attributes) for attributes in named])
 
 
-def _default_experiment(interface: Interface) -> str:
-    told = interface.experiment
-    return element(
-        "DefaultExperiment",
-        {
-            "startTime": float(told.start),
-            "stopTime": float(told.stop),
-            "tolerance": float(told.tolerance),
-            "stepSize": float(told.step),
-        },
-    )
+def _default_experiment(fmu: FmuDescription) -> str:
+    names = ("startTime", "stopTime", "tolerance", "stepSize")
+    return element("DefaultExperiment", dict(zip(names, map(float, astuple(fmu.experiment)), strict=True)))
 
 
-def build_description(
-    interface: Interface, fmi: Version, sources: Sequence[str], language: str = "C99"
-) -> bytes:
+def build_description(fmu: FmuDescription, names: Sequence[str], language: str = "C99") -> bytes:
     """sources/buildDescription.xml of FMI 3.0: what to compile, for importers that build the FMU themselves.
 
-    sources: names of the files in sources/; their folders are told as include directories. The first configuration
+    names: of the files in sources/; their folders are told as include directories. The first configuration
     is for every platform; Windows has no separate mathematics library to link.
     """
-    folders = sorted({PurePosixPath(name).parent.as_posix() for name in (COMPILED, *sources)})
+    folders = sorted({PurePosixPath(name).parent.as_posix() for name in (COMPILED, *names)})
     files = parent(
         "SourceFileSet",
         [
@@ -117,7 +110,7 @@ def build_description(
         {"name": "fmu", "language": language},
     )
     library = element("Library", {"name": "m", "external": True, "description": "mathematics library of C"})
-    identifier = {"modelIdentifier": interface.identifier}
+    identifier = {"modelIdentifier": fmu.identifier}
     configurations = [
         parent("BuildConfiguration", [files, library], identifier),
         *(
@@ -125,4 +118,4 @@ def build_description(
             for platform in WITHOUT_MATH_LIBRARY
         ),
     ]
-    return (HEAD + parent("fmiBuildDescription", configurations, {"fmiVersion": fmi})).encode()
+    return (HEAD + parent("fmiBuildDescription", configurations, {"fmiVersion": fmu.fmi})).encode()

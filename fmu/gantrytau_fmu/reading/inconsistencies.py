@@ -10,13 +10,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 from gantrytau_fmu.building.platforms import ALIASES, native
+from gantrytau_fmu.description import FmuVariable
 from gantrytau_fmu.reading.check_fmu import Finding
-from gantrytau_fmu.reading.described import FmuDescription, FmuVariable
+from gantrytau_fmu.reading.described import FmuFile
 from gantrytau_fmu.reading.libraries import misplaced
-from gantrytau_fmu.reading.read_fmu import FmuFiles
+from gantrytau_fmu.reading.read_fmu import FmuTexts
 
 
-def inconsistencies(fmu: FmuDescription, files: FmuFiles, model: Any) -> Iterator[Finding]:
+def inconsistencies(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[Finding]:
     """What an FMU says and does not keep. model: FMPy's ModelDescription."""
     yield from _header(fmu)
     for variable in fmu.variables:
@@ -28,7 +29,7 @@ def inconsistencies(fmu: FmuDescription, files: FmuFiles, model: Any) -> Iterato
     yield from _binaries(fmu, files)
 
 
-def _header(fmu: FmuDescription) -> Iterator[Finding]:
+def _header(fmu: FmuFile) -> Iterator[Finding]:
     """Names and numbers of the FMU as a whole."""
     if not fmu.token:
         yield Finding(
@@ -84,7 +85,7 @@ def _values(variable: FmuVariable) -> Iterator[Finding]:
         break  # one of an array is enough
 
 
-def _units(fmu: FmuDescription, model: Any) -> Iterator[Finding]:
+def _units(fmu: FmuFile, model: Any) -> Iterator[Finding]:
     """Units that are used and not defined; rates whose unit is not that of their state per second."""
     powers = {unit.name: _powers(unit.baseUnit) for unit in model.unitDefinitions}
     missing: dict[str, str] = {}
@@ -116,7 +117,7 @@ def _powers(base: Any) -> dict[str, int]:
     return {name: getattr(base, name) for name in names} if base is not None else {}
 
 
-def _structure(fmu: FmuDescription, files: FmuFiles, model: Any) -> Iterator[Finding]:
+def _structure(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[Finding]:
     """Whether the model structure lists each output and each rate of a state, and nothing else."""
     own = {variable.name for variable in model.modelVariables if variable.alias is None}
     declared = {variable.name for variable in fmu.variables if variable.causality == "output"} & own
@@ -152,7 +153,7 @@ def _initial_unknowns(model: Any) -> Iterator[Finding]:
             )
 
 
-def _indices(files: FmuFiles, count: int) -> Iterator[Finding]:
+def _indices(files: FmuTexts, count: int) -> Iterator[Finding]:
     """FMI 2 counts variables from 1; Python would take 0 for the last one."""
     for unknown in ElementTree.fromstring(files.description).iterfind("ModelStructure/*/Unknown"):
         said = [unknown.get("index", ""), *unknown.get("dependencies", "").split()]
@@ -160,7 +161,7 @@ def _indices(files: FmuFiles, count: int) -> Iterator[Finding]:
             yield Finding("error", f"ModelStructure: found the index {wrong[0]}, expected 1 to {count}")
 
 
-def _indicators(fmu: FmuDescription, model: Any) -> Iterator[Finding]:
+def _indicators(fmu: FmuFile, model: Any) -> Iterator[Finding]:
     """FMI 3 wants event indicators to be continuous variables that can be read."""
     for unknown in model.eventIndicators:
         variable = fmu.variable(unknown.variable.name)
@@ -176,7 +177,7 @@ def _indicators(fmu: FmuDescription, model: Any) -> Iterator[Finding]:
             )
 
 
-def _members(fmu: FmuDescription) -> Iterator[Finding]:
+def _members(fmu: FmuFile) -> Iterator[Finding]:
     """Terminals that speak of variables that do not exist."""
     names = {variable.name for variable in fmu.variables}
     for terminal in fmu.terminals:
@@ -187,7 +188,7 @@ def _members(fmu: FmuDescription) -> Iterator[Finding]:
                 )
 
 
-def _binaries(fmu: FmuDescription, files: FmuFiles) -> Iterator[Finding]:
+def _binaries(fmu: FmuFile, files: FmuTexts) -> Iterator[Finding]:
     """What can be run where, and sources that are named and missing."""
     for name in fmu.sources:
         if name not in files.names:

@@ -4,7 +4,7 @@ import importlib
 import os
 import re
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -13,31 +13,24 @@ from typing import Any
 from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.reading.described import (
-    FmuDescription,
-    FmuExperiment,
+from gantrytau_fmu.description import (
+    Experiment,
     FmuInterface,
     FmuTerminal,
     FmuVariable,
+    ModelStructure,
+    Unknown,
     Value,
 )
+from gantrytau_fmu.reading.described import FmuFile
 from gantrytau_fmu.reading.libraries import HEAD, platforms_of
 from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive
-
-__all__ = [
-    "FmuDescription",
-    "FmuFiles",
-    "FmuVariable",
-    "model_of",
-    "read_files",
-    "read_fmu",
-    "schema_problems",
-]
 
 BUILD = "sources/buildDescription.xml"
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 _SHOWN = 3  # problems of a model description that a message lists
 _DIRECTIONAL = "providesDirectionalDerivatives"  # of FMI 3
+_UNNEEDED = "completedIntegratorStepNotNeeded"  # of FMI 2
 _KINDS = {
     "modelExchange": "model-exchange",
     "coSimulation": "co-simulation",
@@ -46,7 +39,7 @@ _KINDS = {
 
 
 @dataclass(frozen=True)
-class FmuFiles:
+class FmuTexts:
     """What of an archive describes it: its XML files, checked and of a known version, and the names of all.
 
     libraries: the first bytes of what stands in the folders of binaries, by name.
@@ -73,7 +66,7 @@ class FmuFiles:
         return packed
 
 
-def read_fmu(path: str | os.PathLike[str]) -> FmuDescription:
+def read_fmu(path: str | os.PathLike[str]) -> FmuFile:
     """Describe an FMU of FMI 2.0 or 3.0 without loading its binaries.
 
     Raises ModelError for an archive that is damaged or unsafe (see `safety.open_archive`), for FMI 1.0 and other
@@ -90,7 +83,7 @@ def read_fmu(path: str | os.PathLike[str]) -> FmuDescription:
     return describe(files, model_of(files))
 
 
-def read_files(path: str | os.PathLike[str]) -> FmuFiles:
+def read_files(path: str | os.PathLike[str]) -> FmuTexts:
     """The XML files of an FMU, its version known; ModelError for an unsafe archive or another version."""
     with open_archive(path) as archive:
         description = archive.xml(DESCRIPTION)
@@ -105,7 +98,7 @@ def read_files(path: str | os.PathLike[str]) -> FmuFiles:
         }
     path = Path(path)
     fmi = _version(path, description)
-    return FmuFiles(path, fmi, description, build, terminals, names, libraries, path.stat().st_size, unpacked)
+    return FmuTexts(path, fmi, description, build, terminals, names, libraries, path.stat().st_size, unpacked)
 
 
 def _version(path: Path, description: bytes) -> str:
@@ -122,7 +115,7 @@ def _version(path: Path, description: bytes) -> str:
     raise ModelError(f"{path}: found FMI version '{version}', expected 2.0 or 3.0; {remedy}")
 
 
-def schema_problems(files: FmuFiles) -> list[str]:
+def schema_problems(files: FmuTexts) -> list[str]:
     """Where the XML files break the official schemas, which FMPy brings along; [] if nowhere."""
     major = files.fmi[0]
     schemas = [(DESCRIPTION, files.description, f"fmi{major}/fmi{major}ModelDescription.xsd")]
@@ -148,7 +141,7 @@ def _breaches(name: str, text: bytes, schema: str) -> Iterator[str]:
             yield f"{name}, line {entry.line}: {entry.message}"
 
 
-def model_of(files: FmuFiles) -> Any:
+def model_of(files: FmuTexts) -> Any:
     """FMPy's `ModelDescription` of an FMU that is valid; ModelError if it contradicts itself."""
     from fmpy.model_description import read_model_description
 
@@ -175,7 +168,7 @@ def _consistent(path: Path) -> Iterator[None]:
     )
 
 
-def describe(files: FmuFiles, model: Any) -> FmuDescription:
+def describe(files: FmuTexts, model: Any) -> FmuFile:
     """FMPy's description as a record; model: its ModelDescription."""
     with _consistent(files.path):
         interfaces = tuple(_interfaces(files, model))
@@ -185,7 +178,7 @@ def describe(files: FmuFiles, model: Any) -> FmuDescription:
             for sources in configuration.sourceFileSets
             for name in sources.sourceFiles
         }
-        return FmuDescription(
+        return FmuFile(
             path=files.path,
             fmi=files.fmi,
             name=model.modelName or "",
@@ -194,21 +187,12 @@ def describe(files: FmuFiles, model: Any) -> FmuDescription:
             tool=model.generationTool or "",
             generated=model.generationDateAndTime or "",
             author=model.author or "",
-            version=model.version or "",
+            copyright=model.copyright or "",
             license=model.license or "",
+            version=model.version or "",
             interfaces=interfaces,
             variables=tuple(_variable(variable) for variable in model.modelVariables),
-            outputs=tuple(unknown.variable.name for unknown in model.outputs),
-            states=tuple(
-                unknown.variable.derivative.name
-                for unknown in model.derivatives
-                if unknown.variable.derivative is not None
-            ),
-            dependencies={
-                unknown.variable.name: _names(unknown.dependencies)
-                for unknown in (*model.outputs, *model.derivatives)
-            },
-            indicators=model.numberOfEventIndicators,
+            structure=_structure(files, model),
             platforms=_platforms(files.libraries, {interface.identifier for interface in interfaces}),
             sources=tuple(sorted(sources)),
             experiment=_experiment(model.defaultExperiment),
@@ -218,22 +202,28 @@ def describe(files: FmuFiles, model: Any) -> FmuDescription:
         )
 
 
-def _interfaces(files: FmuFiles, model: Any) -> Iterator[FmuInterface]:
-    """The interfaces; FMPy knows directional derivatives under the name of FMI 2 only, FMI 3 has a plural."""
+def _interfaces(files: FmuTexts, model: Any) -> Iterator[FmuInterface]:
+    """The interfaces, with what FMPy overlooks: directional derivatives have a plural in FMI 3, and the name of FMI 2."""
     root = ElementTree.fromstring(files.description)
     for attribute, kind in _KINDS.items():
         interface = getattr(model, attribute)
-        if interface is not None:
-            capabilities = {
-                field.name: getattr(interface, field.name)
-                for field in type(interface).__attrs_attrs__
-                if field.name != "modelIdentifier"
-            }
-            element = root.find(attribute[0].upper() + attribute[1:])
-            if files.fmi == "3.0" and element is not None:
-                said = element.get(_DIRECTIONAL, "").strip() in ("true", "1")
-                capabilities |= {_DIRECTIONAL: said, _DIRECTIONAL.removesuffix("s"): said}
-            yield FmuInterface(kind, interface.modelIdentifier, capabilities)
+        if interface is None:
+            continue
+        capabilities = {
+            field.name: getattr(interface, field.name)
+            for field in type(interface).__attrs_attrs__
+            if field.name != "modelIdentifier"
+        }
+        element = root.find(attribute[0].upper() + attribute[1:])
+        said = (
+            {} if element is None else {name: text.strip() in ("true", "1") for name, text in element.items()}
+        )
+        if files.fmi == "3.0":
+            one = said.get(_DIRECTIONAL, False)
+            capabilities |= {_DIRECTIONAL: one, _DIRECTIONAL.removesuffix("s"): one}
+        elif kind == "model-exchange":
+            capabilities[_UNNEEDED] = said.get(_UNNEEDED, False)
+        yield FmuInterface(kind, interface.modelIdentifier, capabilities)
 
 
 def _variable(variable: Any) -> FmuVariable:
@@ -281,15 +271,28 @@ def _value(variable: Any) -> Value | None:
     return read(variable.start)
 
 
-def _names(dependencies: Iterable[Any] | None) -> tuple[str, ...] | None:
-    return None if dependencies is None else tuple(variable.name for variable in dependencies)
+def _structure(files: FmuTexts, model: Any) -> ModelStructure:
+    """FMPy's lists by names; event indicators have names in FMI 3 only."""
+    outputs, derivatives, initial = (
+        tuple(map(_unknown, unknowns))
+        for unknowns in (model.outputs, model.derivatives, model.initialUnknowns)
+    )
+    named = tuple(unknown.variable.name for unknown in model.eventIndicators)
+    indicators = named if files.fmi == "3.0" else (None,) * model.numberOfEventIndicators
+    return ModelStructure(outputs, derivatives, initial, indicators)
 
 
-def _experiment(found: Any) -> FmuExperiment:
+def _unknown(unknown: Any) -> Unknown:
+    known, kinds = unknown.dependencies, unknown.dependenciesKind
+    names = None if known is None else tuple(variable.name for variable in known)
+    return Unknown(unknown.variable.name, names, tuple(kinds) if kinds else None)
+
+
+def _experiment(found: Any) -> Experiment:
     if found is None:
-        return FmuExperiment()
+        return Experiment(None, None, None, None)
     said = (found.startTime, found.stopTime, found.tolerance, found.stepSize)
-    return FmuExperiment(*(None if text is None else float(text) for text in said))
+    return Experiment(*(None if text is None else float(text) for text in said))
 
 
 def _platforms(libraries: Mapping[str, bytes], identifiers: set[str]) -> tuple[str, ...]:
@@ -309,12 +312,8 @@ def _terminals(text: bytes | None) -> Iterator[FmuTerminal]:
         return
     for terminal in ElementTree.fromstring(text).iterfind("Terminals/Terminal"):
         said: Mapping[str, str] = terminal.attrib
-        yield FmuTerminal(
-            said.get("name", ""),
-            said.get("terminalKind", ""),
-            said.get("description", ""),
-            dict(_members(terminal)),
-        )
+        kind, description = said.get("terminalKind", ""), said.get("description", "")
+        yield FmuTerminal(said.get("name", ""), dict(_members(terminal)), kind, description)
 
 
 def _members(terminal: ElementTree.Element) -> Iterator[tuple[str, str]]:

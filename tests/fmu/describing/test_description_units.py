@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gantrytau_fmu.describing.unit_definitions import DISPLAYS
-from gantrytau_fmu.description import Variable
-from tests.fmu.interfaces import VERSIONS, interface, read
+from gantrytau_fmu.description import FmuVariable
+from tests.fmu.interfaces import VERSIONS, description, read
 
 # exponents of kg, m, s, rad, taken by hand from the definitions of the units
 EXPONENTS = {
@@ -26,8 +26,8 @@ EXPONENTS = {
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_units_are_defined_by_base_units_and_the_radian(fmi):
-    told = interface(
-        *(Variable(f"p[{k}]", 0, "parameter", "fixed", start=1.0, unit=u) for k, u in enumerate(EXPONENTS))
+    told = description(
+        *(FmuVariable(f"p[{k}]", 0, "parameter", "fixed", start=1.0, unit=u) for k, u in enumerate(EXPONENTS))
     )
     found = {u.name: u.baseUnit for u in read(told, fmi).unitDefinitions}
     assert {name: (b.kg, b.m, b.s, b.rad) for name, b in found.items() if name != "s"} == EXPONENTS
@@ -37,10 +37,10 @@ def test_units_are_defined_by_base_units_and_the_radian(fmi):
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_types_carry_quantity_unit_and_display_unit(fmi):
     angle, speed, heat, odd = (
-        Variable(name, 0, "parameter", "fixed", start=1.0, unit=unit)
+        FmuVariable(name, 0, "parameter", "fixed", start=1.0, unit=unit)
         for name, unit in (("phi", "rad"), ("Velocity", "m/s"), ("T", "K"), ("x", "kg.m2/s3"))
     )
-    found = read(interface(angle, speed, heat, odd), fmi)
+    found = read(description(angle, speed, heat, odd), fmi)
     types = [v.declaredType for v in found.modelVariables[1:]]
     assert [(t.quantity, t.unit, t.displayUnit) for t in types] == [
         ("Angle", "rad", "deg"),
@@ -66,15 +66,15 @@ def test_display_units_of_turning():
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_what_has_no_unit_declares_none(fmi):
-    found = read(interface(Variable("k", 0, "parameter", "fixed", start=1.0, unit="1")), fmi)
+    found = read(description(FmuVariable("k", 0, "parameter", "fixed", start=1.0, unit="1")), fmi)
     assert [u.name for u in found.unitDefinitions] == ["s"]
     assert (found.modelVariables[1].unit, found.modelVariables[1].declaredType) == (None, None)
 
 
 def test_units_that_look_alike_get_types_of_their_own():
-    told = interface(
+    told = description(
         *(
-            Variable(n, 0, "parameter", "fixed", start=1.0, unit=u)
+            FmuVariable(n, 0, "parameter", "fixed", start=1.0, unit=u)
             for n, u in (("a", "m/s.s"), ("b", "m/(s.s)"))
         )
     )

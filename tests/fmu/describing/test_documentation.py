@@ -14,8 +14,8 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau_fmu.describing.documentation import MANY, documentation, licenses
 from gantrytau_fmu.describing.terminals import SIZE, STROKES, icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.description import Variable
-from tests.fmu.interfaces import INTERFACES, VERSIONS, interface, oscillator
+from gantrytau_fmu.description import FmuVariable
+from tests.fmu.interfaces import DESCRIPTIONS, VERSIONS, description, oscillator, said
 
 ROOT = Path(__file__).parents[3]
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
@@ -54,9 +54,9 @@ class Page(HTMLParser):
         return next(row for row in self.rows if row and row[0] == name)
 
 
-@pytest.mark.parametrize("name", INTERFACES)
+@pytest.mark.parametrize("name", DESCRIPTIONS)
 def test_terminals_and_icons_follow_the_schema(name):
-    text = terminals_and_icons(INTERFACES[name]())
+    text = terminals_and_icons(DESCRIPTIONS[name]())
     assert etree.XMLSchema(file=str(SCHEMA)).validate(etree.fromstring(text))
 
 
@@ -87,7 +87,7 @@ def test_the_icon_is_a_small_picture_of_the_robot():
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_the_page_tells_inputs_outputs_parameters_and_states(fmi):
-    page = Page(documentation(oscillator(), fmi))
+    page = Page(documentation(said(oscillator(), fmi)))
     assert page.row("f") == ["f", "N", "0.1", "-60 to 60", "force"]
     assert page.row("m") == ["m", "kg", "2.5", "≥ 0", "mass"]
     assert page.row("spring.c")[3:] == ["0 to 1000000", "stiffness; set before the start"]
@@ -105,21 +105,21 @@ def test_the_page_tells_inputs_outputs_parameters_and_states(fmi):
 
 
 def test_the_page_names_the_version_of_the_tool_and_what_is_marked():
-    page = Page(documentation(oscillator(), "3.0"))
+    page = Page(documentation(oscillator()))
     assert page.row("Made with")[1] == f"gantrytau {version('gantrytau')}, 2026-01-02T03:04:05Z"
     assert page.row("spring.c")[4].endswith("set before the start")
     assert (
         "all but those that are marked “set before the start” may be changed at any time later" in page.words
     )
-    other = Page(documentation(oscillator(tool="no such tool"), "3.0"))
+    other = Page(documentation(oscillator(tool="no such tool")))
     assert other.row("Made with")[1] == "no such tool, 2026-01-02T03:04:05Z"
 
 
 def test_the_example_sets_a_parameter_and_an_input(monkeypatch):
     calls = []
     monkeypatch.setattr(fmpy, "simulate_fmu", lambda *arguments, **more: calls.append((arguments, more)))
-    for told in (oscillator(), interface()):
-        page = Page(documentation(told, "3.0")).words
+    for told in (oscillator(), description()):
+        page = Page(documentation(told)).words
         exec(page[page.index("from fmpy") : page.index("Licence\n")])
     (names, policy), (_, least) = calls
     given = policy.pop("input")
@@ -131,7 +131,7 @@ def test_the_example_sets_a_parameter_and_an_input(monkeypatch):
 
 
 def test_the_page_has_no_scripts_and_its_links_lead_somewhere():
-    page = Page(documentation(replace(oscillator(), name="<script>alert(1)</script>", license="<b>"), "3.0"))
+    page = Page(documentation(replace(oscillator(), name="<script>alert(1)</script>", license="<b>")))
     assert "script" not in page.tags
     assert "<script>alert(1)</script>" in page.words
     assert {"documentation/" + link for link in page.links} <= set(licenses(oscillator()))
@@ -140,18 +140,18 @@ def test_the_page_has_no_scripts_and_its_links_lead_somewhere():
 def test_many_outputs_are_grouped_by_component_and_vectors_folded():
     names = [f"arms[{i}].bodies[{j}].r[{k}]" for i in range(4) for j in range(40) for k in range(3)]
     names += ["der(tool.v[0])", "der(tool.v[1])", "energy"]
-    told = interface(*(Variable(name, 0, "output", "continuous", unit="m") for name in names))
+    told = description(*(FmuVariable(name, 0, "output", "continuous", unit="m") for name in names))
     assert len(told.outputs) > MANY
-    text = documentation(told, "3.0")
+    text = documentation(told)
     page = Page(text)
     assert page.tags.count("details") == 6
     for words in ("arms[3] (120)", "tool (2)", "the model itself (1)"):
         assert words in page.words
     assert page.row("arms[2].bodies[39].r[0] ... [2]")[1] == "m"
     assert page.row("der(tool.v[0]) ... [1])")
-    few = interface(*(Variable(name, 0, "output", "continuous", unit="m") for name in names[:MANY]))
-    assert len(text) < len(documentation(few, "3.0"))  # less than the flat table of fewer outputs
-    assert "details" not in Page(documentation(few, "3.0")).tags
+    few = description(*(FmuVariable(name, 0, "output", "continuous", unit="m") for name in names[:MANY]))
+    assert len(text) < len(documentation(few))  # less than the flat table of fewer outputs
+    assert "details" not in Page(documentation(few)).tags
 
 
 def test_licences_of_model_runtime_and_generated_code():
@@ -160,4 +160,4 @@ def test_licences_of_model_runtime_and_generated_code():
     for words in ("Mechanics.Box", "Licence: MIT", "A. Author", "BSD-3-Clause"):
         assert words in entry
     assert texts["documentation/licenses/gantrytau.txt"] == (ROOT / "LICENSE").read_bytes()
-    assert "none was stated" in licenses(interface())["documentation/licenses/license.txt"].decode()
+    assert "none was stated" in licenses(description())["documentation/licenses/license.txt"].decode()

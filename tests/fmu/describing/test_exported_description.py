@@ -1,6 +1,6 @@
 """What the description of an exported FMU says of its model: the declarations of the model, and which slopes are zero."""
 
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from typing import Any
 from zipfile import ZipFile
 
@@ -12,9 +12,11 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
 from gantrytau.errors import ModelError
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.description import Experiment
+from gantrytau_fmu.describing.xml_description import model_description
+from gantrytau_fmu.description import Experiment, FmuDescription
+from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_models import Pendulum
-from tests.fmu.exported import Exported, Numbers
+from tests.fmu.exported import MODELS, Exported, Numbers
 from tests.fmu.runtime.test_derivatives import at_random, columns, knowns_of, some_outputs, unknowns_of
 
 
@@ -112,6 +114,35 @@ def test_head_experiment_and_words_of_the_caller(fmu):
     assert found == list(asdict(Experiment(0.5, 4.0, 1e-7, 0.002)).values())
     told = [category.name for category in told.logCategories]
     assert told == ["logEvents", "logCalls", "logStatusWarning", "logStatusError"]
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("name", ["described", "compiled", *MODELS])
+def test_what_is_written_is_read_back_as_the_same_record(name, fmi, tmp_path, monkeypatch):
+    written: list[FmuDescription] = []
+
+    def spy(fmu):
+        written.append(fmu)
+        return model_description(fmu)
+
+    monkeypatch.setattr("gantrytau_fmu.export.model_description", spy)
+    model = MODELS.get(name, Described)()
+    platforms = ("native",) if name == "compiled" else ()
+    found: Any = read_fmu(
+        export_fmu(model, tmp_path / "model.fmu", fmi=fmi, platforms=platforms, author="A. Author")
+    )
+    (told,) = written
+    # no file tells a variable without dimension from one without unit
+    told = replace(
+        told, variables=tuple(replace(v, unit="" if v.unit == "1" else v.unit) for v in told.variables)
+    )
+    for field in fields(FmuDescription):
+        if field.name != "interfaces":
+            assert getattr(found, field.name) == getattr(told, field.name), field.name
+    for ours, theirs in zip(told.interfaces, found.interfaces, strict=True):
+        assert replace(theirs, capabilities=ours.capabilities) == ours
+        assert ours.capabilities.items() <= theirs.capabilities.items()
+    assert (found.inputs, found.outputs, found.states) == (told.inputs, told.outputs, told.states)
 
 
 def test_files_of_the_archive(fmu):
