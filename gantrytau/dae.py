@@ -10,10 +10,14 @@ import casadi as ca
 from gantrytau.answers.causality import function
 from gantrytau.answers.diagnosis import Diagnosis, diagnose
 from gantrytau.answers.evaluation import evaluate
+from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.system import System, assemble
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import translate_flat, translate_model
+from gantrytau.compiler.translation import translate_flat
 from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.flatten import flatten
+from gantrytau.flattening.instants import refuse_events
+from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.model import Model
 from gantrytau.writing import write_equations
 
@@ -75,7 +79,7 @@ def translate(
     units: bool = True,
     events: bool = False,
 ) -> Dae:
-    """Turn a model into a system of index one, sorted into blocks.
+    """Turn a model, flattened or not, into a system of index one, sorted into blocks.
 
     given: names that are known instead of the declared inputs, as functions of time (parameters named here
     stay symbols); find: names and derivatives that must be available; states: names preferred as states;
@@ -83,6 +87,10 @@ def translate(
     known after the inputs. Raises ModelError for faults of writing, StructureError if the equations cannot
     determine the unknowns, InitializationError if no consistent start is found.
     """
-    if isinstance(model, FlatModel):
-        return Dae.of(translate_flat(model, given=given, find=find, states=states, events=events))
-    return Dae.of(translate_model(model, given=given, find=find, states=states, units=units, events=events))
+    request = Request(names(given), names(find), names(states or ()))
+    flat = model if isinstance(model, FlatModel) else flatten(model)
+    if units:
+        check_units(flat)
+    if not events:
+        refuse_events(flat)
+    return Dae.of(translate_flat(flat, request))

@@ -146,7 +146,7 @@ def _shown(dae: Dae, find: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, .
     if find:
         return tuple(dict.fromkeys(_found(dae, name) for given in find for name in dae.expand(given))), ()
     known = set(dae.inputs)
-    names = [n for n in dict.fromkeys(dae.variables) if n not in known and not n.startswith("wanted ")]
+    names = [n for n in dict.fromkeys(dae.variables) if n not in known]
     own = {n for v in dae.flat.variables if v.kind == "output" and not v.owner for n in v.elements}
     outputs = tuple(n for n in names if n in own)
     return (outputs, tuple(n for n in names if n not in own)) if outputs else (tuple(names), ())

@@ -1,6 +1,7 @@
 """Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 
 import casadi as ca
 
@@ -8,8 +9,9 @@ from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import all_symbols, names, translate_flat
+from gantrytau.compiler.translation import all_symbols, translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -65,8 +67,8 @@ def _translations(dae: Translated, given: Sequence[str], find: Sequence[str]) ->
     leaves = [leaf.name() for name in find for n in dae.expand(name) for leaf in ca.symvar(dae.expression(n))]
     if any(split_derivative(n)[1] > orders.get(split_derivative(n)[0], 99) for n in leaves):
         parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
-        known, states = (*dae.inputs, *parameters), dae.settings["states"]
-        yield translate_flat(dae.flat, given=known, find=find, states=states, start=dae.start, events=True)
+        request = Request((*dae.inputs, *parameters), tuple(find), dae.request.states)
+        yield translate_flat(dae.flat, request, dae.start)
     yield _flipped(dae, given, find)
 
 
@@ -77,8 +79,7 @@ def _with_parameters(dae: Translated, given: Sequence[str]) -> Translated:
     if not symbols:
         return dae
     parameters = [n for n in scalars if n in dae.table.symbols]
-    chosen = {k: dae.settings[k] for k in ("find", "states")}
-    return translate_flat(dae.flat, given=(*dae.inputs, *parameters), **chosen, events=True)
+    return translate_flat(dae.flat, replace(dae.request, given=(*dae.inputs, *parameters)))
 
 
 def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) -> dict[str, ca.SX]:
@@ -138,9 +139,7 @@ def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Tran
             roots.setdefault(alias.root, name)
     for name in dae.flat.event_names:  # known anyway
         roots.pop(name, None)
-    return translate_flat(
-        dae.flat, given=(*roots.values(), *parameters), find=tuple(find), start=dae.start, events=True
-    )
+    return translate_flat(dae.flat, Request((*roots.values(), *parameters), tuple(find)), dae.start)
 
 
 def _undetermined(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:

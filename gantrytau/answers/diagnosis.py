@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.answers.other_assemblies import Assembly, assemblies
+from gantrytau.compiler.request import Request
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import InitializationError, StructureError
@@ -93,7 +94,7 @@ def check(model: Model) -> Diagnosis:
     try:
         flat = flatten(model)
         check_units(flat)
-        return diagnose(translate_flat(flat, events=True))
+        return diagnose(translate_flat(flat, Request()))
     except (StructureError, InitializationError) as error:
         if flat is None:
             cls = model if isinstance(model, type) else type(model)

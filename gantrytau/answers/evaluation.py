@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.consistent_start import consistent_start
-from gantrytau.compiler.start.start_values import Guess
+from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
 from gantrytau.errors import InitializationError, ModelError
@@ -74,7 +74,7 @@ def _shares(dae: Translated, values: Mapping[str, float], held: set[str]) -> lis
 
 
 def _complete(dae: Translated, values: dict[str, float], held: frozenset[str]) -> dict[str, float]:
-    guess = Guess(values, frozenset(dae.settings.get("started", ())), frozenset())
+    guess = StartValues(values, dae.asked.started, frozenset())
     derivatives = [n for n in values if split_derivative(n)[0] in dae.known]
     try:
         return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, held | set(derivatives))
@@ -92,7 +92,11 @@ def _complete(dae: Translated, values: dict[str, float], held: frozenset[str]) -
 
 
 def _jointly(
-    dae: Translated, guess: Guess, held: frozenset[str], free: tuple[str, ...], error: InitializationError
+    dae: Translated,
+    guess: StartValues,
+    held: frozenset[str],
+    free: tuple[str, ...],
+    error: InitializationError,
 ) -> dict[str, float]:
     """All levels at once: what is held may belong to a later level than the positions that it decides."""
     orders = dae.indexed.orders

@@ -15,9 +15,10 @@ import numpy as np
 
 from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
 from gantrytau.compiler.parameters import with_values
+from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import all_symbols, names, retranslate, translate_flat, translate_model
+from gantrytau.compiler.translation import all_symbols, retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
@@ -103,9 +104,7 @@ def linearize(
     slopes = _Slopes(dae, values)
     if slopes.condition > POOR:
         # states are a matter of the point: the height of a pendulum is none at its lowest
-        dae = translate_flat(
-            dae.flat, **{k: dae.settings[k] for k in ("given", "find", "states")}, start=values
-        )
+        dae = translate_flat(dae.flat, dae.request, values)
         slopes = _Slopes(dae, values)
     slopes.require_regular()
     wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
@@ -131,8 +130,8 @@ def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
     rows = [n for name in outputs for n in dae.expand(name)]
     if all(leaf.name() in known for n in rows for leaf in ca.symvar(dae.expression(n))):
         return dae
-    found = (*dae.settings["find"], *(n for n in outputs if split_derivative(n)[1]))
-    return retranslate(replace(dae, settings={**dae.settings, "find": found}), dae.flat)
+    found = (*dae.request.find, *(n for n in outputs if split_derivative(n)[1]))
+    return translate_flat(dae.flat, replace(dae.request, find=found))
 
 
 def _rate(dae: Translated, state: str) -> ca.SX:
@@ -171,7 +170,7 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
         rest = ca.vertcat(*residuals)
         residuals = ca.substitute(rest, ca.vertcat(*still), ca.DM(list(still.values()))).elements()
     equations = tuple(e.name for e in dae.reduced.equations)
-    started = frozenset(dae.settings.get("started", ()))
+    started = dae.asked.started
     free = tuple(n for n in dae.known if n not in held)
     title = f"steady state of {dae.name}"
     failures: list[InitializationError] = []

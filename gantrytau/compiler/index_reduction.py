@@ -5,7 +5,7 @@ Pantelides' algorithm (SIAM J. Sci. Stat. Comput. 9, 1988) and also gives the st
 consistent values are found: positions, then velocities, then accelerations and forces.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,12 +66,15 @@ class Indexed:
         return [derivative_name(n, k) for n, top in self.orders.items() for k in range(top + 1)]
 
 
-def reduce_index(reduced: Reduced, flat: FlatModel) -> Indexed:
-    """Differentiate what must be differentiated; StructureError if equations and unknowns do not match."""
+def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) -> Indexed:
+    """Differentiate what must be differentiated, and what gives the wanted derivatives, by name.
+
+    StructureError if equations and unknowns do not match.
+    """
     signature = _signature(reduced)
     if len(reduced.residuals) != len(reduced.unknowns):
         raise StructureError(unbalanced(reduced, signature, flat))
-    counts, tops = _offsets(reduced, signature, flat)
+    counts, tops = _offsets(reduced, signature, _mentioned(reduced, flat, wanted), flat)
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     names = tuple(e.name for e in reduced.equations)
@@ -92,13 +95,12 @@ def _signature(reduced: Reduced) -> list[dict[int, int]]:
     return rows
 
 
-def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel):
+def _offsets(reduced: Reduced, signature: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):
     n = len(signature)
     matched = best_matching(signature)
     if matched is None:
         raise StructureError(unbalanced(reduced, signature, flat))
     counts = np.zeros(n, dtype=int)
-    mentioned = _mentioned(reduced, flat)
     while True:
         tops = mentioned.copy()
         for i, row in enumerate(signature):
@@ -110,11 +112,15 @@ def _offsets(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel)
         counts = new
 
 
-def _mentioned(reduced: Reduced, flat: FlatModel) -> np.ndarray:
+def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.ndarray:
     """For each unknown the highest derivative that the model or its user names, by whatever alias."""
     place = {name: j for j, name in enumerate(reduced.unknowns)}
     found = np.zeros(len(place), dtype=int)
-    for name in (*reduced.aliases, *flat.derivatives):
+    named = [*reduced.aliases, *flat.derivatives, *wanted]
+    for name in wanted:
+        if name in reduced.definitions:  # follows from derivatives of variables
+            named += [leaf.name() for leaf in ca.symvar(reduced.definitions.resolved(name))]
+    for name in named:
         base, order = split_derivative(name)
         alias = reduced.aliases.get(base)
         if alias is not None and alias.root in place:

@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.start.consistency import Level, solve_levels
-from gantrytau.compiler.start.start_values import Guess, starting_guess
+from gantrytau.compiler.start.start_values import StartValues, start_values
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
@@ -68,7 +68,7 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
     reduced = eliminate_aliases(bare, table, known)
     constraints = _constraints(flat, table, reduced, duals)
-    guess = starting_guess(flat, table, reduced, list(constraints.level.leaves))
+    guess = start_values(flat, table, reduced, list(constraints.level.leaves))
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
@@ -144,7 +144,7 @@ def _unknowns(expression: ca.SX, reduced: Reduced) -> set[str]:
 
 
 def _close(
-    constraints: Constraints, guess: Guess, values: Mapping[str, float], title: str
+    constraints: Constraints, guess: StartValues, values: Mapping[str, float], title: str
 ) -> dict[str, float]:
     return solve_levels(
         [constraints.level],
@@ -167,7 +167,7 @@ def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequen
 
 
 def _poses(
-    constraints: Constraints, guess: Guess, closed: Mapping[str, float], title: str
+    constraints: Constraints, guess: StartValues, closed: Mapping[str, float], title: str
 ) -> list[dict[str, float]]:
     """Other poses, on a walk in random directions that the constraints leave free."""
     found: list[dict[str, float]] = []

@@ -1,9 +1,8 @@
 """The translated model: the frozen record that simulation, writing and the answers read."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,8 +11,9 @@ from gantrytau.compiler.aliases import Reduced, alias_expression
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed, Key
 from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.compiler.request import Request
+from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.states import StateChoice
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -24,9 +24,11 @@ class Translated:
     """A differential-algebraic system of index one, sorted into blocks that are solved one after another.
 
     Names are those of the model; a vector's name stands for its elements.
-    known: the inputs, then sampled variables, then the forces of friction that sticks.
+    known: the inputs, then sampled variables, then the forces of friction that sticks; asked: start values as the model
+    gives them; start: consistent numbers of all symbols; redundant: constraints that were left out.
     """
 
+    request: Request
     flat: FlatModel
     table: ParameterTable
     reduced: Reduced
@@ -34,9 +36,9 @@ class Translated:
     choice: StateChoice
     blocks: tuple[Block, ...]
     known: tuple[str, ...]
+    asked: StartValues
     start: Mapping[str, float]
     redundant: tuple[Equation, ...] = ()
-    settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         counts = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.blocks)} blocks"
@@ -83,26 +85,14 @@ class Translated:
         """Number of ways in which the positions can change."""
         return sum(1 for n in self.choice.states if self.indexed.orders.get(n, 0) > 1)
 
-    @cached_property
+    @property
     def vectors(self) -> Mapping[str, FlatVariable]:
         """Declared quantities by their whole names."""
-        return {v.name: v for v in (*self.flat.variables, *self.flat.parameters, *self.flat.propagated)}
+        return self.flat.vectors
 
     def expand(self, name: str) -> tuple[str, ...]:
         """The scalar names of `name` (a scalar, a vector, or a derivative of one); ModelError if unknown."""
-        base, order = split_derivative(name)
-        if base in self.vectors:
-            return tuple(derivative_name(n, order) for n in self.vectors[base].elements)
-        if base in self._scalars:
-            return (name,)
-        if base in self.flat.absent:
-            raise ModelError(f"{self.name}: {base} does not exist: {self.flat.absent[base]}")
-        known = list(dict.fromkeys((*self.vectors, *self.variables, *self.parameters)))
-        raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
-
-    @cached_property
-    def _scalars(self) -> frozenset[str]:
-        return frozenset((*self.variables, *self.parameters, self.flat.time.name()))
+        return self.flat.expand(name)
 
     @cached_property
     def _spoken_names(self) -> dict[str, str]:
@@ -141,7 +131,9 @@ class Translated:
 
     def reduce(self, expression: ca.SX) -> ca.SX:
         """An expression of the flat model's symbols in the symbols of the reduced equations; others stay."""
-        leaves = [leaf for leaf in ca.symvar(expression) if split_derivative(leaf.name())[0] in self._scalars]
+        leaves = [
+            leaf for leaf in ca.symvar(expression) if split_derivative(leaf.name())[0] in self.flat.scalars
+        ]
         new = [self.expression(leaf.name()) for leaf in leaves]
         return ca.substitute(expression, ca.vertcat(*leaves), ca.vertcat(*new)) if leaves else expression
 

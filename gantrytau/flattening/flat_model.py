@@ -6,9 +6,11 @@ from functools import cached_property
 
 import casadi as ca
 
+from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.rods import Rods
 from gantrytau.language.statements import Equation, Requirement
+from gantrytau.language.symbols import derivative_name, split_derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +136,31 @@ class FlatModel:
     frictions: tuple[StickSlip, ...] = ()
     rods: Rods | None = None
 
+    @cached_property
+    def vectors(self) -> Mapping[str, FlatVariable]:
+        """Variables, parameters and propagated quantities by their whole names."""
+        return {v.name: v for v in (*self.variables, *self.parameters, *self.propagated)}
+
+    @cached_property
+    def scalars(self) -> frozenset[str]:
+        """Names of all scalars, time among them."""
+        return frozenset(n for v in self.vectors.values() for n in v.elements) | {self.time.name()}
+
     def find(self, name: str) -> FlatVariable | None:
         """The variable, parameter or propagated quantity of that name."""
-        everything = (*self.variables, *self.parameters, *self.propagated)
-        return next((v for v in everything if v.name == name), None)
+        return self.vectors.get(name)
+
+    def expand(self, name: str) -> tuple[str, ...]:
+        """The scalar names of `name` (a scalar, a vector, or a derivative of one); ModelError if unknown."""
+        base, order = split_derivative(name)
+        if base in self.vectors:
+            return tuple(derivative_name(n, order) for n in self.vectors[base].elements)
+        if base in self.scalars:
+            return (name,)
+        if base in self.absent:
+            raise ModelError(f"{self.name}: {base} does not exist: {self.absent[base]}")
+        known = [n for v in self.vectors.values() for n in (v.name, *v.elements)]
+        raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
 
     @cached_property
     def hints(self) -> Mapping[str, str]:

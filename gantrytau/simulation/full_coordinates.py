@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.start.consistent_start import consistent_start
-from gantrytau.compiler.start.start_values import Guess
+from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
@@ -113,9 +113,7 @@ class Coordinates:
         values = {**dae.start, time.name(): t}
         if self.known:
             values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
-        started = frozenset(dae.settings["started"])
-        fixed = frozenset(dae.settings["fixed"])
-        guess = Guess(values, started | frozenset(self.known), fixed)
+        guess = StartValues(values, dae.asked.started | frozenset(self.known), dae.asked.fixed)
         found = consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess)
         x = np.array([found[n] for n in self.states])
         return x, np.array([found[n] for n in self.algebraics])

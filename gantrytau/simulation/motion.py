@@ -148,7 +148,9 @@ def _known_symbols(
     outputs: Sequence[str],
 ) -> dict[str, ca.SX]:
     """Inputs and those of their derivatives that occur, as expressions of time and samples."""
-    occurring = {leaf.name() for r in dae.indexed.residuals.values() for leaf in ca.symvar(r)}
+    sampled_at = dae.reduce(_column([s.expression for s in dae.flat.sampled]))
+    used = [sampled_at, *dae.indexed.residuals.values()]
+    occurring = {leaf.name() for expression in used for leaf in ca.symvar(expression)}
     for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
         base, order = split_derivative(asked)
         alias = dae.reduced.aliases.get(base)

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from gantrytau.compiler.parameters import with_values
+from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import names, retranslate, translate_model
+from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import ModelError, SolveError
 from gantrytau.flattening.instants import refuse_sticking
 from gantrytau.language.model import Model
@@ -49,7 +50,7 @@ def simulate(
     when there is no consistent start, ModelError for wrong names and values.
     """
     _check(start, stop, tolerance, points)
-    dae = model if isinstance(model, Translated) else translate_model(model, events=True)
+    dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -57,8 +58,7 @@ def simulate(
     for name in wanted:
         dae.expand(name)
     if any(split_derivative(name)[1] for name in wanted):
-        chosen = {**dae.settings, "find": (*dae.settings["find"], *wanted)}
-        dae = retranslate(replace(dae, settings=chosen), dae.flat)
+        dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
     signals = read_signals(inputs or {}, dae.expand)
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)

@@ -58,6 +58,8 @@ class _Writer:
         self.dae, self.flat, self.graph = dae, dae.flat, Graph()
         self.equations = independent_equations(dae)
         self.auxiliaries: list[str] = []
+        wanted = [n for name in dae.request.find for n in self.flat.expand(name) if n.startswith("der(")]
+        self.wanted = [n for n in dict.fromkeys(wanted) if n not in self.flat.derivatives]
         self.orders = self._orders()
         self.syntax = ModelicaSyntax({n for n, order in self.orders.items() if order > 1})
 
@@ -67,6 +69,8 @@ class _Writer:
         used = [side for e in (*self.equations, *self.flat.initial_equations) for side in (e.left, e.right)]
         for leaf in ca.symvar(ca.SX(ca.vertcat(*used, *self.flat.definitions.values()))):
             name, order = split_derivative(leaf.name())
+            found[name] = max(order, found.get(name, 0))
+        for name, order in map(split_derivative, self.wanted):
             found[name] = max(order, found.get(name, 0))
         return found
 
@@ -111,7 +115,7 @@ class _Writer:
         return f"  {side} = {right.text} {string(equation.name)};"
 
     def _derivatives(self) -> list[str]:
-        """One equation for each derivative that is differentiated again."""
+        """One equation for each derivative that is differentiated again, or asked for."""
         found: list[str] = []
         for name, top in self.orders.items():
             for order in range(1, top):
@@ -119,6 +123,9 @@ class _Writer:
                 words = "" if order == 1 else f"derivative {order} of {name}"
                 self.auxiliaries.append(f"  Real {quoted(new)} {string(words or f'derivative of {name}')};")
                 found.append(f"  {quoted(new)} = der({quoted(old)});")
+        for new in self.wanted:
+            self.auxiliaries.append(f"  output Real {quoted(f'wanted {new}')};")
+            found.append(f"  {quoted(f'wanted {new}')} = {self.syntax.symbol(new).text};")
         return found
 
     def _named(self, propagated: dict[str, Node], text: Text, start: int) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError, SolveError
-from gantrytau.compiler.translation import names
+from gantrytau.compiler.request import names
 from gantrytau_optimica.answers.archive.run_record import require_place, write_record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build

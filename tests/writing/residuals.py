@@ -35,7 +35,7 @@ def _assert_same_at(dae: Dae, read: ModelicaClass, generator: np.random.Generato
     sides = ca.SX(ca.vertcat(*(side for e in written for side in (e.left, e.right))))
     symbols = ca.symvar(ca.SX(ca.vertcat(sides, *flat.definitions.values(), *flat.derivatives.values())))
     orders = dict.fromkeys((*(n for v in flat.variables for n in v.elements), "time"), 0)
-    for name, order in (split_derivative(s.name()) for s in symbols):
+    for name, order in map(split_derivative, (*(s.name() for s in symbols), *dae.request.find)):
         orders[name] = max(orders.get(name, 0), order)
     values = {
         derivative_name(n, k): generator.uniform(lowest, 2)

@@ -143,7 +143,7 @@ def _determined(
     from scipy.linalg import qr
 
     slopes = point.slopes(column([equations, *(d.expression - d.start for d in rows)]))
-    fixed = set(dae.settings["fixed"])
+    fixed = dae.asked.fixed
     may_move = [k for k, n in enumerate(dae.choice.states) if n not in fixed]
     slopes = slopes[:, may_move] * [1e-3 if k in spoken_for else 1.0 for k in may_move]
     size = 1e-9 * max(1.0, float(np.abs(slopes).max(initial=0.0)))

@@ -23,8 +23,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Strata
+from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import names, translate_flat, translate_model
+from gantrytau.compiler.translation import translate_flat, translate_model
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
@@ -168,7 +169,7 @@ def _moved_by_tool(dae: Translated, roles: Mapping[str, Sequence[str]]) -> Trans
         others = []  # the forces are no inputs: all inputs follow from them
     accelerations = [derivative_name(n, 2) for n in (*roles["q"], *roles["T"])]
     try:
-        return translate_flat(dae.flat, given=(*roles["T"], *others), find=accelerations, start=dae.start)
+        return translate_flat(dae.flat, Request((*roles["T"], *others), tuple(accelerations)), dae.start)
     except StructureError as error:
         raise StructureError(
             f"{', '.join(roles['T'])} cannot be moved at will by {', '.join(roles['f'])}, expected independent coordinates "

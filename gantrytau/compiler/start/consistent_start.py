@@ -6,7 +6,7 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.start.consistency import Level, solve_levels
-from gantrytau.compiler.start.start_values import Guess
+from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel
 
@@ -16,7 +16,7 @@ def consistent_start(
     table: ParameterTable,
     reduced: Reduced,
     indexed: Indexed,
-    guess: Guess,
+    guess: StartValues,
     held: frozenset[str] = frozenset(),
     free: tuple[str, ...] = (),
 ) -> dict[str, float]:

@@ -13,7 +13,7 @@ from gantrytau.language.symbols import derivative_name
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
+class StartValues:
     """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold."""
 
     values: Mapping[str, float]
@@ -21,7 +21,7 @@ class Guess:
     fixed: frozenset[str]
 
 
-def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> Guess:
+def start_values(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> StartValues:
     """Start attributes carried over to the symbols of the reduced equations."""
     values: dict[str, float] = dict.fromkeys(symbols, 0.0)
     owners: dict[str, tuple[bool, int]] = {}
@@ -36,7 +36,7 @@ def starting_guess(flat: FlatModel, table: ParameterTable, reduced: Reduced, sym
         values[event.name] = _own_start(flat, table, event.name)
     values.update(table.values)
     values[flat.time.name()] = 0.0
-    return Guess(values, frozenset(owners), frozenset(fixed))
+    return StartValues(values, frozenset(owners), frozenset(fixed))
 
 
 def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError, Parameter, translate
-from gantrytau.compiler.translation import names
+from gantrytau.compiler.request import names
 from gantrytau.errors import told
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
@@ -81,7 +81,7 @@ def read_problem(
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
     check_constraints(constraints, asked.targets)
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
-    dae = translate(flat, given=_given(stages, flat), find=mentioned)
+    dae = translate(flat, units=False, given=_given(stages, flat), find=mentioned)
     links = [_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink)]
     read = SymbolicProblem(
         name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),

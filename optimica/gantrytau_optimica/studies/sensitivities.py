@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.compiler.translation import names
+from gantrytau.compiler.request import names
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.held_parameters import holding
 from gantrytau_optimica.studies.kkt import ActiveSet, Slopes, slopes
