@@ -10,9 +10,9 @@ from gantrytau.compiler.request import Request
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import InitializationError, StructureError
+from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel, Loop
 from gantrytau.flattening.flatten import flatten
-from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.model import Model
 
 POOR = 1e4  # condition of the choice of states from which it deserves a remark

@@ -20,9 +20,9 @@ from gantrytau.compiler.start.start_values import start_values
 from gantrytau.compiler.states import choose_states
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import InitializationError, ModelError, StructureError
+from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
-from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name, split_derivative

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.errors import ModelError
+from gantrytau.language.instructions import computed
 
 FUNCTIONS = {
     ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_FABS: "abs", ca.OP_SIGN: "sign",
@@ -91,20 +92,9 @@ class Graph:
         vector = ca.densify(ca.vertcat(*expressions))
         leaves = ca.symvar(vector)
         function = ca.Function("expressions", [ca.vertcat(*leaves)], [vector])
-        work: dict[int, Node] = {}
-        found: dict[int, Node] = {}
-        for k in range(function.n_instructions()):
-            operator, inputs = function.instruction_id(k), function.instruction_input(k)
-            outputs = function.instruction_output(k)
-            if operator == ca.OP_OUTPUT:
-                found[outputs[1]] = self.real(work[inputs[0]])
-            elif operator == ca.OP_INPUT:
-                work[outputs[0]] = self.symbol(leaves[inputs[1]].name())
-            elif operator == ca.OP_CONST:
-                work[outputs[0]] = self.number(function.instruction_constant(k))
-            else:
-                work[outputs[0]] = self._operation(operator, [work[i] for i in inputs])
-        return [found[i] for i in range(len(expressions))]
+        names = [leaf.name() for leaf in leaves]
+        (found,) = computed(function, lambda _, i: self.symbol(names[i]), self.number, self._operation)
+        return [self.real(node) for node in found]
 
     def _operation(self, operator: int, arguments: Sequence[Node]) -> Node:
         if operator in (ca.OP_AND, ca.OP_OR, ca.OP_NOT):

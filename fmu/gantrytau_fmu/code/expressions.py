@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from gantrytau.errors import ModelError
+from gantrytau.language.instructions import computed
 from gantrytau_fmu.code.operations import OPERATIONS
 
 NAMES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_")}
@@ -40,18 +41,13 @@ class Graph:
     def enter(self, name: str, arguments: Mapping[str, ca.SX], results: ca.SX) -> list[int]:
         """Numbers of the nodes of `results`, dense, in symbols of `arguments`, by array name."""
         function = ca.Function(name, list(arguments.values()), [ca.densify(results)], {"cse": True})
-        arrays, slots, roots = list(arguments), {}, [0] * results.numel()
-        for k in range(function.n_instructions()):
-            operation = NAMES[function.instruction_id(k)]
-            inside, outside = function.instruction_input(k), function.instruction_output(k)
-            if operation == "OUTPUT":
-                roots[outside[1]] = slots[inside[0]]
-            elif operation == "INPUT":
-                slots[outside[0]] = self.node("INPUT", arrays[inside[0]], inside[1])
-            elif operation == "CONST":
-                slots[outside[0]] = self.node("CONST", function.instruction_constant(k))
-            else:
-                slots[outside[0]] = self.operation(operation, [slots[i] for i in inside])
+        arrays = list(arguments)
+        (roots,) = computed(
+            function,
+            lambda k, i: self.node("INPUT", arrays[k], i),
+            lambda value: self.node("CONST", value),
+            lambda operator, inside: self.operation(NAMES[operator], inside),
+        )
         return roots
 
     def operation(self, name: str, inside: list[int]) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.language.instructions import computed
 from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.failures.row_meanings import signal_words
 from gantrytau_optimica.problem.model_words import definition_words, motion_words
@@ -187,7 +188,7 @@ def _evaluated(column: ca.SX, table: _Table) -> np.ndarray:
 
 def _cause(expression: ca.SX, table: _Table, copy: int, kind: str) -> tuple[str, set[int], ca.SX | None]:
     """The first operation whose operand lies outside of its domain at a copy, in words, and the symbols of the operand."""
-    candidates = list(_operations(expression, table.symbols))
+    candidates = _operations(expression, table.symbols)
     if not candidates:
         return "", set(), None
     operands = ca.vertcat(*(x for _, first, second in candidates for x in (first, second)))
@@ -211,29 +212,17 @@ def _named(operand: ca.SX, value: float, table: _Table) -> str:
     return f"`{text}` = {value:.4g}" if len(text) <= LONG and "@" not in text else f"{value:.4g}"
 
 
-def _operations(expression: ca.SX, symbols: ca.SX) -> Iterator[tuple[int, ca.SX, ca.SX]]:
+def _operations(expression: ca.SX, symbols: ca.SX) -> list[tuple[int, ca.SX, ca.SX]]:
     """Operations that have a domain, with their operands, in the order of evaluation."""
-    function = ca.Function("steps", [symbols], [expression])
-    work: dict[int, ca.SX] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            continue
-        if operation == ca.OP_INPUT:
-            work[outputs[0]] = symbols[inputs[1]]
-        elif operation == ca.OP_CONST:
-            work[outputs[0]] = ca.SX(function.instruction_constant(k))
-        else:
-            operands = [work[i] for i in inputs]
-            if operation in _DOMAINS:
-                yield operation, operands[0], operands[-1]
-            made = (
-                ca.SX.binary(operation, *operands)
-                if len(operands) == 2
-                else ca.SX.unary(operation, operands[0])
-            )
-            work[outputs[0]] = made
+    found: list[tuple[int, ca.SX, ca.SX]] = []
+
+    def apply(operator: int, operands: list[ca.SX]) -> ca.SX:
+        if operator in _DOMAINS:
+            found.append((operator, operands[0], operands[-1]))
+        return (ca.SX.binary if len(operands) == 2 else ca.SX.unary)(operator, *operands)
+
+    computed(ca.Function("steps", [symbols], [expression]), lambda _, i: symbols[i], ca.SX, apply)
+    return found
 
 
 def _root(a: float, b: float, first: bool, second: bool) -> str:

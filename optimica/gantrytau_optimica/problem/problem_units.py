@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import time
 from gantrytau_optimica.problem.optimization import Point

@@ -11,10 +11,10 @@ import numpy as np
 from gantrytau import Dae, ModelError, Parameter, translate
 from gantrytau.compiler.request import names
 from gantrytau.errors import told
+from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.unit_checking import check_units
 from gantrytau.language.functions import Between
 from gantrytau.language.symbols import writing
 from gantrytau.simulation.signals import read_signals

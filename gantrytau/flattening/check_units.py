@@ -4,14 +4,16 @@ A number has no unit of its own: in a product it counts as one, in a sum it take
 neighbours. Quantities declared without a unit fit anywhere.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import NamedTuple
 
 import casadi as ca
 
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instants import unit_equations
+from gantrytau.language.instructions import computed
 from gantrytau.language.symbols import split_derivative
 from gantrytau.language.units import ONE, Dimension, dimension, unit_text
 
@@ -20,40 +22,43 @@ ANY = "any"
 Unit = Dimension | str
 
 SAME = {
-    ca.OP_ADD,
-    ca.OP_SUB,
-    ca.OP_FMIN,
-    ca.OP_FMAX,
-    ca.OP_HYPOT,
-    ca.OP_FMOD,
-    ca.OP_REMAINDER,
-    ca.OP_COPYSIGN,
-}
+    ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_HYPOT, ca.OP_FMOD, ca.OP_REMAINDER, ca.OP_COPYSIGN,
+}  # fmt: skip
 RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
 ANGLES = {
-    getattr(ca, f"OP_{name}"): name.lower()
+    getattr(ca, f"OP_{name.upper()}"): name
     for name in [
-        "SIN",
-        "COS",
-        "TAN",
-        "ASIN",
-        "ACOS",
-        "ATAN",
-        "SINH",
-        "COSH",
-        "TANH",
-        "ASINH",
-        "ACOSH",
-        "ATANH",
-        "EXP",
-        "LOG",
-        "LOG1P",
-        "EXPM1",
-        "ERF",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+        "atanh",
+        "exp",
+        "log",
+        "log1p",
+        "expm1",
+        "erf",
     ]
 }
 POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
+
+SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+
+
+class Term(NamedTuple):
+    """An expression as it is written, its unit, and what is wrong with it."""
+
+    unit: Unit
+    text: str
+    fault: str = ""
 
 
 def check_units(flat: FlatModel) -> None:
@@ -69,11 +74,14 @@ def check_units(flat: FlatModel) -> None:
         ),
     ]
     symbols += list(flat.derivatives.values())
-    given = [units[s.name()] for s in symbols]
     for equations in (flat.equations, flat.initial_equations, unit_equations(flat)):
         sides = [side for e in equations for side in (e.left, e.right)]
-        found = _infer(symbols, given, sides, lambda place, _eqs=equations: _eqs[place // 2].name)
-        for equation, left, right in zip(equations, found[::2], found[1::2], strict=True):
+        terms = _terms(symbols, units, sides)
+        for equation, *pair in zip(equations, terms[::2], terms[1::2], strict=True):
+            fault = next((term.fault for term in pair if term.fault), "")
+            if fault:
+                raise ModelError(f"{equation.name}: {fault}")
+            left, right = (term.unit for term in pair)
             if not _agree(left, right):
                 raise ModelError(
                     f"{equation.name}: units disagree in `{equation.text[:160]}`: the left side is in "
@@ -101,43 +109,25 @@ def _read(unit: str, path: str) -> Dimension:
         raise ModelError(f"{path}: {error}") from None
 
 
-def _infer(symbols, given, expressions, place_name) -> list[Unit]:
-    """Units of scalar expressions, by one walk over their instructions."""
+def _terms(symbols: Sequence[ca.SX], units: Mapping[str, Unit], expressions: Sequence[ca.SX]) -> list[Term]:
+    """Scalar expressions with their units."""
+    terms = [Term(units[s.name()], s.name()) for s in symbols]
     function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
-    work: dict[int, Unit] = {}
-    text: dict[int, str] = {}
-    found: list[Unit] = [ANY] * len(expressions)
-    failures: dict[int, str] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        inputs = function.instruction_input(k)
-        outputs = function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            found[outputs[0]] = work[inputs[0]]
-            if inputs[0] in failures:
-                raise ModelError(f"{place_name(outputs[0])}: {failures[inputs[0]]}")
-            continue
-        target = outputs[0]
-        failures.pop(target, None) if target not in inputs else None
-        if operation == ca.OP_INPUT:
-            work[target], text[target] = given[inputs[0]], symbols[inputs[0]].name()
-            continue
-        if operation == ca.OP_CONST:
-            value = function.instruction_constant(k)
-            work[target], text[target] = (ANY if value == 0 else NUMBER), f"{value:g}"
-            continue
-        carried = next((failures[i] for i in inputs if i in failures), None)
-        units, words = [work[i] for i in inputs], [text[i] for i in inputs]
-        constant = None
-        if operation in (ca.OP_POW, ca.OP_CONSTPOW) and units[1] == NUMBER:
-            constant = Fraction(words[1]).limit_denominator(1000)
-        unit, fault = _unit(operation, units, words, constant)
-        work[target], text[target] = unit, _words(operation, words)
-        if carried or fault:
-            failures[target] = carried or fault or ""
-        else:
-            failures.pop(target, None)
-    return found
+    found = computed(
+        function, lambda k, _: terms[k], lambda x: Term(NUMBER if x else ANY, f"{x:g}"), _operation
+    )
+    return [one[0] if one else Term(ANY, "0") for one in found]
+
+
+def _operation(operator: int, operands: Sequence[Term]) -> Term:
+    """The term that an operation makes; what is wrong with an operand goes on."""
+    units, words = [term.unit for term in operands], [term.text for term in operands]
+    constant = None
+    if operator in (ca.OP_POW, ca.OP_CONSTPOW) and units[1] == NUMBER:
+        constant = Fraction(words[1]).limit_denominator(1000)
+    unit, fault = _unit(operator, units, words, constant)
+    carried = next((term.fault for term in operands if term.fault), "")
+    return Term(unit, _words(operator, words), carried or fault or "")
 
 
 def _unit(
@@ -210,9 +200,6 @@ def _agree(first: Unit, second: Unit) -> bool:
 
 def _text(unit: Unit) -> str:
     return unit if isinstance(unit, str) else f"'{unit_text(unit)}'"
-
-
-SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 
 
 def _words(operation: int, words: list[str]) -> str:

@@ -1,0 +1,35 @@
+"""The reader of CasADi's instructions: a function of scalars computed with values of any kind."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import casadi as ca
+
+Value = TypeVar("Value")
+
+
+def computed(
+    function: ca.Function,
+    symbol: Callable[[int, int], Value],
+    number: Callable[[float], Value],
+    operation: Callable[[int, list[Value]], Value],
+) -> list[list[Value]]:
+    """The results of an SX function, the nonzeros of each, instruction by instruction with other values than numbers.
+
+    symbol: the value of an element (argument, nonzero); number: that of a constant; operation: that of CasADi's
+    operator, such as casadi.OP_ADD, on the values of its operands.
+    """
+    work: dict[int, Value] = {}
+    results: list[dict[int, Value]] = [{} for _ in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        operator = function.instruction_id(k)
+        inside, outside = function.instruction_input(k), function.instruction_output(k)
+        if operator == ca.OP_OUTPUT:
+            results[outside[0]][outside[1]] = work[inside[0]]
+        elif operator == ca.OP_INPUT:
+            work[outside[0]] = symbol(inside[0], inside[1])
+        elif operator == ca.OP_CONST:
+            work[outside[0]] = number(function.instruction_constant(k))
+        else:
+            work[outside[0]] = operation(operator, [work[i] for i in inside])
+    return [[found[i] for i in sorted(found)] for found in results]
