@@ -16,7 +16,9 @@ from gantrytau_fmu.building.archive import binary_members, check_target, write_f
 from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
-from gantrytau_fmu.code.model_code import ModelCode, model_code
+from gantrytau_fmu.code.formulas import Formulas, formulas_of
+from gantrytau_fmu.code.model_code import model_code
+from gantrytau_fmu.code.model_graph import entered
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
@@ -72,12 +74,16 @@ def export_fmu(
     targets = chosen(platforms)
     check_target(path)
     dae = _translated(model, given, find, states)
-    contents = contents_of(dae, *_shown(dae, find))
+    outputs, others = _shown(dae, find)
+    graph = entered(formulas_of(dae, [*outputs, *others]))
+    contents = contents_of(graph, outputs, others)
     words = description or _first_words(model) or f"{dae.name}, a model of gantrytau"
     about = AboutFmu(words, author, copyright, license, version)
-    token = _token(contents, fmi, solver, tolerance)
-    fmu = _described(contents, about, token, kinds, experiment or Experiment(tolerance=tolerance))
-    code = _code(contents, fmu, tolerance)
+    token = _token(graph.formulas, contents, fmi, solver, tolerance)
+    fmu = _described(
+        graph.formulas, contents, about, token, kinds, experiment or Experiment(tolerance=tolerance)
+    )
+    code = model_code(graph, contents, name=fmu.name, token=token, interfaces=kinds, tolerance=tolerance)
     texts = source_files(code.text, solver)
     binaries = _compiled(texts, targets, fmu.identifier, code.operations)
     fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
@@ -164,19 +170,24 @@ def _found(dae: Dae, name: str) -> str:
     return name
 
 
-def _token(contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
+def _token(formulas: Formulas, contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
     """The same for the same model: a hash of its formulas and variables, in the form of a UUID."""
     variables = [astuple(variable) for variable in contents.variables]
-    formulas = f"{contents.formulas.rates}{contents.formulas.residuals}"
-    digits = hashlib.sha256(f"{variables}{fmi}{solver}{tolerance}{formulas}".encode()).hexdigest()
+    text = f"{variables}{fmi}{solver}{tolerance}{formulas.rates}{formulas.residuals}"
+    digits = hashlib.sha256(text.encode()).hexdigest()
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 
 
 def _described(
-    contents: Contents, about: AboutFmu, token: str, kinds: Sequence[str], experiment: Experiment
+    formulas: Formulas,
+    contents: Contents,
+    about: AboutFmu,
+    token: str,
+    kinds: Sequence[str],
+    experiment: Experiment,
 ) -> FmuDescription:
     """The record of the FMU, in the words of FMI 3, before its binaries are there."""
-    name, formulas = contents.formulas.dae.name, contents.formulas
+    name = formulas.dae.name
     identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
     # singular poses are looked for at the end of each step, also of an importer's integrator
     watches = {"model-exchange": {"needsCompletedIntegratorStep": bool(formulas.roots or formulas.blocks)}}
@@ -190,21 +201,6 @@ def _described(
         experiment=experiment,
         terminals=contents.terminals,
         generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-    )
-
-
-def _code(contents: Contents, fmu: FmuDescription, tolerance: float) -> ModelCode:
-    return model_code(
-        contents.formulas,
-        name=fmu.name,
-        token=fmu.token,
-        variables=contents.entries,
-        constants=contents.constants,
-        nominals=contents.nominals,
-        interfaces=[each.kind for each in fmu.interfaces],
-        tolerance=tolerance,
-        outputs=contents.wanted,
-        graph=contents.graph,
     )
 
 

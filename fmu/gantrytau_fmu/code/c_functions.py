@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from gantrytau_fmu.code.expressions import Graph
+from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.operations import OPERATIONS, number_text
 
 PIECE = 1500  # operations per C function
@@ -29,7 +29,7 @@ class CFunction:
 
 
 def c_function(
-    graph: Graph, name: str, roots: Sequence[int], *, hoisting: bool = False, seldom: bool = False
+    graph: ExpressionGraph, name: str, roots: Sequence[int], *, hoisting: bool = False, seldom: bool = False
 ) -> CFunction:
     """The function whose results r are the roots, from the arrays of the graph, then the hoisted one.
 
@@ -63,7 +63,7 @@ def c_function(
 class _Piece:
     """One C function of the graph while it is written; texts: expressions by node, where they have one here."""
 
-    graph: Graph
+    graph: ExpressionGraph
     number: int
     known: Mapping[int, int]
     home: Mapping[int, int]
@@ -101,7 +101,7 @@ class _Piece:
         self.lines.append(f"  r[{place}] = {self.word(root)};")
 
 
-def _whole(name: str, graph: Graph, body: Sequence[str]) -> str:
+def _whole(name: str, graph: ExpressionGraph, body: Sequence[str]) -> str:
     text = "".join(body)
     used = [(k, n) for k, n in enumerate([*graph.arrays, HOISTED]) if f"{n}[" in text]
     lines = [

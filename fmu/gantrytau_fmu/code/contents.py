@@ -1,35 +1,41 @@
 """The variables of an FMU, made of the formulas of a model: who they are to the outside and to the runtime."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from gantrytau import Dae
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import split_derivative
-from gantrytau_fmu.code.arrays import column, numbers_of
-from gantrytau_fmu.code.expressions import Graph
-from gantrytau_fmu.code.formulas import Formulas, formulas_of
-from gantrytau_fmu.code.model_code import Entry, output_places
+from gantrytau_fmu.code.arrays import numbers_of
+from gantrytau_fmu.code.dependencies import Dependencies
+from gantrytau_fmu.code.formulas import Formulas
+from gantrytau_fmu.code.model_graph import ModelGraph
 from gantrytau_fmu.description import FmuTerminal, FmuVariable, ModelStructure, Unknown
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the table of variables: kind as in core.h, without GT_; index within the kind."""
+
+    kind: str
+    index: int
+    fixed: bool
+    name: str
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
     """Variables and model structure of an FMU (see FmuDescription), and the tables of the runtime, in the same order."""
 
-    formulas: Formulas
     variables: tuple[FmuVariable, ...]
     entries: tuple[Entry, ...]
     constants: tuple[float, ...]
     nominals: tuple[float, ...]
     structure: ModelStructure
     terminals: tuple[FmuTerminal, ...]
-    wanted: tuple[ca.SX, ...]
-    graph: Graph
 
 
 def fmi_name(name: str) -> str:
@@ -39,10 +45,11 @@ def fmi_name(name: str) -> str:
 
 
 @dataclass(eq=False)
-class _Builder:
-    dae: Dae
+class _Listed:
+    """The variables while they are collected; places: of outputs among those that differ."""
+
     formulas: Formulas
-    places: dict[str, int]
+    places: Mapping[str, int]
     outputs: frozenset[str]
     variables: list[FmuVariable] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
@@ -51,6 +58,7 @@ class _Builder:
     rates: list[int] = field(default_factory=list)  # references of the derivatives of the states
 
     def __post_init__(self) -> None:
+        self.dae = self.formulas.dae
         flat = self.dae.flat
         everything = (*flat.parameters, *flat.variables, *flat.propagated)
         self.declared = {n: (v, k) for v in everything for k, n in enumerate(v.elements)}
@@ -121,51 +129,39 @@ def _per_second(unit: str, order: int) -> str:
     return f"{above}/({joined})" if rest else f"{above}/{joined}"
 
 
-def contents_of(dae: Dae, outputs: Sequence[str], others: Sequence[str] = ()) -> Contents:
-    """What an FMU of a translated model holds; scalar names of its outputs, and of what else can be read from it."""
-    formulas = formulas_of(dae, _evaluated(dae, [*outputs, *others]))
-    graph, places, wanted = output_places(formulas)
-    builder = _Builder(dae, formulas, places, frozenset(outputs))
-    builder.add(
+def contents_of(model: ModelGraph, outputs: Sequence[str], others: Sequence[str] = ()) -> Contents:
+    """What an FMU of a model holds; scalar names of its outputs, and of what else can be read from it."""
+    formulas = model.formulas
+    listed = _Listed(formulas, model.places, frozenset(outputs))
+    listed.add(
         "time", "TIME", 0, causality="independent", variability="continuous", unit="s", description="time"
     )
-    _parameters(builder)
-    _inputs(builder)
-    _states(builder)
-    _outputs(builder, [*outputs, *others])
-    indicators = _frictions(builder)
+    _parameters(listed)
+    _inputs(listed)
+    _states(listed)
+    _outputs(listed, [*outputs, *others])
+    indicators = _frictions(listed)
     return Contents(
-        formulas=formulas,
-        variables=tuple(builder.variables),
-        entries=tuple(builder.entries),
-        constants=tuple(builder.constants),
-        nominals=tuple(_nominal(builder, n) for n in formulas.states),
-        structure=_structure(builder, Dependencies(formulas, wanted), outputs, indicators),
-        terminals=_terminals(builder),
-        wanted=tuple(wanted),
-        graph=graph,
+        variables=tuple(listed.variables),
+        entries=tuple(listed.entries),
+        constants=tuple(listed.constants),
+        nominals=tuple(_nominal(listed, n) for n in formulas.states),
+        structure=_structure(listed, Dependencies(formulas, model.outputs), outputs, indicators),
+        terminals=_terminals(listed),
     )
 
 
-def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
-    """What needs an output function: outputs that are no states, and parameters that follow from others."""
-    direct = {*dae.states, *(f"der({n})" for n in dae.states), *(s.name for s in dae.flat.sampled)}
-    dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
-    varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
-    return [*dependent, *varying]
+def _nominal(listed: _Listed, name: str) -> float:
+    declaration, place = listed.declared.get(split_derivative(name)[0], (None, 0))
+    return listed.limits(declaration, place).get("nominal", 1.0) if declaration is not None else 1.0
 
 
-def _nominal(builder: _Builder, name: str) -> float:
-    declaration, place = builder.declared.get(split_derivative(name)[0], (None, 0))
-    return builder.limits(declaration, place).get("nominal", 1.0) if declaration is not None else 1.0
-
-
-def _parameters(builder: _Builder) -> None:
-    table, formulas = builder.dae.table, builder.formulas
+def _parameters(listed: _Listed) -> None:
+    table, formulas = listed.dae.table, listed.formulas
     early = formulas.start_parameters
     for place, name in enumerate(table.independent):
         fixed = name in early
-        builder.add(
+        listed.add(
             name,
             "PARAMETER",
             place,
@@ -178,23 +174,23 @@ def _parameters(builder: _Builder) -> None:
         )
     for name, expression in table.expressions.items():
         if expression.is_constant():
-            _constant(builder, name, table.values[name], "local")
+            _constant(listed, name, table.values[name], "local")
             continue
         tunable = any(s.name() not in early for s in ca.symvar(expression))
         more: dict[str, Any] = dict(variability="tunable" if tunable else "fixed", initial="calculated")
-        builder.add(name, "OUTPUT", builder.places[name], causality="local", **more)
+        listed.add(name, "OUTPUT", listed.places[name], causality="local", **more)
 
 
-def _constant(builder: _Builder, name: str, value: float, causality: str) -> None:
+def _constant(listed: _Listed, name: str, value: float, causality: str) -> None:
     more: dict[str, Any] = dict(causality=causality, variability="constant", initial="exact", start=value)
-    builder.add(name, "CONSTANT", len(builder.constants), **more)
-    builder.constants.append(value)
+    listed.add(name, "CONSTANT", len(listed.constants), **more)
+    listed.constants.append(value)
 
 
-def _inputs(builder: _Builder) -> None:
-    start = numbers_of(builder.dae, builder.formulas.arrays)["u"]
-    for place, name in enumerate(builder.formulas.inputs):
-        builder.add(
+def _inputs(listed: _Listed) -> None:
+    start = numbers_of(listed.dae, listed.formulas.arrays)["u"]
+    for place, name in enumerate(listed.formulas.inputs):
+        listed.add(
             name,
             "INPUT",
             place,
@@ -206,21 +202,21 @@ def _inputs(builder: _Builder) -> None:
         )
 
 
-def _states(builder: _Builder) -> None:
-    formulas = builder.formulas
-    starts = numbers_of(builder.dae, formulas.arrays)["x"]
+def _states(listed: _Listed) -> None:
+    formulas = listed.formulas
+    starts = numbers_of(listed.dae, formulas.arrays)["x"]
     references = []
     for place, name in enumerate(formulas.states):
         solved = place in formulas.starts.solved
         more: dict[str, Any] = {} if solved else dict(start=float(starts[place]))
         references.append(
-            builder.add(
+            listed.add(
                 name,
                 "STATE",
                 place,
                 fixed=solved,
                 limited=True,
-                causality=builder.causality(name),
+                causality=listed.causality(name),
                 variability="continuous",
                 initial="calculated" if solved else "exact",
                 **more,
@@ -228,115 +224,75 @@ def _states(builder: _Builder) -> None:
         )
     for place, name in enumerate(formulas.states):
         rate = f"der({name})"
-        own = rate not in builder.places_of  # else a state of that name is shown
-        builder.rates.append(
-            builder.add(
+        own = rate not in listed.places_of  # else a state of that name is shown
+        listed.rates.append(
+            listed.add(
                 rate,
                 "DERIVATIVE",
                 place,
-                causality=builder.causality(rate) if own else "local",
+                causality=listed.causality(rate) if own else "local",
                 variability="continuous",
                 initial="calculated",
-                derivative=builder.variables[references[place]].name,
+                derivative=listed.variables[references[place]].name,
             )
         )
 
 
-def _outputs(builder: _Builder, names: Sequence[str]) -> None:
+def _outputs(listed: _Listed, names: Sequence[str]) -> None:
     """What is computed, shown as output or not."""
-    formulas, dae = builder.formulas, builder.dae
+    formulas, dae = listed.formulas, listed.dae
     for place, name in enumerate(formulas.held):
         more: dict[str, Any] = dict(
-            causality=builder.causality(name), variability="discrete", initial="calculated"
+            causality=listed.causality(name), variability="discrete", initial="calculated"
         )
-        builder.add(name, "HELD", len(formulas.inputs) + place, **more)
+        listed.add(name, "HELD", len(formulas.inputs) + place, **more)
     for name in names:
-        if name in builder.places_of:
+        if name in listed.places_of:
             continue
         expression = dae.expression(name)
         if expression.is_constant():
-            _constant(builder, name, float(expression), builder.causality(name))
+            _constant(listed, name, float(expression), listed.causality(name))
             continue
         leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
         held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
         variability = "discrete" if held else "continuous"
-        more = dict(causality=builder.causality(name), variability=variability, initial="calculated")
-        builder.add(name, "OUTPUT", builder.places[name], limited=True, **more)
-        builder.places_of[name] = len(builder.variables) - 1
+        more = dict(causality=listed.causality(name), variability=variability, initial="calculated")
+        listed.add(name, "OUTPUT", listed.places[name], limited=True, **more)
+        listed.places_of[name] = len(listed.variables) - 1
 
 
-def _frictions(builder: _Builder) -> tuple[str, ...]:
+def _frictions(listed: _Listed) -> tuple[str, ...]:
     """Mode and event indicator of each friction with exact stick-slip; names of the indicators."""
     indicators = []
-    for place, name in enumerate(builder.formulas.frictions):
+    for place, name in enumerate(listed.formulas.frictions):
         owner = name.rpartition(".")[0]
         prefix = f"{owner}." if owner else ""
         words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
         more: dict[str, Any] = dict(
             causality="local", variability="discrete", initial="calculated", type="Int32"
         )
-        builder.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
+        listed.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
         more = dict(causality="local", variability="continuous", initial="calculated")
-        reference = builder.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
-        indicators.append(builder.variables[reference].name)
+        reference = listed.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        indicators.append(listed.variables[reference].name)
     return tuple(indicators)
 
 
-def _terminals(builder: _Builder) -> tuple[FmuTerminal, ...]:
+def _terminals(listed: _Listed) -> tuple[FmuTerminal, ...]:
     """Components that have inputs, each with its own inputs and outputs by their names there."""
     found: dict[str, dict[str, str]] = {}
-    owners = {n.rpartition(".")[0] for n in builder.formulas.inputs if not n.startswith("der(")}
-    for variable in builder.variables:
+    owners = {n.rpartition(".")[0] for n in listed.formulas.inputs if not n.startswith("der(")}
+    for variable in listed.variables:
         owner, _, member = variable.name.rpartition(".")
         if owner in owners and owner and variable.causality in ("input", "output"):
             found.setdefault(owner, {})[member] = variable.name
     return tuple(FmuTerminal(owner, members) for owner, members in found.items())
 
 
-class Dependencies:
-    """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
-
-    rates, outputs, samples: boolean rows over (time, states, inputs, parameters).
-    """
-
-    def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
-        arrays = formulas.arrays
-        held, inputs = len(formulas.held), len(formulas.inputs)
-        sizes = [1, arrays["x"].numel(), inputs + held, arrays["p"].numel()]
-        z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
-        place = 0
-        for block in formulas.blocks:
-            z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
-            place += len(block.names)
-        own = slice(1 + sizes[1] + inputs, 1 + sizes[1] + inputs + held)
-        samples = self._rows(formulas, formulas.samples, z)
-        for _ in range(held):  # what is held may depend on what is held
-            samples |= samples[:, own] @ samples
-        known = np.eye(sum(sizes), dtype=bool)
-        known[own] = samples
-        shown = np.delete(np.arange(sum(sizes)), own)
-        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, shown]
-        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, shown]
-        self.samples = samples[:, shown]
-
-    @staticmethod
-    def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
-        """Dependence of a vector on (t, x, u, p), directly and through z."""
-        arrays = formulas.arrays
-        function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
-        places = [list(arrays).index(n) for n in "txupz"]
-        patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
-        *direct, through = [
-            found.reshape(expression.numel(), arrays[n].numel())
-            for n, found in zip("txupz", patterns, strict=True)
-        ]
-        return np.hstack(direct) | through @ z
-
-
-def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
+def _row(listed: _Listed, depends: Dependencies, name: str) -> np.ndarray:
     """What an output depends on."""
-    formulas, entry = builder.formulas, builder.entries[builder.places_of[name]]
+    formulas, entry = listed.formulas, listed.entries[listed.places_of[name]]
     if entry.kind == "OUTPUT":
         return depends.outputs[entry.index]
     if entry.kind == "DERIVATIVE":
@@ -350,18 +306,18 @@ def _row(builder: _Builder, depends: Dependencies, name: str) -> np.ndarray:
 
 
 def _structure(
-    builder: _Builder, depends: Dependencies, outputs: Sequence[str], indicators: tuple[str, ...]
+    listed: _Listed, depends: Dependencies, outputs: Sequence[str], indicators: tuple[str, ...]
 ) -> ModelStructure:
     """Outputs, derivatives and initial unknowns, each with what it depends on."""
-    formulas, found, variables = builder.formulas, builder.places_of, builder.variables
+    formulas, found, variables = listed.formulas, listed.places_of, listed.variables
     count = 1 + len(formulas.states) + len(formulas.inputs)
     names = ("time", *formulas.states, *formulas.inputs, *formulas.parameters)
     references = np.array([found[n] for n in names], dtype=int)
     solved = {formulas.states[k] for k in formulas.starts.solved}
     first = np.array([n not in solved for n in names], dtype=bool)
     shown = [n for n in outputs if variables[found[n]].causality == "output"]
-    rows = {found[n]: _row(builder, depends, n) for n in shown}
-    rates = dict(zip(builder.rates, depends.rates, strict=True))
+    by_output = {found[n]: _row(listed, depends, n) for n in shown}
+    rates = dict(zip(listed.rates, depends.rates, strict=True))
 
     def unknown(reference: int, chosen: np.ndarray) -> Unknown:
         known = sorted(references[np.flatnonzero(chosen)].tolist())
@@ -372,12 +328,12 @@ def _structure(
 
     # what initial equations determine depends on all that they may hold
     at_start = {
-        r: (row | first) if (row & ~first).any() else row & first for r, row in {**rows, **rates}.items()
+        r: (row | first) if (row & ~first).any() else row & first for r, row in {**by_output, **rates}.items()
     }
     at_start |= {found[n]: first for n in solved}
     calculated = [r for r in at_start if variables[r].initial == "calculated"]
     return ModelStructure(
-        outputs=tuple(unknown(r, limited(row)) for r, row in rows.items()),
+        outputs=tuple(unknown(r, limited(row)) for r, row in by_output.items()),
         derivatives=tuple(unknown(r, limited(row)) for r, row in rates.items()),
         initial_unknowns=tuple(unknown(r, at_start[r] & first) for r in sorted(calculated)),
         indicators=indicators,

@@ -27,7 +27,7 @@ Node = tuple  # ("INPUT", array, index), ("CONST", value) or (operation, node nu
 
 
 @dataclass(eq=False)
-class Graph:
+class ExpressionGraph:
     """Nodes by number; `slow`: names of the arrays that rarely change, whose expressions are hoisted."""
 
     arrays: Sequence[str]

@@ -72,8 +72,9 @@ class Formulas:
 
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
-    """The formulas of a translated model; outputs: scalar names of what is wanted."""
+    """The formulas of a translated model; outputs: scalar names of what can be read of it, states and all."""
     system = dae.system()
+    outputs = _evaluated(dae, outputs)
     flat = dae.flat
     sampled, frictions = flat.sampled, flat.frictions
     wanted = system.resolve([dae.expression(n) for n in outputs]) if outputs else []
@@ -123,6 +124,14 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
         starts=starts,
         parameters=system.parameters,
     )
+
+
+def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
+    """What needs an output function: outputs that are no states, and parameters that follow from others."""
+    direct = {*dae.states, *(f"der({n})" for n in dae.states), *(s.name for s in dae.flat.sampled)}
+    dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
+    varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
+    return [*dependent, *varying]
 
 
 def _symbol(system: System, name: str) -> ca.SX:

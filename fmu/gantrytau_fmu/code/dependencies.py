@@ -1,0 +1,49 @@
+"""On what the rates and outputs of an FMU depend."""
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from gantrytau_fmu.code.arrays import column
+from gantrytau_fmu.code.formulas import Formulas
+
+
+class Dependencies:
+    """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
+
+    rates, outputs, samples: boolean rows over (time, states, inputs, parameters).
+    """
+
+    def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
+        arrays = formulas.arrays
+        held, inputs = len(formulas.held), len(formulas.inputs)
+        sizes = [1, arrays["x"].numel(), inputs + held, arrays["p"].numel()]
+        z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
+        place = 0
+        for block in formulas.blocks:
+            z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
+            place += len(block.names)
+        own = slice(1 + sizes[1] + inputs, 1 + sizes[1] + inputs + held)
+        samples = self._rows(formulas, formulas.samples, z)
+        for _ in range(held):  # what is held may depend on what is held
+            samples |= samples[:, own] @ samples
+        known = np.eye(sum(sizes), dtype=bool)
+        known[own] = samples
+        shown = np.delete(np.arange(sum(sizes)), own)
+        self.rates = (self._rows(formulas, formulas.rates, z) @ known)[:, shown]
+        self.outputs = (self._rows(formulas, column(wanted), z) @ known)[:, shown]
+        self.samples = samples[:, shown]
+
+    @staticmethod
+    def _rows(formulas: Formulas, expression: ca.SX, z: np.ndarray) -> np.ndarray:
+        """Dependence of a vector on (t, x, u, p), directly and through z."""
+        arrays = formulas.arrays
+        function = ca.Function("f", list(arrays.values()), [ca.densify(expression)])
+        places = [list(arrays).index(n) for n in "txupz"]
+        patterns = [np.array(ca.DM(function.jac_sparsity(0, k), 1).full(), dtype=bool) for k in places]
+        *direct, through = [
+            found.reshape(expression.numel(), arrays[n].numel())
+            for n, found in zip("txupz", patterns, strict=True)
+        ]
+        return np.hstack(direct) | through @ z

@@ -1,0 +1,80 @@
+"""All formulas of an FMU in one graph, by the C functions that they become."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau_fmu.code.arrays import column
+from gantrytau_fmu.code.expressions import ExpressionGraph
+from gantrytau_fmu.code.formulas import Formulas
+
+SEEDS = ("dt", "dx", "du", "dz", "dp")
+ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelGraph:
+    """The graph, and its nodes that are the results of each function.
+
+    outputs: the expressions that differ; places: name of an output -> place among them.
+    """
+
+    formulas: Formulas
+    graph: ExpressionGraph
+    roots: Mapping[str, list[int]]
+    outputs: tuple[ca.SX, ...]
+    places: Mapping[str, int]
+
+
+def entered(formulas: Formulas) -> ModelGraph:
+    """The graph of a model, whole: no function is added to it later."""
+    graph = ExpressionGraph(ARRAYS)
+    symbols = {**formulas.arrays, **{s: ca.SX.sym(s, formulas.arrays[s[1]].numel()) for s in SEEDS}}
+    found = graph.enter("outputs", symbols, column(list(formulas.outputs.values())))
+    first: dict[int, ca.SX] = {}
+    for expression, root in zip(formulas.outputs.values(), found, strict=True):
+        first.setdefault(root, expression)
+    place = {root: k for k, root in enumerate(first)}
+    outputs = tuple(first.values())
+    places = {name: place[root] for name, root in zip(formulas.outputs, found, strict=True)}
+    functions = _functions(formulas, symbols, column(outputs))
+    roots = {name: graph.enter(name, symbols, expression) for name, expression in functions.items()}
+    solving = [name for name in functions if name == "gt_rates" or name.startswith("gt_residual_")]
+    roots["gt_pivots"] = graph.divisors(root for name in solving for root in roots[name])
+    graph.hoist(root for found in roots.values() for root in found)
+    return ModelGraph(formulas, graph, roots, outputs, places)
+
+
+def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dict[str, ca.SX]:
+    """The results of the C functions by their names."""
+    point = ca.vertcat(s["t"], s["x"], s["u"], s["z"])
+    way = ca.vertcat(s["dt"], s["dx"], s["du"], s["dz"])
+    everything = column([formulas.rates, formulas.residuals, wanted])
+    named = {
+        "gt_rates": formulas.rates,
+        "gt_outputs": wanted,
+        "gt_starts": formulas.starts.values,
+        "gt_initial": formulas.starts.equations,
+        "gt_friction": formulas.friction,
+        "gt_roots": column(list(formulas.roots.values())),
+        "gt_periods": formulas.periods,
+        "gt_samples": formulas.samples,
+        "gt_forward": _along(everything, point, way),
+        "gt_by_parameters": _along(everything, s["p"], s["dp"]),
+        "gt_initial_slopes": _along(
+            formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])
+        ),
+    }
+    for k, block in enumerate(formulas.blocks):
+        named[f"gt_residual_{k}"] = block.residual
+        named[f"gt_jacobian_{k}"] = ca.vec(ca.densify(ca.jacobian(block.residual, block.unknowns)))
+    return named
+
+
+def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:
+    return (
+        ca.jtimes(expression, point, way)
+        if expression.numel() and point.numel()
+        else ca.SX.zeros(*expression.shape)
+    )
