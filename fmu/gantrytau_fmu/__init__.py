@@ -5,6 +5,6 @@ from gantrytau_fmu.export import export_fmu
 from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.systems.cosimulate import cosimulate
-from gantrytau_fmu.systems.ssp_writing import write_ssp
+from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 
 __all__ = ["Experiment", "check_fmu", "cosimulate", "export_fmu", "read_fmu", "write_ssp"]

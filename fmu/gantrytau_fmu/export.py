@@ -13,7 +13,7 @@ from typing import Literal
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
-from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries
+from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
 from gantrytau_fmu.code.formulas import Formulas, formulas_of
@@ -21,8 +21,8 @@ from gantrytau_fmu.code.model_code import model_code
 from gantrytau_fmu.code.model_graph import entered
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
+from gantrytau_fmu.describing.model_description import COMPILED, build_description, model_description
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.describing.xml_description import COMPILED, build_description, model_description
 from gantrytau_fmu.description import AboutFmu, Experiment, FmuDescription, FmuInterface, Interfaces
 
 SOLVERS = ("dopri5", "rodas4")

@@ -8,7 +8,7 @@ from typing import Any
 from fmpy.model_description import read_model_description
 
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
-from gantrytau_fmu.describing.xml_description import build_description, model_description
+from gantrytau_fmu.describing.model_description import build_description, model_description
 from gantrytau_fmu.description import (
     Experiment,
     FmuDescription,

@@ -1,6 +1,6 @@
 """The attributes of a variable that both versions write alike."""
 
-from gantrytau_fmu.describing.interface_checks import initial_of, limit
+from gantrytau_fmu.describing.description_checks import initial_of, limit
 from gantrytau_fmu.describing.xml_text import Attribute
 from gantrytau_fmu.description import FmuVariable
 

@@ -22,7 +22,7 @@ from gantrytau_fmu.description import (
     Unknown,
     Value,
 )
-from gantrytau_fmu.reading.described import FmuFile
+from gantrytau_fmu.reading.fmu_file import FmuFile
 from gantrytau_fmu.reading.libraries import HEAD, platforms_of
 from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive
 

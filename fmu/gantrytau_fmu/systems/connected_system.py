@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.units import BASE, dimension
-from gantrytau_fmu.systems.components import Component, Scalar, numeric
+from gantrytau_fmu.systems.component import Component, Scalar, numeric
 
 SHOWN, FEW = 6, 5  # names that a message lists, and with their values
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI

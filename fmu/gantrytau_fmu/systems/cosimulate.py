@@ -13,8 +13,7 @@ import numpy as np
 from gantrytau.errors import ModelError, SolveError, did_you_mean
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
-from gantrytau_fmu.systems.beginnings import initialize
-from gantrytau_fmu.systems.components import Component, numeric, read_component
+from gantrytau_fmu.systems.component import Component, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (
     Connection,
     System,
@@ -23,11 +22,12 @@ from gantrytau_fmu.systems.connected_system import (
     unconnected,
     warn_of,
 )
+from gantrytau_fmu.systems.initialize import initialize
 from gantrytau_fmu.systems.isolation import Isolated
-from gantrytau_fmu.systems.masters import Grid, Master, Order, Part, make_grid, paces_of
+from gantrytau_fmu.systems.master import Grid, Master, Order, Part, make_grid, paces_of
 from gantrytau_fmu.systems.recorder import Recorder
-from gantrytau_fmu.systems.slaves import Slave
-from gantrytau_fmu.systems.ssp import Structure, matching, read_ssp
+from gantrytau_fmu.systems.slave import Slave
+from gantrytau_fmu.systems.ssp.read_ssp import Structure, matching, read_ssp
 from gantrytau_fmu.systems.step_order import sequence_of
 
 FileName = str | os.PathLike[str]
@@ -63,7 +63,7 @@ def cosimulate(
     stop, step, begin: s; if the step does not divide the span, the last one is shorter.
     start: name -> value of parameters, inputs and states before initialisation.
     order: "gauss-seidel": one after the other, sampled components first, those with direct feedthrough last (see
-        systems/ordering.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps are
+        step_order.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps are
         repeated from saved states until every input is the mean of the output that drives it at both ends of the step,
         within `agreement` (relative), in at most `iterations`; of second order, where no component samples.
     inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))

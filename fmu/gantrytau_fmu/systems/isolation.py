@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Any, BinaryIO
 
 from gantrytau.errors import GantryTauError, InitializationError, SolveError
-from gantrytau_fmu.systems.components import Component
+from gantrytau_fmu.systems.component import Component
 
 _START = "import sys; sys.path[:] = {path!r}; from gantrytau_fmu.systems.isolation import serve; serve()"
 _LENGTH = struct.Struct("<Q")
@@ -153,7 +153,7 @@ def serve() -> None:
             call, arguments = _read(source)
             try:
                 if call == "Slave":
-                    from gantrytau_fmu.systems.slaves import Slave
+                    from gantrytau_fmu.systems.slave import Slave
 
                     slave, value = Slave(*arguments), None
                 else:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gantrytau.results.result import Result
 from gantrytau_fmu.systems.connected_system import Drive, Link, Place, System
-from gantrytau_fmu.systems.masters import Grid, Master
+from gantrytau_fmu.systems.master import Grid, Master
 
 ROWS = 1024  # made room for at first; then always twice as many
 

@@ -30,7 +30,7 @@ def check(
     notes alone give 0.
     """
     from gantrytau_fmu.reading.check_fmu import check_fmu
-    from gantrytau_fmu.systems.overview import check_system
+    from gantrytau_fmu.systems.ssp.system_description import check_system
 
     with reporting(json):
         present(file)

@@ -42,7 +42,7 @@ def info(
 def _read(file: Path) -> Any:
     """The description of an FMU, or of a system."""
     if is_system(file):
-        from gantrytau_fmu.systems.overview import read_system
+        from gantrytau_fmu.systems.ssp.system_description import read_system
 
         return read_system(file)
     from gantrytau_fmu.reading.read_fmu import read_fmu

@@ -166,7 +166,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
     if not is_system(file):
-        from gantrytau_fmu.systems.single import run_fmu
+        from gantrytau_fmu.systems.run_fmu import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
     from gantrytau_fmu.systems.cosimulate import cosimulate

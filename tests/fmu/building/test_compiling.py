@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 
 from gantrytau import GantryTauError, ModelError
-from gantrytau_fmu.building import compiling
-from gantrytau_fmu.building.compiling import NoCompiler, compile_libraries, compile_library, compiler
+from gantrytau_fmu.building.compile_libraries import NoCompiler, _lasting_cache, compile_libraries, compiler
 from gantrytau_fmu.building.platforms import PLATFORMS, Platform, chosen, native
 from tests.fmu.building.binaries import exports, glibc_versions, imported_libraries, install_name
 
@@ -50,6 +49,12 @@ def no_path(monkeypatch, tmp_path):
     monkeypatch.delenv("CC", raising=False)
 
 
+def library(sources: dict[str, str], platform: Platform | None = None, **options) -> bytes:
+    """The library for one platform, by default this one."""
+    wanted = platform or native()
+    return compile_libraries(sources, (wanted,), identifier="small", **options)[wanted]
+
+
 def fake_compiler(folder: Path, script: str) -> str:
     """A program that takes the place of a compiler."""
     if os.name != "posix":
@@ -63,7 +68,7 @@ def fake_compiler(folder: Path, script: str) -> str:
 @pytest.fixture(scope="module")
 def here() -> bytes:
     try:
-        return compile_library(SOURCES, platform=native(), identifier="small", optimisation="-O1")
+        return library(SOURCES, optimisation="-O1")
     except NoCompiler:
         pytest.skip("no C compiler")
 
@@ -92,14 +97,14 @@ def test_only_what_is_marked_is_exported(here):
 
 
 def test_the_same_sources_give_the_same_bytes(here):
-    again = compile_library(SOURCES, platform=native(), identifier="small", optimisation="-O1")
+    again = library(SOURCES, optimisation="-O1")
     assert again == here
 
 
 def test_nothing_is_left_after_success_or_failure(temporary_files, here):
-    compile_library(SOURCES, platform=native(), identifier="small", optimisation="-O0")
+    library(SOURCES, optimisation="-O0")
     with pytest.raises(ModelError):
-        compile_library({"fmu.c": "nonsense"}, platform=native(), identifier="small")
+        library({"fmu.c": "nonsense"})
     assert list(temporary_files.iterdir()) == []
 
 
@@ -108,7 +113,7 @@ def test_an_error_in_the_sources_is_shown(here):
     with pytest.raises(
         ModelError, match=r"(?s)small: compiling for .*ended with code 1, expected a lib"
     ) as found:
-        compile_library(wrong, platform=native(), identifier="small")
+        library(wrong)
     assert "inner.h:2" in str(found.value)
     assert "first a warning" not in str(found.value)
     assert "the variable CC names another one" in str(found.value)
@@ -118,7 +123,7 @@ def test_a_symbol_that_exists_nowhere_is_an_error_now_and_not_when_loading(here)
     unit = SOURCES["fmu.c"].replace("double hidden", "double gone(double);\ndouble hidden")
     missing = SOURCES | {"fmu.c": unit.replace("half(x)", "gone(x)")}
     with pytest.raises(ModelError, match="gone"):
-        compile_library(missing, platform=native(), identifier="small")
+        library(missing)
 
 
 def test_without_a_compiler_it_is_said(no_path, monkeypatch):
@@ -126,7 +131,7 @@ def test_without_a_compiler_it_is_said(no_path, monkeypatch):
     with pytest.raises(
         NoCompiler, match=r"no C compiler found, expected cc, gcc or clang .*gantrytau\[cross\]"
     ):
-        compile_library(SOURCES, platform=native(), identifier="small")
+        library(SOURCES)
     assert issubclass(NoCompiler, GantryTauError)
     assert not issubclass(NoCompiler, ModelError)  # so that an export can go on without binaries
 
@@ -142,16 +147,16 @@ def test_the_variable_names_the_compiler(monkeypatch):
 def test_other_platforms_need_ziglang(monkeypatch):
     monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(ModelError, match=r"aarch64-windows: found no package ziglang.*'gantrytau\[cross\]'"):
-        compile_library(SOURCES, platform=PLATFORMS["aarch64-windows"], identifier="small")
+        library(SOURCES, PLATFORMS["aarch64-windows"])
 
 
 def test_a_compiler_that_is_killed_or_writes_nothing_is_an_error(monkeypatch, tmp_path):
     monkeypatch.setenv("CC", fake_compiler(tmp_path, "kill -9 $$"))
     with pytest.raises(ModelError, match=r"ended with signal 9 \(out of memory\?\)"):
-        compile_library(SOURCES, platform=native(), identifier="small")
+        library(SOURCES)
     monkeypatch.setenv("CC", fake_compiler(tmp_path, "exit 0"))
     with pytest.raises(ModelError, match="ended with code 0, expected a library: it said nothing"):
-        compile_library(SOURCES, platform=native(), identifier="small")
+        library(SOURCES)
 
 
 def test_a_compiler_that_cannot_start_is_an_error(monkeypatch, tmp_path):
@@ -161,7 +166,7 @@ def test_a_compiler_that_cannot_start_is_an_error(monkeypatch, tmp_path):
     with pytest.raises(
         ModelError, match=r"small: cannot be compiled .*the variables CC and TMPDIR name others"
     ):
-        compile_library(SOURCES, platform=native(), identifier="small")
+        library(SOURCES)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals to oneself are POSIX")
@@ -173,7 +178,7 @@ def test_an_interruption_stops_the_compiler_and_cleans_up(monkeypatch, tmp_path,
     monkeypatch.setenv("CC", program)
     threading.Thread(target=_interrupt_once_written, args=(written,)).start()
     with pytest.raises(KeyboardInterrupt):
-        compile_library(SOURCES, platform=native(), identifier="small")
+        library(SOURCES)
     assert not any(alive(int(process)) for process in written.read_text().split())
     assert list(temporary_files.iterdir()) == []
 
@@ -201,7 +206,7 @@ def alive(process: int) -> bool:
 def test_the_first_failure_stops_the_others(monkeypatch, tmp_path):
     """One compiler fails at once, the other would take a minute."""
     failing = fake_compiler(tmp_path, 'case "$*" in *slow*) sleep 60;; *) echo "error: no"; exit 3;; esac')
-    monkeypatch.setattr(compiling, "compiler", lambda platform: [failing])
+    monkeypatch.setattr("gantrytau_fmu.building.compile_libraries.compiler", lambda platform: [failing])
     platforms = [Platform(name, "", ".so", name) for name in ("slow-linux", "quick-linux")]
     begin = time.monotonic()
     with pytest.raises(ModelError, match=r"quick-linux.*ended with code 3"):
@@ -213,10 +218,10 @@ def test_zig_keeps_its_libraries_where_it_may_write(monkeypatch, tmp_path):
     monkeypatch.delenv("ZIG_GLOBAL_CACHE_DIR", raising=False)
     variable = "LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME"
     monkeypatch.setenv(variable, str(tmp_path / "cache"))
-    assert compiling._lasting_cache() == tmp_path / "cache" / "zig"
+    assert _lasting_cache() == tmp_path / "cache" / "zig"
     (tmp_path / "file").touch()
     monkeypatch.setenv(variable, str(tmp_path / "file"))  # nothing can be created below a file
-    assert compiling._lasting_cache() is None
+    assert _lasting_cache() is None
 
 
 @pytest.fixture(scope="module")

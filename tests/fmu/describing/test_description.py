@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.describing.interface_checks import initial_of
-from gantrytau_fmu.describing.xml_description import LOG_CATEGORIES, build_description, model_description
+from gantrytau_fmu.describing.description_checks import initial_of
+from gantrytau_fmu.describing.model_description import LOG_CATEGORIES, build_description, model_description
 from gantrytau_fmu.describing.xml_text import plain
 from gantrytau_fmu.description import Experiment, FmuDescription, FmuTerminal, FmuVariable, Unknown
 from tests.fmu.interfaces import DESCRIPTIONS, VERSIONS, description, fmu, gain, oscillator, read, relay, said

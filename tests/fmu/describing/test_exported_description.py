@@ -12,7 +12,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
 from gantrytau.errors import ModelError
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.describing.xml_description import model_description
+from gantrytau_fmu.describing.model_description import model_description
 from gantrytau_fmu.description import Experiment, FmuDescription
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_models import Pendulum

@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from gantrytau import ModelError
 from gantrytau.commands.app import app
-from gantrytau_fmu.systems.overview import check_system, read_system
-from gantrytau_fmu.systems.ssp import STRUCTURE
-from gantrytau_fmu.systems.ssp_writing import write_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import STRUCTURE
+from gantrytau_fmu.systems.ssp.system_description import check_system, read_system
+from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 from tests.fmu.systems.small_fmus import Builder, variable
 
 FAULT, MISUSE = 1, 2

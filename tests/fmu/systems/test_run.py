@@ -13,8 +13,8 @@ from gantrytau import Model, ModelError, Output, Parameter, Real, SolveError, de
 from gantrytau.commands.app import app
 from gantrytau.progress import Progress
 from gantrytau_fmu import export_fmu
-from gantrytau_fmu.systems.single import run_fmu
-from gantrytau_fmu.systems.ssp_writing import write_ssp
+from gantrytau_fmu.systems.run_fmu import run_fmu
+from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 from tests.fmu.systems.small_fmus import Builder, variable
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
@@ -197,7 +197,7 @@ def test_an_interrupted_integration_saves_what_there_is(swing, tmp_path, monkeyp
     whole = run(swing, "--me", "--stop", 1, "--step", 0.1, "--output", table)
     assert whole.exit_code == 0, whole.output
     assert len(table.read_text().splitlines()) == 12
-    monkeypatch.setattr("gantrytau_fmu.systems.exchange.Progress", Pressing)
+    monkeypatch.setattr("gantrytau_fmu.systems.model_exchange.Progress", Pressing)
     found = run(swing, "--me", "--stop", 1, "--step", 0.1, "--output", table, "--json")
     assert found.exit_code == INTERRUPTED, found.output
     said = json.loads(found.stdout)
@@ -216,7 +216,7 @@ def test_an_integration_that_fails_keeps_what_there_is(swing, monkeypatch):
             if t > 0.45:
                 raise RuntimeError("the integrator gave up")
 
-    monkeypatch.setattr("gantrytau_fmu.systems.exchange.Progress", Failing)
+    monkeypatch.setattr("gantrytau_fmu.systems.model_exchange.Progress", Failing)
     with pytest.raises(
         SolveError,
         match=r"swing\.fmu: the integration failed after t = 0\.\d+ s: the integrator gave up; try",

@@ -7,8 +7,8 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_fmu.systems.cosimulate import cosimulate
-from gantrytau_fmu.systems.ssp import STRUCTURE
-from gantrytau_fmu.systems.ssp_writing import write_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import STRUCTURE
+from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 from tests.fmu.systems.small_fmus import Builder, variable
 
 SPACES = "http://ssp-standard.org/SSP1/SystemStructure"

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 from gantrytau.errors import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.components import Component, Scalar, numeric, read_component
+from gantrytau_fmu.systems.component import Component, Scalar, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (
     KILOGRAM_FIRST,
     Connection,
@@ -20,7 +20,7 @@ from gantrytau_fmu.systems.connected_system import (
     build_system,
     unit_of,
 )
-from gantrytau_fmu.systems.ssp import FMU_TYPE, STEP, STRUCTURE
+from gantrytau_fmu.systems.ssp.read_ssp import FMU_TYPE, STEP, STRUCTURE
 
 SPACES = "http://ssp-standard.org/SSP1/SystemStructure"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that zip knows: equal systems give equal files

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau.errors import InitializationError, SolveError
-from gantrytau_fmu.systems.masters import Master
+from gantrytau_fmu.systems.master import Master
 
 AGREEMENT = 1e-10  # relative to the largest of both values, and to one unit near zero
 PERTURBATION = 1e-6  # relative; the error of a difference is near that of its rounding, 1e-10

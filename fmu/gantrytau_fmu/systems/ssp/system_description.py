@@ -9,12 +9,12 @@ from typing import Any
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, Finding, check_fmu
-from gantrytau_fmu.reading.described import SHOWN
+from gantrytau_fmu.reading.fmu_file import SHOWN
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.components import Component, read_component
+from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import System, build_system, unconnected
-from gantrytau_fmu.systems.ssp import Structure, matching, read_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import Structure, matching, read_ssp
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,6 @@ class NoCompiler(GantryTauError):
     """This machine has no C compiler for the platform "native"."""
 
 
-def compile_library(
-    sources: Mapping[str, str], *, platform: Platform, identifier: str, optimisation: str = "-O2"
-) -> bytes:
-    """The shared library for one platform; see `compile_libraries`."""
-    return compile_libraries(sources, (platform,), identifier=identifier, optimisation=optimisation)[platform]
-
-
 def compile_libraries(
     sources: Mapping[str, str], platforms: Sequence[Platform], *, identifier: str, optimisation: str = "-O2"
 ) -> dict[Platform, bytes]:

@@ -11,11 +11,11 @@ from typing import Any
 from gantrytau.errors import GantryTauError, ModelError, SolveError
 from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.components import read_component
+from gantrytau_fmu.systems.component import read_component
 from gantrytau_fmu.systems.connected_system import build_system, unconnected, warn_of
 from gantrytau_fmu.systems.cosimulate import check_times, cosimulate
-from gantrytau_fmu.systems.exchange import integrate
-from gantrytau_fmu.systems.masters import make_grid
+from gantrytau_fmu.systems.master import make_grid
+from gantrytau_fmu.systems.model_exchange import integrate
 
 STEPS = 500  # where neither the caller nor the file says a step
 

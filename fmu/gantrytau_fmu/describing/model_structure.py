@@ -8,7 +8,7 @@ from collections.abc import Collection, Set
 from dataclasses import replace
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.describing.interface_checks import initial_of
+from gantrytau_fmu.describing.description_checks import initial_of
 from gantrytau_fmu.description import FmuDescription, ModelStructure, Unknown
 
 KINDS = ("constant", "fixed", "tunable", "discrete")

@@ -10,9 +10,9 @@ from gantrytau.errors import ModelError, SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
-from gantrytau_fmu.systems.components import Component
+from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import System
-from gantrytau_fmu.systems.masters import Grid
+from gantrytau_fmu.systems.master import Grid
 
 
 def integrate(component: Component, system: System, grid: Grid, tolerance: float | None) -> Result:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import InitializationError, ModelError, SolveError
-from gantrytau_fmu.systems.components import Component, Scalar
+from gantrytau_fmu.systems.component import Component, Scalar
 
 LAST = 12  # messages kept of the log
 ERRORS = ("logStatusError", "logStatusFatal", "logStatusWarning")  # categories that FMI predefines

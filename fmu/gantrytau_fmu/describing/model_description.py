@@ -1,17 +1,16 @@
 """The XML files of an FMU that say what it is: modelDescription.xml and sources/buildDescription.xml.
 
-One record, `FmuDescription`, is written for FMI 2.0 or 3.0; what differs between them stands in `description_2` and
-`description_3`.
+One record, `FmuDescription`, is written for FMI 2.0 or 3.0; what differs between them stands in `fmi2_description` and
+`fmi3_description`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
 from pathlib import PurePosixPath
 
-from gantrytau_fmu.describing import fmi2_description as description_2
-from gantrytau_fmu.describing import fmi3_description as description_3
-from gantrytau_fmu.describing.interface_checks import check_description
-from gantrytau_fmu.describing.structure import written_structure
+from gantrytau_fmu.describing import fmi2_description, fmi3_description
+from gantrytau_fmu.describing.description_checks import check_description
+from gantrytau_fmu.describing.model_structure import written_structure
 from gantrytau_fmu.describing.unit_definitions import declared_types, unit_definitions
 from gantrytau_fmu.describing.xml_text import HEAD, Attribute, element, parent
 from gantrytau_fmu.description import FmuDescription
@@ -35,7 +34,7 @@ TAGS = {"model-exchange": "ModelExchange", "co-simulation": "CoSimulation"}
 def model_description(fmu: FmuDescription) -> bytes:
     """modelDescription.xml, UTF-8. Raises ModelError for what no valid FMU can have, as a name that is there twice."""
     check_description(fmu)
-    version = description_2 if fmu.fmi == "2.0" else description_3
+    version = fmi2_description if fmu.fmi == "2.0" else fmi3_description
     types = declared_types(fmu.variables)
     lists = written_structure(fmu)
     reset = set(fmu.states) if fmu.indicators and fmu.has("model-exchange") else set()

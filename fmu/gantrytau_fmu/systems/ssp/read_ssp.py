@@ -15,7 +15,7 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.systems.components import Component
+from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import Connection, locate
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
