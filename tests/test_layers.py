@@ -22,7 +22,7 @@ ORDER = {  # a room imports the rooms before it
     "gantrytau": "errors interruption whole_files progress language flattening compiler results simulation writing "
     "answers dae __init__ kinematics mechanics commands cli",
     "gantrytau_models": "prototypes mechanisms control __init__",
-    "gantrytau_optimica": "problem control transcription solving failures answers refinement prepared optimize "
+    "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "
     "studies estimation paths calibration procedure __init__",
     "gantrytau_optimica.calibration": "data rods fitting judging calibration calibrate design devices surveys report",
     "gantrytau_fmu": "description code describing building reading export systems __init__",

@@ -23,8 +23,9 @@ from gantrytau_optimica.calibration.surveys.orientation_errors import orientatio
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
-from gantrytau_optimica.optimize import Prepared, optimize, prepare
+from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.problem.optimization import (
     Free,
     Optimization,

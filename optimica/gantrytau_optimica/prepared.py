@@ -16,6 +16,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumbe
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
+from gantrytau_optimica.policy import Guesses
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import searched
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
@@ -26,7 +27,6 @@ from gantrytau_optimica.transcription.point_functions import places_of_points, s
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-Guesses = Mapping[str, Any] | Result | Answer
 FEW = 30  # elements, from which on first guesses are tried on half as many
 STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh if its branch was lost
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
@@ -86,8 +86,8 @@ class Prepared:
         optimum = self._best(built, program, first, self.near if guess is None else solution_given(guess))
         if self.refine is None:
             return optimum
-        policy = self.solver.policy
-        again = replace(policy, max_iterations=min(policy.max_iterations, MOST_AGAIN))
+        settings = self.solver.settings
+        again = replace(settings, max_iterations=min(settings.max_iterations, MOST_AGAIN))
 
         def solve(program: Program, first: np.ndarray) -> Optimum:
             """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none."""
@@ -109,9 +109,9 @@ class Prepared:
 
         if self.starts == 1:
             return solved_or_raise(self._alone(built, program, first, near))
-        policy = self.solver.policy
+        settings = self.solver.settings
         coarse = self._coarse(built)
-        solver = Solver(coarse, replace(policy, max_iterations=min(policy.max_iterations, MOST_TRIED)))
+        solver = Solver(coarse, replace(settings, max_iterations=min(settings.max_iterations, MOST_TRIED)))
 
         def solve(problem: ControlProblem) -> Optimum:
             guessed = coarse.with_numbers(
@@ -126,7 +126,7 @@ class Prepared:
             return solved_or_raise(best)
         if coarse.assembled is program.assembled:
             return solved_or_raise(best)
-        close = Solver(program, replace(policy, near=True))
+        close = Solver(program, replace(settings, near=True))
         found: list[Optimum] = []
         for branch in best.search.branches[:MOST_BRANCHES]:
             nearby = warm_start(list(branch.optimum.phases.values()), program)
@@ -140,9 +140,9 @@ class Prepared:
     def _alone(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """From one first guess, on its branch if it is a solution; with ramps, over the answer without if need be."""
         if near:
-            policy = self.solver.policy
-            most = min(policy.max_iterations, MOST_AGAIN)
-            nearby = Solver(program, replace(policy, near=True, max_iterations=most))
+            settings = self.solver.settings
+            most = min(settings.max_iterations, MOST_AGAIN)
+            nearby = Solver(program, replace(settings, near=True, max_iterations=most))
             optimum = self._solved(built, program, nearby, first)
             if optimum.success or optimum.status == "interrupted":
                 return optimum
@@ -153,7 +153,7 @@ class Prepared:
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        solver = Solver(plain, self.solver.policy)
+        solver = Solver(plain, self.solver.settings)
         free = self._solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
             return optimum
@@ -181,7 +181,7 @@ class Prepared:
                 break
             program = _relocated(program, solution.w, confined=number == ROUNDS - 1)
             built = replace(built, problem=program.problem)
-            solution = Solver(program, solver.policy).solve(program, solution.w)
+            solution = Solver(program, solver.settings).solve(program, solution.w)
         if solution.success:
             program.require_points(solution.w)
             if program.astray(solution.w):

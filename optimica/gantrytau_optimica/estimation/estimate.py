@@ -10,7 +10,7 @@ computed for bad guesses of them (Bock, 1983, Recent advances in parameter ident
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 
@@ -30,8 +30,9 @@ from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_
 from gantrytau_optimica.estimation.experiments import Experiment, named
 from gantrytau_optimica.estimation.mesh_shift import mesh_shift
 from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
-from gantrytau_optimica.optimize import Prepared
-from gantrytau_optimica.solving.ipopt import Progress, Solver, SolverSettings
+from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
+from gantrytau_optimica.prepared import Prepared
+from gantrytau_optimica.solving.ipopt import Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
 from gantrytau_optimica.transcription.scheme import Collocation, collocation
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -49,44 +50,40 @@ def estimate(
     parameters: Mapping[str, Any],
     experiments: Experiment | Sequence[Experiment],
     *,
-    elements: int | Sequence[float] = 50,
-    points: int = 3,
-    scheme: str = "radau",
     loss: Literal["squares", "robust"] = "squares",
-    tolerance: float = 1e-8,
-    max_iterations: int = 1000,
-    max_time: float = 300.0,
-    progress: Progress | None = None,
+    **policy: Unpack[MeshKeywords],
 ) -> Estimate:
     """Estimate parameters of a model, and initial values, from experiments.
 
     parameters: name in the model -> Free(guess, min=..., max=...) or a guess, the same in all experiments; limits
-    default to those that the model declares. elements, points, scheme: of the mesh of every experiment; loss: "robust"
-    bounds the influence of stray values (Huber's). tolerance, max_iterations, max_time (s), progress: as for `optimize`.
-    Raises ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError with
-    `.optimum` where no solution is found, or where the data cannot tell parameters apart; its message names them.
+    default to those that the model declares. loss: "robust" bounds the influence of stray values (Huber's). elements,
+    points and scheme ("radau" or "gauss"), of every experiment, tolerance, max_iterations, max_time and progress: as for
+    `optimize`. Raises ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError
+    with `.optimum` where no solution is found, or where the data cannot tell parameters apart; its message names them.
     """
     begin = time.perf_counter()
-    _check(parameters, loss)
+    asked = policy_of("estimate", MeshKeywords, policy)
+    _check(parameters, loss, asked)
     trials = named(experiments)
     known = next(iter(trials[0].measured.values())).weighted
     read = plan(model, parameters, trials, 1.0 if known else _factor(trials))
     _check_amount(read, known)
     built = _built(read)
-    grid = collocation("radau", 1) if read.static else collocation(scheme, points)
-    meshes = [_mesh(read, k, phase, elements) for k, phase in enumerate(built.problem.phases)]
+    grid = collocation("radau", 1) if read.static else asked.collocation
+    meshes = [_mesh(read, k, phase, asked.mesh) for k, phase in enumerate(built.problem.phases)]
     program = transcribe(built.problem, meshes, grid)
     found = residuals(program)
     check_determined(found, _without_start(read))
-    policy = SolverSettings(tolerance, max_iterations, max_time, progress)
-    optimum = Prepared(built, program, Solver(program, policy), {}, time.perf_counter() - begin).solve()
+    optimum = Prepared(built, program, Solver(program, asked.solver), {}, time.perf_counter() - begin).solve()
     weights = np.ones(sum(found.sizes))
     if loss == "robust":
-        optimum, weights = _robust(optimum, found, policy, grid, meshes, known)
+        optimum, weights = _robust(optimum, found, asked.solver, grid, meshes, known)
     return _answer(read, found, optimum, weights, known, loss)
 
 
-def _check(parameters: Any, loss: Any) -> None:
+def _check(parameters: Any, loss: Any, policy: Policy) -> None:
+    if policy.shooting:
+        raise ModelError("estimate: found scheme='shooting', expected 'radau' or 'gauss'", argument="scheme")
     if not isinstance(parameters, Mapping):
         raise ModelError(f"estimate: found parameters={parameters!r}, expected {{name: Free(guess)}}")
     if loss not in ("squares", "robust"):
@@ -146,12 +143,11 @@ def _course(times: np.ndarray, values: np.ndarray):
     return lambda t: np.array([np.interp(t, times, column) for column in values.T])
 
 
-def _mesh(read: Plan, number: int, phase: Phase, elements: Any) -> Mesh:
+def _mesh(read: Plan, number: int, phase: Phase, mesh: Mesh) -> Mesh:
     """Elements of one experiment: borders where inputs jump, and for static models one at every sample."""
     if read.static:
         steps = np.diff(sample_times(read.experiments[number]))
         return mesh_of([steps[0] if steps.size else 1.0, *steps])
-    mesh = mesh_of(elements)
     jumps = [course.jumps for course in phase.courses if course.jumps.size]
     start, final = read.experiments[number].horizon
     return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start)) if jumps else mesh
@@ -172,7 +168,7 @@ def _without_start(read: Plan) -> dict[str, list[str]]:
 def _robust(
     optimum: Optimum,
     found: Residuals,
-    policy: SolverSettings,
+    settings: SolverSettings,
     grid: Collocation,
     meshes: Sequence[Mesh],
     known: bool,
@@ -187,7 +183,7 @@ def _robust(
             break
         problem = _weighted(found.program.problem, weights)
         program = transcribe(problem, meshes, grid)
-        solution = Solver(program, policy).solve(program, optimum.solution.w)
+        solution = Solver(program, settings).solve(program, optimum.solution.w)
         optimum = replace(optimum, program=program, solution=solution)
         if not solution.success:
             raise SolveError(f"{optimum.report()}\nThe robust fit did not settle.", optimum=optimum)

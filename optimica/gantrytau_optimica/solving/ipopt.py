@@ -77,10 +77,10 @@ class SolverSettings:
 class Solver:
     """Ipopt with exact derivatives for one program; may be called again with other numbers and guesses."""
 
-    def __init__(self, program: Program, policy: SolverSettings):
+    def __init__(self, program: Program, settings: SolverSettings):
         assembled = program.assembled
-        self.policy = policy
-        self.watch = Watch(assembled.variables, assembled.rows, policy.progress)
+        self.settings = settings
+        self.watch = Watch(assembled.variables, assembled.rows, settings.progress)
         options = {
             "iteration_callback": self.watch,
             "print_time": False,
@@ -91,12 +91,12 @@ class Solver:
                 "sb": "yes",
                 "mu_strategy": "adaptive",
                 "linear_solver": "mumps",
-                "tol": policy.tolerance,
-                "max_iter": policy.max_iterations,
-                "max_wall_time": policy.max_time,
+                "tol": settings.tolerance,
+                "max_iter": settings.max_iterations,
+                "max_wall_time": settings.max_time,
             },
         }
-        if policy.near:
+        if settings.near:
             options["ipopt"] |= NEAR
         options["ipopt"]["obj_scaling_factor"] = _objective_scale(program)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}

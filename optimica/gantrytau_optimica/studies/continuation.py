@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.optimize import Prepared
+from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.transcription.program import Program
 
 HALVINGS = 3  # of a step that fails: at most eight steps to the next value

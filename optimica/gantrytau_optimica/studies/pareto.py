@@ -1,15 +1,16 @@
 """`pareto`: a problem solved along a weight, each time from the answer before."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Unpack
 
 import numpy as np
 
 from gantrytau import ModelError, SolveError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.optimize import Guesses, Prepared, Problem, prepare
-from gantrytau_optimica.solving.ipopt import Progress
+from gantrytau_optimica.optimize import Problem, prepare_with
+from gantrytau_optimica.policy import TranscriptionKeywords, policy_of
+from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.studies.continuation import Continuation, follow
 from gantrytau_optimica.studies.trade_off import TradeOff
 
@@ -23,40 +24,18 @@ def pareto(
     values: Sequence[float],
     *,
     along: Sequence[str] | Mapping[str, str | Quantity] | None = None,
-    elements: int | Sequence[float] = 50,
-    points: int = 3,
-    scheme: str = "radau",
-    lengths: Literal["given", "free"] = "given",
-    guess: Guesses | None = None,
-    controls: Mapping[str, Any] | None = None,
-    tolerance: float = 1e-8,
-    max_iterations: int = 1000,
-    max_time: float = 300.0,
-    progress: Progress | None = None,
+    **policy: Unpack[TranscriptionKeywords],
 ) -> TradeOff:
     """Solve a problem for several values of a weight, each from the one before; it is built once.
 
     weight: a scalar Parameter; along: what to record, all to be small: a free number, "final_time", "objective",
     "integral(x)", "final(x)", or {label: one of these or a function of an Optimum}; default: the two parts of the
-    objective, "unweighed" and "weighed" (objective = unweighed + weight * weighed). Other keywords: see `optimize`.
-    A value that is not reached is approached by smaller steps; if that fails too, it is told in `.failures`. Raises
-    ModelError for what is written wrongly, SolveError if no value is solved.
+    objective, "unweighed" and "weighed" (objective = unweighed + weight * weighed). Other keywords: those of `optimize`,
+    but `refine`, `starts` and `record`. A value that is not reached is approached by smaller steps; if that fails too,
+    it is told in `.failures`. Raises ModelError for what is written wrongly, SolveError if no value is solved.
     """
     numbers = _numbers(weight, values)
-    prepared = prepare(
-        problem,
-        parameters=[weight],
-        elements=elements,
-        points=points,
-        scheme=scheme,
-        lengths=lengths,
-        guess=guess,
-        controls=controls,
-        tolerance=tolerance,
-        max_iterations=max_iterations,
-        max_time=max_time,
-        progress=progress,
-    )
+    prepared = prepare_with(problem, [weight], policy_of("pareto", TranscriptionKeywords, policy))
     _check_weight(prepared, weight)
     asked, units = _quantities(prepared, weight, along)
     course = follow(prepared, weight, numbers)
