@@ -37,8 +37,7 @@ from gantrytau_optimica.problem.optimization import (
     sum_of_squares,
 )
 from gantrytau_optimica.problem.samples import Samples
-from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
-from gantrytau_optimica.procedure.documents.files import load_plan
+from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, load_plan
 from gantrytau_optimica.procedure.plan_calibration import plan_calibration
 from gantrytau_optimica.studies.pareto import pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities

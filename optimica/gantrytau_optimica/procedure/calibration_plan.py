@@ -1,93 +1,25 @@
-"""What the procedure plans: poses in a safe order, what to expect of their calibration, and files for who carries it out."""
+"""A plan for who carries it out: the robot program, files, and the poses that are left to be measured."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import Model, ModelError
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.candidates import Candidates
+from gantrytau_optimica.procedure.documents.files import plan_on_file, write_plan
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
-from gantrytau_optimica.procedure.fleet import Fleet
-from gantrytau_optimica.procedure.pose_choice import Choice
-from gantrytau_optimica.procedure.trials import Trials, matched, placed
-from gantrytau_optimica.procedure.verdict import Verdict, um
+from gantrytau_optimica.procedure.fleet import build_fleet
+from gantrytau_optimica.procedure.pose_plan import PlanBasis, PosePlan
+from gantrytau_optimica.procedure.trials import matched, placed
 from gantrytau_optimica.procedure.ways.tours import Roadmap, find_tour
-from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 
-@dataclass(frozen=True, eq=False)
-class Cell:
-    """What a plan was made from and its file does not hold: robots, limits, device, candidates."""
-
-    fleet: Fleet
-    limits: Limits
-    device: Device | None = None
-    candidates: Candidates | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationPlan:
-    """Poses to measure and what to expect of them; lengths in m, angles in rad.
-
-    q (k, n), r (k, 3), R (k, 3, 3): the program, from home to home, and where the nominal robot then is; measured (k,):
-    whether the device measures there, else the pose is only passed. workspace: its size, on which grid; prediction: the
-    choice of poses with `.position` (error expected over the workspace), `.error`, `.condition` and `.observability`;
-    trials: simulated calibrations, `.before` and `.after`; verdict: `.good` and `.reasons`. lost: poses that were wanted,
-    (m, 3), but cannot be reached without a collision. kind, joints, carts, parameters: of the robot; settings: what was
-    asked for. unseen (j, 3): safe places that the device does not see in all robots. cell: None where the plan was loaded
-    without its robot. numbers (k,): of the rows of the program in poses.csv, counted from 1; of what is left of a plan
-    they are those of the whole plan.
-    """
-
-    robot_name: str
-    kind: str
-    joints: tuple[str, ...]
-    carts: int
-    parameters: Mapping[str, Any]
-    settings: Mapping[str, Any]
-    workspace: SettledWorkspace
-    q: np.ndarray
-    r: np.ndarray
-    R: np.ndarray
-    measured: np.ndarray
-    prediction: Choice
-    trials: Trials
-    verdict: Verdict
-    lost: np.ndarray
-    unseen: np.ndarray
-    cell: Cell | None = field(default=None, repr=False)
-    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-
-    def __post_init__(self):
-        if len(self.numbers) != len(self.q):
-            object.__setattr__(self, "numbers", np.arange(1, len(self.q) + 1))
-
-    def __repr__(self) -> str:
-        state = "good" if self.verdict.good else "not good enough"
-        return f"<CalibrationPlan of {self.robot_name}: {int(self.measured.sum())} poses, {state}>"
-
-    def __str__(self) -> str:
-        passed = int((~self.measured).sum())
-        lines = [
-            f"Calibration of {self.robot_name} ({self.kind}) with a {self.settings['device']}",
-            f"  verdict    {'good' if self.verdict.good else 'NOT GOOD ENOUGH'}",
-            *(f"             {reason}" for reason in self.verdict.reasons),
-            f"  workspace  {self.workspace}",
-            f"  poses      {int(self.measured.sum())} to measure, {passed} only passed, {len(self.lost)} replaced as "
-            "they cannot "
-            "be reached",
-            f"  expected   {um(self.prediction.error)} of the tool by noise of {um(self.prediction.noise)} per axis; "
-            "condition "
-            f"{self.prediction.condition:.3g}, observability {self.prediction.observability:.3g} (Nahvi and Hollerbach)",
-        ]
-        return "\n".join(lines)
+class CalibrationPlan(PosePlan):
+    """Poses to measure and what to expect of them, with its program and its files; the numbers are those of `PosePlan`."""
 
     def program(
         self,
@@ -118,8 +50,6 @@ class CalibrationPlan:
         program: as of `program`; its name is that of the file, Calibration.mod. Returns the folder, which is made where
         it does not exist; ModelError where the folder around it does not.
         """
-        from gantrytau_optimica.procedure.documents.files import write_plan
-
         return write_plan(self, Path(folder), program)
 
     def placed(self, measurements: Measurements) -> Measurements:
@@ -178,3 +108,35 @@ class CalibrationPlan:
         held = np.zeros(int(self.measured.sum()), dtype=bool)
         held[rows[rows >= 0]] = True
         return held
+
+
+def load_plan(
+    folder: str | Path, robot: Model | None = None, limits: Limits | None = None
+) -> CalibrationPlan:
+    """The plan that `CalibrationPlan.write` left in a folder, or its plan.json itself.
+
+    robot, limits: as they were planned for; with both `remaining` seeks a new order, without them it keeps the old one.
+    Raises ModelError for a folder without a plan, a file that is none, and a robot of another kind or
+    with other parameters.
+    """
+    plan = CalibrationPlan(**plan_on_file(Path(folder)))
+    return plan if robot is None or limits is None else _with_basis(plan, robot, limits)
+
+
+def _with_basis(plan: CalibrationPlan, robot: Model, limits: Limits) -> CalibrationPlan:
+    asked = plan.settings
+    fleet = build_fleet(robot, limits, tape=asked["tape"], robots=asked["robots"], seed=asked["seed"])
+    if tuple(fleet.nominal.kinematics.joints) != plan.joints:
+        raise ModelError(
+            f"load_plan: found {type(robot).__name__} with {', '.join(fleet.nominal.kinematics.joints)}, expected the "
+            f"robot of the plan, {plan.robot_name} with {', '.join(plan.joints)}"
+        )
+    now = {name: arm.values[name] for arm in fleet.arms for name in arm.free}
+    for name, then in plan.parameters.items():
+        if name not in now or not np.allclose(now[name], then, rtol=0, atol=1e-9):
+            found, expected = (np.asarray(x).tolist() for x in (now.get(name), then))
+            raise ModelError(
+                f"load_plan: found {type(robot).__name__} with {name} = {found}, expected {expected} as planned; give the "
+                "robot with its nominal values of then, or plan again"
+            )
+    return replace(plan, cell=PlanBasis(fleet, limits))

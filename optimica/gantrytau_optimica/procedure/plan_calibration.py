@@ -10,11 +10,13 @@ from gantrytau import Model, ModelError
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, Cell
+from gantrytau_optimica.procedure.asked import Asked
+from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
 from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_candidates
 from gantrytau_optimica.procedure.documents.files import check_folder
 from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
-from gantrytau_optimica.procedure.pose_choice import Choice, choose, judge
+from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
+from gantrytau_optimica.procedure.pose_plan import PlanBasis
 from gantrytau_optimica.procedure.stages import Progress, Stages, digest
 from gantrytau_optimica.procedure.trials import (
     AVERAGED,
@@ -82,7 +84,7 @@ def plan_calibration(
     check_device(fleet, device)
     start = _home(fleet, home)
     check_home(fleet, start)
-    asked = dict(
+    asked = Asked(
         poses=poses,
         wanted=wanted,
         tape=tape,
@@ -98,9 +100,9 @@ def plan_calibration(
 class _Procedure:
     """The stages, each with what it depends on."""
 
-    def __init__(self, fleet: Fleet, limits: Limits, device: Device, asked: dict[str, Any], stages: Stages):
+    def __init__(self, fleet: Fleet, limits: Limits, device: Device, asked: Asked, stages: Stages):
         self.fleet, self.limits, self.device, self.asked, self.stages = fleet, limits, device, asked, stages
-        strict = _stricter(limits, asked["margin"])
+        strict = _stricter(limits, asked.margin)
         self.strict = fleet.with_limits(strict)
         place = fleet.nominal.linked.home
         geometry = [arm.values for arm in fleet.arms]
@@ -121,9 +123,9 @@ class _Procedure:
             joints=tuple(kinematics.joints),
             carts=len(self.fleet.nominal.linked.geometry.offset),
             parameters={n: arm.values[n] for arm in self.fleet.arms for n in arm.free},
-            settings=self.asked
+            settings=vars(self.asked)
             | {
-                "prior": prior_of(self.fleet, self.asked["tape"]),
+                "prior": prior_of(self.fleet, self.asked.tape),
                 "device": type(self.device).__name__,
                 "device_r": self.device.r,
             },
@@ -137,11 +139,11 @@ class _Procedure:
             verdict=verdict,
             lost=candidates.r[order.lost],
             unseen=candidates.r[hidden],
-            cell=Cell(self.fleet, self.limits, self.device, candidates),
+            cell=PlanBasis(self.fleet, self.limits, self.device, candidates),
         )
 
     def _workspace(self) -> SettledWorkspace:
-        spacing = self.asked["spacing"]
+        spacing = self.asked.spacing
         key = digest(self.robot_key, self.limits, self.device, spacing)
         self.workspace_key = key
         return self.stages.of(
@@ -152,36 +154,34 @@ class _Procedure:
         )
 
     def _candidates(self, places: SettledWorkspace) -> tuple[Candidates, str]:
-        asked = [self.asked[name] for name in ("tape", "robots", "seed", "margin")]
-        key = digest(self.workspace_key, asked)
+        asked = self.asked
+        key = digest(self.workspace_key, [asked.tape, asked.robots, asked.seed, asked.margin])
         return self.stages.of(
             "candidates",
             Candidates,
             key,
-            lambda: find_candidates(self.strict, places, self.device, self.asked["seed"]),
+            lambda: find_candidates(self.strict, places, self.device, asked.seed),
         ), key
 
-    def _ways(self, candidates: Candidates, key: str) -> tuple[Choice, Order, str]:
-        n, tape, seed, home = (self.asked[name] for name in ("poses", "tape", "seed", "home"))
-        known, key = KnownWays(self.stages, key), digest(key, n)
+    def _ways(self, candidates: Candidates, key: str) -> tuple[PoseChoice, Order, str]:
+        asked = self.asked
+        known, key = KnownWays(self.stages, key), digest(key, asked.poses)
         at = (self.fleet, candidates, self.device)
-        choice = self.stages.of(
-            "choice", Choice, key, lambda: choose(*at, candidates.usable, n, tape=tape, seed=seed)
-        )
-        key = digest(key, home)
+        choice = self.stages.of("choice", PoseChoice, key, lambda: choose(*at, candidates.usable, asked))
+        key = digest(key, asked.home)
         order = self.stages.of(
             "ways",
             Order,
             key,
-            lambda: ordered(*at, choice, home=home, poses=n, tape=tape, seed=seed, check=known),
+            lambda: ordered(*at, choice, asked, check=known),
         )
         if not np.array_equal(np.sort(order.rows), choice.rows):
-            choice = judge(*at, np.sort(order.rows), tape=tape)
+            choice = judge(*at, np.sort(order.rows), tape=asked.tape)
         return choice, order, key
 
     def _trials(self, candidates: Candidates, order: Order, key: str) -> tuple[Trials, str]:
-        q, seed = order.q[order.measured], self.asked["seed"]
-        count, found = self.asked["robots"], []
+        q, seed = order.q[order.measured], self.asked.seed
+        count, found = self.asked.robots, []
         key = digest(key, q)
 
         def trial(number: int, readings: int) -> Trial:
@@ -192,7 +192,7 @@ class _Procedure:
                 q,
                 number,
                 seed=seed,
-                tape=self.asked["tape"],
+                tape=self.asked.tape,
                 readings=readings,
             )
 
@@ -215,11 +215,12 @@ class _Procedure:
         return collected(found, averaged), key
 
     def _verdict(
-        self, places: SettledWorkspace, candidates: Candidates, choice: Choice, trials: Trials, key: str
+        self, places: SettledWorkspace, candidates: Candidates, choice: PoseChoice, trials: Trials, key: str
     ) -> Verdict:
-        asked = {name: self.asked[name] for name in ("poses", "wanted", "tape", "seed")}
+        asked = self.asked
+        key = digest(key, [asked.poses, asked.wanted, asked.tape, asked.seed])
         at = (self.fleet, self.device, places, candidates, choice, trials)
-        return self.stages.of("verdict", Verdict, digest(key, asked), lambda: decide(*at, **asked))
+        return self.stages.of("verdict", Verdict, key, lambda: decide(*at, asked))
 
 
 def _stricter(limits: Limits, margin: float) -> Limits:

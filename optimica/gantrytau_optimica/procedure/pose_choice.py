@@ -8,6 +8,7 @@ from gantrytau_optimica.calibration.design.identifiability import Poses
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.fitting.arm_fit import scales
+from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
 
@@ -20,7 +21,7 @@ CRITERION = (
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class PoseChoice:
     """Chosen rows of the candidates (n,), and what they promise.
 
     position: expected standard deviations of the tool over the workspace, (k,) in m; angle: the same in rad; noise,
@@ -47,24 +48,23 @@ def choose(
     candidates: Candidates,
     device: Device,
     allowed: np.ndarray,
-    n: int,
-    *,
-    tape: float,
-    seed: int,
-) -> Choice:
-    """Choose n poses among the rows `allowed` of the candidates, or all of these where they are fewer."""
+    asked: Asked,
+) -> PoseChoice:
+    """Choose as many poses as asked for among the rows `allowed` of the candidates, or all of these if they are fewer."""
     data = poses_of(fleet, candidates, allowed)
-    found = allowed[select_poses(fleet.robot, data, min(n, len(allowed)), seed=seed)]
-    return judge(fleet, candidates, device, found, tape=tape)
+    found = allowed[select_poses(fleet.robot, data, min(asked.poses, len(allowed)), seed=asked.seed)]
+    return judge(fleet, candidates, device, found, tape=asked.tape)
 
 
-def judge(fleet: Fleet, candidates: Candidates, device: Device, rows: np.ndarray, *, tape: float) -> Choice:
+def judge(
+    fleet: Fleet, candidates: Candidates, device: Device, rows: np.ndarray, *, tape: float
+) -> PoseChoice:
     """What some rows of the candidates promise."""
     noise = device_noise(device, candidates.r[rows], candidates.R[rows])
     expected = expected_error(fleet, candidates, rows, noise=noise, tape=tape)
     held = max(noise[0], 1e-9) / tape
     condition, index = observability(fleet, poses_of(fleet, candidates, rows), held)
-    return Choice(rows, expected.position, expected.angle, *noise, condition, index)
+    return PoseChoice(rows, expected.position, expected.angle, *noise, condition, index)
 
 
 def expected_error(

@@ -7,9 +7,10 @@ import numpy as np
 from gantrytau import GantryTauError
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
-from gantrytau_optimica.procedure.pose_choice import Choice, device_noise, expected_error, poses_of
+from gantrytau_optimica.procedure.pose_choice import PoseChoice, device_noise, expected_error, poses_of
 from gantrytau_optimica.procedure.trials import Trials
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
@@ -38,15 +39,12 @@ def decide(
     device: Device,
     places: SettledWorkspace,
     candidates: Candidates,
-    choice: Choice,
+    choice: PoseChoice,
     trials: Trials,
-    *,
-    poses: int,
-    wanted: float,
-    tape: float,
-    seed: int,
+    asked: Asked,
 ) -> Verdict:
     """The verdict on a plan."""
+    wanted = asked.wanted
     good = bool(trials.worst <= wanted)
     count = len(choice.rows)
     said = [_told(trials, count, wanted)]
@@ -55,8 +53,8 @@ def decide(
     elif not good and trials.averaged >= SYSTEMATIC * trials.worst:
         said.append(_systematic(device, trials))
     elif not good:
-        said.append(_noise(fleet, device, candidates, choice, trials, wanted=wanted, tape=tape, seed=seed))
-    said += _remarks(device, places, candidates, count, poses, choice, trials)
+        said.append(_noise(fleet, device, candidates, choice, trials, asked))
+    said += _remarks(device, places, candidates, count, asked.poses, choice, trials)
     return Verdict(good, trials.worst, wanted, tuple(said))
 
 
@@ -99,14 +97,12 @@ def _noise(
     fleet: Fleet,
     device: Device,
     candidates: Candidates,
-    choice: Choice,
+    choice: PoseChoice,
     trials: Trials,
-    *,
-    wanted: float,
-    tape: float,
-    seed: int,
+    asked: Asked,
 ) -> str:
     """How many poses would be enough, or which other device or place."""
+    wanted, tape, seed = asked.wanted, asked.tape, asked.seed
     usable = poses_of(fleet, candidates, candidates.usable)
     noise, angle = max(choice.noise, 1e-9), choice.noise_angle
     chosen = poses_of(fleet, candidates, choice.rows)
@@ -140,7 +136,7 @@ def _remarks(
     candidates: Candidates,
     count: int,
     poses: int,
-    choice: Choice,
+    choice: PoseChoice,
     trials: Trials,
 ) -> list[str]:
     safe, usable = len(candidates.safe), len(candidates.usable)

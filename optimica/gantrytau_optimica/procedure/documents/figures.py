@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gantrytau.kinematics.workspace.obstacles import Obstacle
 from gantrytau.whole_files import replacing
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
+from gantrytau_optimica.procedure.pose_plan import PosePlan
 
 VIEWS = (("from above", 0, 1), ("from the side", 0, 2), ("from the front", 1, 2))
 FINE, DEEP = 160, 60  # points along the sides of a picture and into it, by which obstacles are seen
@@ -19,7 +17,7 @@ CLOSE = 0.03  # of the extent, within which numbers of poses share a place
 WAY = 12  # poses that draw the way of a move, which is no straight line in space
 
 
-def draw_plan(plan: "CalibrationPlan", file: Path) -> None:
+def draw_plan(plan: PosePlan, file: Path) -> None:
     """Draw a plan whose cell is known to a PNG file."""
     import matplotlib.pyplot as plt
 
@@ -49,7 +47,7 @@ def draw_plan(plan: "CalibrationPlan", file: Path) -> None:
     plt.close(figure)
 
 
-def _extent(plan: "CalibrationPlan") -> np.ndarray:
+def _extent(plan: PosePlan) -> np.ndarray:
     """What the pictures show, (3, 2): the workspace and the program with some space around."""
     points = np.concatenate([plan.workspace.r, plan.r])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -57,7 +55,7 @@ def _extent(plan: "CalibrationPlan") -> np.ndarray:
     return np.stack([low - space, high + space], axis=1)
 
 
-def _places(axis: Any, plan: "CalibrationPlan", across: int, up: int) -> None:
+def _places(axis: Any, plan: PosePlan, across: int, up: int) -> None:
     """Cells of the workspace seen along the third axis."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle
@@ -85,7 +83,7 @@ def _obstacles(axis: Any, obstacles: Sequence[Obstacle], box: np.ndarray, across
             axis.fill([], [], color="0.45", alpha=0.6, label="obstacle")
 
 
-def _poses(axis: Any, plan: "CalibrationPlan", across: int, up: int) -> None:
+def _poses(axis: Any, plan: PosePlan, across: int, up: int) -> None:
     way = _way(plan)
     axis.plot(
         way[:, across],
@@ -163,7 +161,7 @@ def _numbers(axis: Any, numbers: np.ndarray, at: np.ndarray) -> None:
         )
 
 
-def _way(plan: "CalibrationPlan") -> np.ndarray:
+def _way(plan: PosePlan) -> np.ndarray:
     """The tool along all moves."""
     assert plan.cell is not None
     steps = np.linspace(0.0, 1.0, WAY)[:, None]
@@ -171,7 +169,7 @@ def _way(plan: "CalibrationPlan") -> np.ndarray:
     return plan.cell.fleet.nominal.pose(np.concatenate(moves))[0]
 
 
-def _device(axis: Any, plan: "CalibrationPlan", box: np.ndarray, across: int, up: int) -> None:
+def _device(axis: Any, plan: PosePlan, box: np.ndarray, across: int, up: int) -> None:
     """The device, or an arrow at the border towards it."""
     place = np.asarray(plan.settings["device_r"], dtype=float)[[across, up]]
     limits = box[[across, up]]
@@ -195,7 +193,7 @@ def _device(axis: Any, plan: "CalibrationPlan", box: np.ndarray, across: int, up
         )
 
 
-def _words(plan: "CalibrationPlan") -> str:
+def _words(plan: PosePlan) -> str:
     places = plan.workspace
     return (
         f"{plan.robot_name}, {plan.kind}\n{int(plan.measured.sum())} poses to measure, verdict: "

@@ -9,13 +9,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gantrytau import Model, ModelError
-from gantrytau.kinematics import Limits
+from gantrytau import ModelError
 from gantrytau.whole_files import replacing
-from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, Cell
-from gantrytau_optimica.procedure.documents.rapid import OPERATOR
-from gantrytau_optimica.procedure.fleet import build_fleet
-from gantrytau_optimica.procedure.pose_choice import CRITERION, Choice
+from gantrytau_optimica.procedure.documents.figures import draw_plan
+from gantrytau_optimica.procedure.documents.plan_page import html_page
+from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.pose_choice import CRITERION, PoseChoice
+from gantrytau_optimica.procedure.pose_plan import PosePlan
 from gantrytau_optimica.procedure.trials import Trials
 from gantrytau_optimica.procedure.verdict import Verdict
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
@@ -27,17 +27,13 @@ TEMPLATE = "measurements-template.csv"
 PLACES = ("r", "R", "q")  # of the workspace, which JSON leaves out
 
 
-def write_plan(plan: CalibrationPlan, folder: Path, program: dict[str, Any]) -> Path:
+def write_plan(plan: PosePlan, folder: Path, program: dict[str, Any]) -> Path:
     """See `CalibrationPlan.write`."""
-    from gantrytau_optimica.procedure.documents.plan_page import html_page
-
-    text = plan.program(**program)  # before anything is written
+    text = rapid_program(plan, **program)  # before anything is written
     check_folder("write", folder)
     folder.mkdir(exist_ok=True)
     picture = None
     if plan.cell is not None:
-        from gantrytau_optimica.procedure.documents.figures import draw_plan
-
         picture = folder / "workspace.png"
         draw_plan(plan, picture)
     name = f"{program.get('name', 'Calibration')}.mod"
@@ -67,7 +63,7 @@ def _write(path: Path, write: Callable[[Path], Any]) -> None:
         write(partial)
 
 
-def _write_poses(plan: CalibrationPlan, path: Path) -> None:
+def _write_poses(plan: PosePlan, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["number", *(f"q{k + 1}" for k in range(plan.q.shape[1])), "x", "y", "z", "measured"])
@@ -75,7 +71,7 @@ def _write_poses(plan: CalibrationPlan, path: Path) -> None:
             writer.writerow([number, *(f"{x:.9g}" for x in q), *(f"{x:.6f}" for x in r), int(measured)])
 
 
-def _write_template(plan: CalibrationPlan, path: Path) -> None:
+def _write_template(plan: PosePlan, path: Path) -> None:
     """The poses to measure, with empty cells for what is measured."""
     filled = [f"q{k + 1}" for k in range(plan.q.shape[1])]
     empty = ["x", "y", "z"] + ([] if plan.kind == "three links" else ["qw", "qx", "qy", "qz"])
@@ -86,7 +82,7 @@ def _write_template(plan: CalibrationPlan, path: Path) -> None:
             writer.writerow([plan.numbers[k], *(f"{x:.9g}" for x in plan.q[k]), *[""] * len(empty)])
 
 
-def plan_numbers(plan: CalibrationPlan) -> dict[str, Any]:
+def plan_numbers(plan: PosePlan) -> dict[str, Any]:
     """The plan as plain numbers, lists and words; lengths in m, angles in rad."""
     return {
         "kind": KIND,
@@ -128,16 +124,8 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def load_plan(
-    folder: str | Path, robot: Model | None = None, limits: Limits | None = None
-) -> CalibrationPlan:
-    """The plan that `CalibrationPlan.write` left in a folder, or its plan.json itself.
-
-    robot, limits: as they were planned for; with both `remaining` seeks a new order, without them it keeps the old one.
-    Raises ModelError for a folder without a plan, a file that is none, and a robot of another kind or
-    with other parameters.
-    """
-    path = Path(folder)
+def plan_on_file(path: Path) -> dict[str, Any]:
+    """The fields of a plan from the folder in which it was written, or from its plan.json itself."""
     path = path / "plan.json" if path.is_dir() else path
     try:
         numbers = json.loads(path.read_text(encoding="utf-8"))
@@ -158,7 +146,7 @@ def load_plan(
             f"gantrytau, expected format {FORMAT}; plan again, which goes on from the stages that are still right"
         )
     try:
-        plan = _plan_of(numbers)
+        return _fields(numbers)
     except KeyError as error:
         raise ModelError(
             f"load_plan: found '{path}' without {error.args[0]!r}, expected a whole plan; plan again"
@@ -167,14 +155,13 @@ def load_plan(
         raise ModelError(
             f"load_plan: found '{path}' with something else than a plan has ({error}), expected a whole plan; plan again"
         ) from None
-    return plan if robot is None or limits is None else _with_cell(plan, robot, limits)
 
 
-def _plan_of(numbers: dict[str, Any]) -> CalibrationPlan:
+def _fields(numbers: dict[str, Any]) -> dict[str, Any]:
     robot, program = numbers["robot"], numbers["program"]
     n = len(robot["joints"])
     empty = dict(r=np.zeros((0, 3)), R=np.zeros((0, 3, 3)), q=np.zeros((0, n)))
-    return CalibrationPlan(
+    return dict(
         robot_name=robot["name"],
         kind=robot["kind"],
         joints=tuple(robot["joints"]),
@@ -186,7 +173,7 @@ def _plan_of(numbers: dict[str, Any]) -> CalibrationPlan:
         r=np.array(program["r"], dtype=float),
         R=np.array(program["R"], dtype=float),
         measured=np.array(program["measured"], dtype=bool),
-        prediction=_record(Choice, numbers["prediction"]),
+        prediction=_record(PoseChoice, numbers["prediction"]),
         trials=_record(Trials, numbers["trials"]),
         verdict=_record(Verdict, numbers["verdict"]),
         lost=np.array(numbers["lost"], dtype=float).reshape(-1, 3),
@@ -212,23 +199,3 @@ def _record(kind: type[Record], numbers: dict[str, Any], more: dict[str, Any] | 
         else:
             values[one.name] = (np.inf if one.name == "error" else np.nan) if value is None else value
     return kind(**values)
-
-
-def _with_cell(plan: CalibrationPlan, robot: Model, limits: Limits) -> CalibrationPlan:
-    from dataclasses import replace
-
-    asked = plan.settings
-    fleet = build_fleet(robot, limits, tape=asked["tape"], robots=asked["robots"], seed=asked["seed"])
-    if tuple(fleet.nominal.kinematics.joints) != plan.joints:
-        raise ModelError(
-            f"load_plan: found {type(robot).__name__} with {', '.join(fleet.nominal.kinematics.joints)}, expected the "
-            f"robot of the plan, {plan.robot_name} with {', '.join(plan.joints)}"
-        )
-    now = {name: arm.values[name] for arm in fleet.arms for name in arm.free}
-    for name, then in plan.parameters.items():
-        if name not in now or not np.allclose(now[name], then, rtol=0, atol=1e-9):
-            raise ModelError(
-                f"load_plan: found {type(robot).__name__} with {name} = {_plain(now.get(name))}, expected {_plain(then)} as "
-                "planned; give the robot with its nominal values of then, or plan again"
-            )
-    return replace(plan, cell=Cell(fleet, limits))

@@ -3,17 +3,14 @@
 from base64 import b64encode
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
 from gantrytau_optimica.procedure.fleet import WIDER
 from gantrytau_optimica.procedure.pose_choice import CRITERION
+from gantrytau_optimica.procedure.pose_plan import PosePlan
 from gantrytau_optimica.procedure.verdict import um
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
 
 USUAL = 20  # robots that are drawn
 DOUBT = 0.05  # of 95 % confidence
@@ -29,14 +26,14 @@ th:first-child, td:first-child { text-align: left; white-space: nowrap; }
 """
 
 
-def command(plan: "CalibrationPlan", folder: str | Path = ".") -> str:
+def command(plan: PosePlan, folder: str | Path = ".") -> str:
     """What is given on the command line once the poses of a plan in a folder are measured."""
     prior = plan.settings.get("prior") or {}
     words = " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
     return f"gantrytau calibrate {Path(folder) / 'measurements.csv'}{words}"
 
 
-def drawn(plan: "CalibrationPlan") -> str:
+def drawn(plan: PosePlan) -> str:
     """What so many simulated robots say of the safety of all others."""
     robots = int(plan.settings["robots"])
     share = 1 - DOUBT ** (1 / robots)
@@ -49,7 +46,7 @@ def drawn(plan: "CalibrationPlan") -> str:
 
 
 def html_page(
-    plan: "CalibrationPlan",
+    plan: PosePlan,
     picture: Path | None,
     program: str,
     *,
@@ -80,13 +77,13 @@ def html_page(
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 
 
-def _verdict(plan: "CalibrationPlan") -> str:
+def _verdict(plan: PosePlan) -> str:
     said = "".join(f"<p>{escape(reason)}</p>" for reason in plan.verdict.reasons)
     word = "Good: go ahead" if plan.verdict.good else "Not good enough yet"
     return f'<div class="verdict{"" if plan.verdict.good else " bad"}"><h2>{word}</h2>{said}</div>'
 
 
-def _steps(plan: "CalibrationPlan", program: str, folder: str | Path, trigger: str) -> str:
+def _steps(plan: PosePlan, program: str, folder: str | Path, trigger: str) -> str:
     count, header = int(plan.measured.sum()), ",".join(f"q{k + 1}" for k in range(plan.q.shape[1]))
     turned = ",qw,qx,qy,qz" if plan.kind != "three links" else ""
     place = ", ".join(f"{x:.3g}" for x in np.asarray(plan.settings["device_r"], dtype=float))
@@ -111,14 +108,14 @@ def _steps(plan: "CalibrationPlan", program: str, folder: str | Path, trigger: s
     return "<ol>" + "".join(f"<li>{escape(step)}</li>" for step in steps) + "</ol>"
 
 
-def _target(plan: "CalibrationPlan") -> str:
+def _target(plan: PosePlan) -> str:
     """Which point x, y, z is: devices that find orientations know where the tool is, a tracker only its target."""
     if plan.settings["device"] == "LaserTracker":
         return ", of the target (the reflector), which is the tool of the robot that is found"
     return ", of the tool frame, which the device finds from its target"
 
 
-def _joint(plan: "CalibrationPlan", k: int, value: float) -> str:
+def _joint(plan: PosePlan, k: int, value: float) -> str:
     name = plan.joints[k]
     return f"{name} = {value * 1e3:.1f} mm" if k < plan.carts else f"{name} = {np.degrees(value):.2f} deg"
 
@@ -130,7 +127,7 @@ def _image(picture: Path | None) -> str:
     return f'<img alt="workspace, obstacles, poses and ways from three sides" src="data:image/png;base64,{data}">'
 
 
-def _facts(plan: "CalibrationPlan") -> str:
+def _facts(plan: PosePlan) -> str:
     asked, found = plan.settings, plan.prediction
     rows = [
         ["robot", f"{plan.robot_name}, {plan.kind}"],
@@ -155,7 +152,7 @@ def _facts(plan: "CalibrationPlan") -> str:
     return f"<table>{body}</table>"
 
 
-def _lost(plan: "CalibrationPlan") -> str:
+def _lost(plan: PosePlan) -> str:
     return "; ".join("(" + ", ".join(f"{x:.3f}" for x in r) + ") m" for r in plan.lost) or "none"
 
 
@@ -163,7 +160,7 @@ def _angle(angle: float) -> str:
     return f", {np.degrees(angle) * 1e3:.3g} mdeg" if angle else ""
 
 
-def _trials(plan: "CalibrationPlan") -> str:
+def _trials(plan: PosePlan) -> str:
     trials = plan.trials
     head = "<tr><th>robot</th><th>before</th><th>after, mean</th><th>after, largest</th><th>not seen</th><th></th></tr>"
     rows = ""
@@ -182,7 +179,7 @@ def _trials(plan: "CalibrationPlan") -> str:
     )
 
 
-def _poses(plan: "CalibrationPlan") -> str:
+def _poses(plan: PosePlan) -> str:
     names = [f"{name} [{'mm' if k < plan.carts else 'deg'}]" for k, name in enumerate(plan.joints)]
     heads = ["number", *names, "x [m]", "y [m]", "z [m]", ""]
     rows = "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in heads) + "</tr>"

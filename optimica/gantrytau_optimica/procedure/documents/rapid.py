@@ -9,16 +9,14 @@ characters at most, names 32.
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau_optimica.procedure.pose_choice import CRITERION
+from gantrytau_optimica.procedure.pose_plan import PosePlan
 from gantrytau_optimica.procedure.verdict import um
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
 
 WIDTH = 80
 AXES = 6  # of robax and of extax
@@ -33,15 +31,15 @@ RESERVED = {
 
 
 def rapid_program(
-    plan: "CalibrationPlan",
-    name: str,
+    plan: PosePlan,
+    name: str = "Calibration",
     *,
-    speed: float,
-    settle: float,
-    measure: float,
-    carts: Literal["robax", "extax"],
-    trigger: str,
-    tool: str,
+    speed: float = 0.1,
+    settle: float = 1.0,
+    measure: float = 2.0,
+    carts: Literal["robax", "extax"] = "robax",
+    trigger: str = OPERATOR,
+    tool: str = "tool0",
 ) -> str:
     """See `CalibrationPlan.program`."""
     check_program(
@@ -108,7 +106,7 @@ def _check_name(what: str, word: str) -> None:
         )
 
 
-def _label(plan: "CalibrationPlan", row: int) -> str:
+def _label(plan: PosePlan, row: int) -> str:
     """Name of the target of a row of the program, by its number in poses.csv of the whole plan."""
     number = int(plan.numbers[row])
     if number == 1 or row == len(plan.q) - 1:
@@ -146,7 +144,7 @@ def _trigger(trigger: str, words: str, settle: float, measure: float) -> list[st
     ]
 
 
-def _comments(plan: "CalibrationPlan", carts: str, trigger: str) -> list[str]:
+def _comments(plan: PosePlan, carts: str, trigger: str) -> list[str]:
     unused = "unused robax 0, extax 9E9" if carts == "robax" else "carts are external axes, unused extax 9E9"
     said = [
         f"Calibration of {plan.robot_name}: {int(plan.measured.sum())} poses to measure, "
@@ -173,7 +171,7 @@ def _waiting(trigger: str) -> str:
     return f"At each pose to measure it says so on the pendant{pulse}, and goes on by itself after a time."
 
 
-def _parameters(plan: "CalibrationPlan") -> Sequence[str]:
+def _parameters(plan: PosePlan) -> Sequence[str]:
     return [
         f"{name} = " + ", ".join(_number(float(x), 7) for x in np.atleast_1d(value))
         for name, value in plan.parameters.items()

@@ -7,9 +7,10 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
-from gantrytau_optimica.procedure.pose_choice import Choice, choose
+from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose
 from gantrytau_optimica.procedure.ways.clear_ways import clear_ways
 from gantrytau_optimica.procedure.ways.tours import PLACES, Roadmap, find_tour, spread
 
@@ -33,12 +34,8 @@ def ordered(
     fleet: Fleet,
     candidates: Candidates,
     device: Device,
-    choice: Choice,
-    *,
-    home: np.ndarray,
-    poses: int,
-    tape: float,
-    seed: int,
+    choice: PoseChoice,
+    asked: Asked,
     check: Callable[..., np.ndarray] = clear_ways,
 ) -> Order:
     """An order of the chosen poses with clear ways, from home and back; poses that have none are replaced.
@@ -50,14 +47,14 @@ def ordered(
     few = safe[spread(candidates.q[safe], PLACES)]
     rows, lost = choice.rows, []
     places = np.union1d(few, rows)
-    roadmap = Roadmap(fleet, np.concatenate([home[None], candidates.q[places]]), check)
+    roadmap = Roadmap(fleet, np.concatenate([asked.home[None], candidates.q[places]]), check)
     tour = find_tour(roadmap, 1 + np.searchsorted(places, rows))
     for _ in range(ROUNDS):
         lost += places[tour.lost - 1].tolist()
         allowed = np.setdiff1d(allowed, [*lost, *_apart(roadmap, places, candidates, allowed)])
         if not len(tour.lost) or not len(allowed):
             break
-        rows = choose(fleet, candidates, device, allowed, poses, tape=tape, seed=seed).rows
+        rows = choose(fleet, candidates, device, allowed, asked).rows
         places, roadmap = _extended(roadmap, places, rows, candidates)
         tour = find_tour(roadmap, 1 + np.searchsorted(places, rows))
     lost += places[tour.lost - 1].tolist()

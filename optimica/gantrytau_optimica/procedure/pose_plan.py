@@ -1,0 +1,84 @@
+"""What the procedure plans: poses in a safe order, and what to expect of their calibration."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gantrytau.kinematics import Limits
+from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.procedure.candidates import Candidates
+from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.pose_choice import PoseChoice
+from gantrytau_optimica.procedure.trials import Trials
+from gantrytau_optimica.procedure.verdict import Verdict, um
+from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
+
+
+@dataclass(frozen=True, eq=False)
+class PlanBasis:
+    """What a plan was made from and its file does not hold: robots, limits, device, candidates."""
+
+    fleet: Fleet
+    limits: Limits
+    device: Device | None = None
+    candidates: Candidates | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PosePlan:
+    """Poses to measure and what to expect of them; lengths in m, angles in rad.
+
+    q (k, n), r (k, 3), R (k, 3, 3): the program, from home to home, and where the nominal robot then is; measured (k,):
+    whether the device measures there, else the pose is only passed. workspace: its size, on which grid; prediction: the
+    choice of poses with `.position` (error expected over the workspace), `.error`, `.condition` and `.observability`;
+    trials: simulated calibrations, `.before` and `.after`; verdict: `.good` and `.reasons`. lost: poses that were wanted,
+    (m, 3), but cannot be reached without a collision. kind, joints, carts, parameters: of the robot; settings: what was
+    asked for. unseen (j, 3): safe places that the device does not see in all robots. cell: None where the plan was loaded
+    without its robot. numbers (k,): of the rows of the program in poses.csv, counted from 1; of what is left of a plan
+    they are those of the whole plan.
+    """
+
+    robot_name: str
+    kind: str
+    joints: tuple[str, ...]
+    carts: int
+    parameters: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    workspace: SettledWorkspace
+    q: np.ndarray
+    r: np.ndarray
+    R: np.ndarray
+    measured: np.ndarray
+    prediction: PoseChoice
+    trials: Trials
+    verdict: Verdict
+    lost: np.ndarray
+    unseen: np.ndarray
+    cell: PlanBasis | None = field(default=None, repr=False)
+    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def __post_init__(self):
+        if len(self.numbers) != len(self.q):
+            object.__setattr__(self, "numbers", np.arange(1, len(self.q) + 1))
+
+    def __repr__(self) -> str:
+        state = "good" if self.verdict.good else "not good enough"
+        return f"<{type(self).__name__} of {self.robot_name}: {int(self.measured.sum())} poses, {state}>"
+
+    def __str__(self) -> str:
+        passed = int((~self.measured).sum())
+        lines = [
+            f"Calibration of {self.robot_name} ({self.kind}) with a {self.settings['device']}",
+            f"  verdict    {'good' if self.verdict.good else 'NOT GOOD ENOUGH'}",
+            *(f"             {reason}" for reason in self.verdict.reasons),
+            f"  workspace  {self.workspace}",
+            f"  poses      {int(self.measured.sum())} to measure, {passed} only passed, {len(self.lost)} replaced as "
+            "they cannot "
+            "be reached",
+            f"  expected   {um(self.prediction.error)} of the tool by noise of {um(self.prediction.noise)} per axis; "
+            "condition "
+            f"{self.prediction.condition:.3g}, observability {self.prediction.observability:.3g} (Nahvi and Hollerbach)",
+        ]
+        return "\n".join(lines)
