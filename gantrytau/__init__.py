@@ -11,9 +11,11 @@ from gantrytau.errors import (
     ModelError,
     SolveError,
     StructureError,
+    did_you_mean,
 )
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
+from gantrytau.interruption import heeding_interrupts
 from gantrytau.language.declarations import (
     Array,
     Bounds,
@@ -47,17 +49,22 @@ from gantrytau.language.functions import (
     tan,
     tanh,
 )
-from gantrytau.language.model import Connector, Model, outer
+from gantrytau.language.model import Connector, Declared, Model, check_member, outer
+from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
+from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
-from gantrytau.language.symbols import der, time
+from gantrytau.language.symbols import der, split_derivative, time
+from gantrytau.results.figures import has_windows
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
+from gantrytau.whole_files import replacing
 
 __all__ = [
     "Array",
     "Bounds",
     "Connector",
     "Dae",
+    "Declared",
     "Diagnosis",
     "Fixed",
     "FlatModel",
@@ -86,30 +93,41 @@ __all__ = [
     "branch",
     "c_source",
     "check",
+    "check_member",
     "connect",
     "constraint",
     "cos",
     "cross",
     "der",
+    "did_you_mean",
     "dot",
     "exp",
     "extract_mechanism",
     "fabs",
     "flatten",
+    "has_windows",
+    "heeding_interrupts",
     "if_else",
     "linearize",
     "log",
     "norm_2",
     "outer",
+    "parameter_text",
+    "parameters_of",
+    "read_parameters",
+    "read_toml",
+    "replacing",
     "require",
     "root",
     "sampled",
     "simulate",
     "sin",
+    "split_derivative",
     "sqrt",
     "stick_slip",
     "tan",
     "tanh",
     "time",
     "translate",
+    "with_setting",
 ]

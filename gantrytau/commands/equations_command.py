@@ -11,7 +11,7 @@ from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName,
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting, write_text
 
 if TYPE_CHECKING:
-    from gantrytau.dae import Dae
+    from gantrytau import Dae
 
 
 def equations(
@@ -92,8 +92,7 @@ def _c_code(
     reverse: int,
 ) -> str:
     """C code of the function from `given` to `find`, parameters at their values."""
-    from gantrytau import translate
-    from gantrytau.answers.c_code import c_source
+    from gantrytau import c_source, translate
 
     function = translate(chosen.model, events=True).function(list(given), list(find))
     origin = f" of prototype {chosen.prototype}" if chosen.prototype else ""

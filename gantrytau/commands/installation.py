@@ -25,7 +25,7 @@ _PLUGINS = (
 
 
 @dataclass(frozen=True)
-class Finding:
+class Checked:
     """One line of the examination: what was looked for, what was found, and what to do if it is not good."""
 
     group: str
@@ -36,18 +36,18 @@ class Finding:
     remedy: str = ""
 
 
-def examine() -> list[Finding]:
+def examine() -> list[Checked]:
     """Look for all that the toolkit needs or can use; nothing is changed."""
     return [_python(), *_packages(), *_plugins(), _compiler()]
 
 
-def as_json(findings: list[Finding]) -> str:
+def as_json(findings: list[Checked]) -> str:
     """The findings as a JSON object, with `ok` false if something essential is missing."""
     ok = all(finding.good or not finding.essential for finding in findings)
     return json.dumps({"ok": ok, "findings": [asdict(finding) for finding in findings]}, indent=2)
 
 
-def show(findings: list[Finding]) -> None:
+def show(findings: list[Checked]) -> None:
     """Print the findings as a table, and below it what to do."""
     from rich import box
     from rich.console import Console
@@ -72,9 +72,9 @@ def show(findings: list[Finding]) -> None:
             console.print(f"{weight}: {escape(f'{finding.name}: {finding.remedy}')}", soft_wrap=True)
 
 
-def _python() -> Finding:
+def _python() -> Checked:
     least = ".".join(map(str, _LEAST_PYTHON))
-    return Finding(
+    return Checked(
         "python",
         "python",
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",
@@ -83,13 +83,13 @@ def _python() -> Finding:
     )
 
 
-def _packages() -> Iterator[Finding]:
+def _packages() -> Iterator[Checked]:
     """The toolkit itself, what it requires, and what its extras for users would add."""
     version = _version("gantrytau")
     if version is None:
-        yield Finding("packages", "gantrytau", "not installed", False, remedy="pip install -e .")
+        yield Checked("packages", "gantrytau", "not installed", False, remedy="pip install -e .")
         return
-    yield Finding("packages", "gantrytau", version)
+    yield Checked("packages", "gantrytau", version)
     for text in importlib.metadata.requires("gantrytau") or ():
         requirement = Requirement(text)
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
@@ -98,37 +98,37 @@ def _packages() -> Iterator[Finding]:
         yield _extra(extra)
 
 
-def _package(requirement: Requirement) -> Finding:
+def _package(requirement: Requirement) -> Checked:
     version = _version(requirement.name)
     good = version is not None and requirement.specifier.contains(version, prereleases=True)
     found = version or "not installed"
     expected = f"{found}, expected {requirement.specifier}" if not good else found
-    return Finding("packages", requirement.name, expected, good, remedy=f"pip install '{requirement}'")
+    return Checked("packages", requirement.name, expected, good, remedy=f"pip install '{requirement}'")
 
 
-def _extra(extra: str) -> Finding:
+def _extra(extra: str) -> Checked:
     """Whether all packages of an extra are installed."""
     parts = [Requirement(text) for text in importlib.metadata.requires("gantrytau") or ()]
     names = [part.name for part in parts if part.marker and part.marker.evaluate({"extra": extra})]
     versions = {name: _version(name) for name in names}
     found = ", ".join(f"{name} {version or 'not installed'}" for name, version in versions.items())
     remedy = f"pip install 'gantrytau[{extra}]'"
-    return Finding("extras", extra, found, None not in versions.values(), essential=False, remedy=remedy)
+    return Checked("extras", extra, found, None not in versions.values(), essential=False, remedy=remedy)
 
 
-def _plugins() -> Iterator[Finding]:
+def _plugins() -> Iterator[Checked]:
     try:
         import casadi
     except ImportError as error:
-        yield Finding("solvers", "casadi", f"cannot be imported: {error}", False, remedy=_REINSTALL)
+        yield Checked("solvers", "casadi", f"cannot be imported: {error}", False, remedy=_REINSTALL)
         return
     for kind, name, purpose in _PLUGINS:
         there = bool(getattr(casadi, f"has_{kind}")(name))
         found = f"found ({purpose})" if there else f"not found; needed by {purpose}"
-        yield Finding("solvers", name, found, there, remedy=f"casadi lacks this plug-in; {_REINSTALL}")
+        yield Checked("solvers", name, found, there, remedy=f"casadi lacks this plug-in; {_REINSTALL}")
 
 
-def _compiler() -> Finding:
+def _compiler() -> Checked:
     """The C compiler that `CC` names, else the first on the path."""
     candidates = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang", "cl") if name]
     path = next((found for name in candidates if (found := shutil.which(name))), None)
@@ -136,15 +136,15 @@ def _compiler() -> Finding:
         remedy = (
             "needed to compile functions and FMUs; install gcc or clang (Debian, Ubuntu: apt install gcc)"
         )
-        return Finding("compiler", "C compiler", "not found", False, essential=False, remedy=remedy)
+        return Checked("compiler", "C compiler", "not found", False, essential=False, remedy=remedy)
     try:
         answer = subprocess.run(
             [path, "--version"], capture_output=True, text=True, timeout=10, check=False
         ).stdout
     except (OSError, subprocess.TimeoutExpired) as error:
         remedy = "repair it, or name another one in the environment variable CC"
-        return Finding("compiler", "C compiler", f"{path}: {error}", False, essential=False, remedy=remedy)
-    return Finding("compiler", "C compiler", ": ".join([path, *answer.splitlines()[:1]]), essential=False)
+        return Checked("compiler", "C compiler", f"{path}: {error}", False, essential=False, remedy=remedy)
+    return Checked("compiler", "C compiler", ": ".join([path, *answer.splitlines()[:1]]), essential=False)
 
 
 def _version(package: str) -> str | None:

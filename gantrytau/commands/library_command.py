@@ -7,10 +7,10 @@ from typing import Any
 
 import typer
 
+from gantrytau import Declared
 from gantrytau.commands.arguments import model_choice as models
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import as_json
-from gantrytau.language.model import Declared
 
 
 def library(json: Json = False) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from gantrytau import GantryTauError, SolveError
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
 from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
@@ -20,16 +21,15 @@ from gantrytau.commands.printing.reporting import (
     FAULT,
     INTERRUPTED,
     MISUSE,
-    CommandError,
     as_json,
     note,
+    refusing,
     reporting,
 )
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.errors import GantryTauError, SolveError, did_you_mean
 
 if TYPE_CHECKING:
-    from gantrytau.flattening.flat_model import FlatModel
+    from gantrytau import FlatModel
 
 SPELLING = Spelling(
     ("optimize",),
@@ -114,15 +114,11 @@ def optimize(
 def _flat(chosen: Chosen, drawn: tuple[str, ...]) -> "FlatModel":
     """The problem written out, which knows all names; CommandError for one to draw that it does not have."""
     from gantrytau import flatten
-    from gantrytau.language.symbols import split_derivative
 
     flat = flatten(chosen.model)
-    held = (*flat.variables, *flat.parameters, *flat.propagated)
-    names = {name: None for variable in held for name in (variable.name, *variable.elements)}
     for name in drawn:
-        base, _ = split_derivative(name)
-        if base not in names and base != "time":
-            raise CommandError(f"--plot {name}: {chosen.name} has no '{base}'{did_you_mean(base, names)}")
+        with refusing(f"--plot {name}: "):
+            flat.expand(name)
     return flat
 
 
@@ -164,7 +160,7 @@ def _written(
     except GantryTauError as error:
         wrong.append(str(error))
     try:
-        files += pictures.draw(answers.selected(optimum, drawn), drawn, place) if place else []
+        files += pictures.draw(optimum, drawn, place) if place else []
     except GantryTauError as error:
         wrong.append(str(error))
     return files, "\n".join(wrong)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from gantrytau import SolveError
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
@@ -22,11 +23,9 @@ from gantrytau.commands.printing import picture_output as pictures
 from gantrytau.commands.printing import result_output as saving
 from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, busy, fail, reporting
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.errors import SolveError
 
 if TYPE_CHECKING:
-    from gantrytau.dae import Dae
-    from gantrytau.results.result import Result
+    from gantrytau import Dae, Result
 
 SPELLING = Spelling(
     ("simulate",),

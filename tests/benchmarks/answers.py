@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import Optimum, optimize
 from tests.benchmarks.table import Row, at_most, shown
 
@@ -15,7 +15,7 @@ KNOWN_FREE = 0.9131  # s, of the branch to which the straight line leads
 
 def rows() -> Iterator[Row]:
     """What is left of the errors of refined motions, and the faster branch."""
-    free, line, _ = motion_problems()
+    free, line = FreePath, OnLine
     begin = time.perf_counter()
     straight = optimize(line, refine=1e-6)
     yield at_most(

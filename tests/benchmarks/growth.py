@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from gantrytau import SolveError
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_optimica import prepare
 from tests.benchmarks import opti_reference, reference_collocation
 from tests.benchmarks.gta import Task
@@ -49,7 +49,7 @@ def rows() -> Iterator[Row]:
 
 def from_components(elements: int, max_time: float) -> Outcome:
     """The motion from components; building begins with the translation of the robot."""
-    free, _, _ = motion_problems()
+    free = FreePath
     begin = time.perf_counter()
     prepared = prepare(free, elements=elements, max_time=max_time)
     built = time.perf_counter()

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import optimize
 from gantrytau_optimica.problem.read_problem import read_problem
 from tests.benchmarks import reference_collocation
@@ -24,7 +24,7 @@ TIMES = {("free path", 0.001): 0.92103, ("free path", 0.01): 0.97598}
 
 def rows() -> Iterator[Row]:
     """Values of the four rows, and the time of the free row against its peers."""
-    free, line, _ = motion_problems()
+    free, line = FreePath, OnLine
     for (title, weight), value in KNOWN.items():
         problem: Any = (line if title == "straight line" else free)(weight=weight)
         found = optimize(problem).final_time

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Parameter, SolveError
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_models import prototypes
 from gantrytau_optimica import final, initial, prepare
 
@@ -33,7 +33,7 @@ class Verdict:
 
 def sweep(count: int, seed: int, **policy: Any) -> Iterator[Verdict]:
     """Minimum-time motions on free paths between `count` random pairs of poses; the program is built once."""
-    free, _, _ = motion_problems()
+    free = FreePath
 
     class BetweenPoses(free):
         """The free motion between poses that are parameters."""

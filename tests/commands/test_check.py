@@ -192,7 +192,7 @@ def test_a_file_that_cannot_be_loaded_shows_its_lines(fails, tmp_path, text, wor
             "Misspelt",
             ["Misspelt has no 'force'", "robots.py, line 24: yield self.m * der(self.v) == self.force"],
         ),
-        ("Divided", ["ZeroDivisionError", "robots.py, line 31: yield"]),
+        ("Divided", ["integer division or modulo by zero", "robots.py, line 31: yield"]),
     ],
 )
 def test_a_model_with_a_fault_is_told_with_the_line(fails, robots, name, words):

@@ -419,9 +419,12 @@ def test_a_problem_with_a_fault_is_told_with_the_line(fails, moves, name, words)
     [
         (
             ("--plot", "cart.y", "--to", "a.png"),
-            "--plot cart.y: Fastest has no 'cart.y'; did you mean 'cart.x'?",
+            "--plot cart.y: Fastest has no variable or parameter 'cart.y'; did you mean 'cart.x'?",
         ),
-        (("--plot", "der(cart.z)", "--to", "a.png"), "--plot der(cart.z): Fastest has no 'cart.z'"),
+        (
+            ("--plot", "der(cart.z)", "--to", "a.png"),
+            "--plot der(cart.z): Fastest has no variable or parameter 'der(cart.z)'",
+        ),
         (("--to", "a.png"), "--to a.png: found no names to draw, expected some; add --plot NAMES"),
         (("--plot", "cart.x", "--to", "a.xyz"), "found the suffix '.xyz'"),
         (("--save", "a.cvs"), "a.cvs: found the suffix '.cvs'"),

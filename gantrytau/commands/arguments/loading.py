@@ -10,8 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from gantrytau import GantryTauError, did_you_mean
 from gantrytau.commands.printing.reporting import CommandError, in_words, places
-from gantrytau.errors import GantryTauError, did_you_mean
 
 
 def load(file: Path) -> ModuleType:

@@ -8,14 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gantrytau.commands.arguments import parameter_files
+from gantrytau import Connector, Model, ModelError, check_member, parameters_of, read_parameters, with_setting
 from gantrytau.commands.arguments.choice import Choice, source_of
 from gantrytau.commands.arguments.loading import import_by_name, load, similar
-from gantrytau.commands.arguments.settings import with_setting
 from gantrytau.commands.arguments.values import number, split
-from gantrytau.commands.printing.reporting import CommandError, note
-from gantrytau.errors import ModelError
-from gantrytau.language.model import Connector, Model, check_member
+from gantrytau.commands.printing.reporting import CommandError, note, refusing
 
 FIRST_PROTOTYPE = "L1"
 
@@ -72,7 +69,8 @@ def build(
         chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
     for name, value in _settings(settings, chosen.prototype):
-        model = with_setting(model, name, value)
+        with refusing("--set "):
+            model = with_setting(model, name, value)
     return Chosen(model, chosen.prototype)
 
 
@@ -82,9 +80,10 @@ def _settings(settings: Sequence[str], prototype: str | None) -> Iterator[tuple[
     prototype: of the model; a file that says it belongs to another one is taken, with a warning.
     """
     for setting in settings:
-        if setting.endswith(parameter_files.SUFFIX) and "=" not in setting:
-            values = parameter_files.read("--set", Path(setting))
-            own = parameter_files.prototype_of(Path(setting))
+        if setting.endswith(".toml") and "=" not in setting:
+            with refusing("--set "):
+                values = read_parameters(Path(setting))
+            own = parameters_of(Path(setting))
             if own and prototype and own != prototype:
                 note(f"--set {setting}: these are values of {own}, found with {prototype}; expected ({own})")
             yield from values.items()

@@ -10,15 +10,14 @@ import numpy as np
 from gantrytau.commands.printing.reporting import CommandError
 
 if TYPE_CHECKING:
-    from gantrytau.results.result import Result
+    from gantrytau import Result
 
 FORMATS = (".csv", ".nc")
 
 
 def read_result(file: Path) -> "Result":
     """The variables of a CSV or netCDF file as `Result.save` writes it; CommandError for another one."""
-    from gantrytau.errors import ModelError
-    from gantrytau.results.result import Result
+    from gantrytau import ModelError, Result
 
     if file.suffix.lower() not in FORMATS:
         raise CommandError(

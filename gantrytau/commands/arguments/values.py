@@ -5,8 +5,8 @@ import csv
 from pathlib import Path
 from typing import Any
 
+from gantrytau import did_you_mean
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import did_you_mean
 
 
 def split(option: str, text: str) -> tuple[str, str]:

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands.arguments import parameter_files
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
@@ -132,7 +131,7 @@ def calibrate(
                 "found no FILE, expected measurements, gantrytau calibrate measurements.csv, or a cell to be planned: "
                 "gantrytau calibrate --example > cell.toml"
             )
-        if file.suffix.lower() == parameter_files.SUFFIX:
+        if file.suffix.lower() == ".toml":
             others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior)
             _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
             planning.plan(file, output, json)

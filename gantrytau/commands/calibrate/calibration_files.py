@@ -7,9 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gantrytau.commands.arguments import parameter_files
+from gantrytau import ModelError, parameter_text
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import ModelError
 
 PARAMETERS = "calibrated.toml"
 REPORT = "report.html"
@@ -61,7 +60,7 @@ def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> lis
         robot_values = modifications(found)
         if robot_values is not None:
             heading = _heading(found, robot, source, folder / PARAMETERS, about.verdict)
-            (partial / PARAMETERS).write_text(parameter_files.text(robot_values, heading), encoding="utf-8")
+            (partial / PARAMETERS).write_text(parameter_text(robot_values, robot, heading), encoding="utf-8")
         names = sorted(file.name for file in partial.iterdir())
     if robot_values is None:
         (folder / PARAMETERS).unlink(missing_ok=True)  # of an earlier model, which these results are not
@@ -71,7 +70,6 @@ def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> lis
 def _heading(found: Any, robot: str, source: Path, file: Path, verdict: str) -> str:
     said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses"
     return (
-        f"{parameter_files.OF}{robot}\n"
         f"Calibrated with {source.name}: lengths and offsets in m.\n"
         f"{said}.\n"
         f"On the command line: gantrytau simulate '{robot}' --set {file.name}\n"

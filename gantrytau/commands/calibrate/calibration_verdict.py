@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from gantrytau import GantryTauError
 from gantrytau.commands.calibrate.cross_validation import Validation
 from gantrytau.commands.calibrate.measured_plan import Planned
-from gantrytau.errors import GantryTauError
 
 MATTERS = 0.1  # of the error that is wanted, by which a number that is not held may move the tool
 SHOWN = 3  # combinations that are named

@@ -1,8 +1,8 @@
 """What `gantrytau calibrate --example` prints: the file of a cell, to be filled in, for each kind of robot."""
 
+from gantrytau import did_you_mean
 from gantrytau.commands.calibrate.cell_template import CELL, F1, L1, SIX
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import did_you_mean
 
 EXAMPLES = {"l1": L1, "six": SIX, "f1": F1}
 OF_MODELS = {"GantryTau": "l1", "SixLinkGantryTau": "six", "F1GantryTau": "f1"}

@@ -5,13 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gantrytau import Model, ModelError, did_you_mean, read_toml, with_setting
 from gantrytau.commands.arguments.model_choice import build
-from gantrytau.commands.arguments.parameter_files import read_toml
-from gantrytau.commands.arguments.settings import with_setting
 from gantrytau.commands.calibrate.toml_quantities import Value, at, read_table
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.model import Model
 
 POINT = Value("m", ((3,),))
 ROTATION = Value("1", ((3, 3),))

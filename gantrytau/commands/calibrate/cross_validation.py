@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import Model
 from gantrytau.commands.calibrate.measurement_file import Measured
-from gantrytau.language.model import Model
 
 FOLDS = 5
 FEW = 60  # poses, fewer than which are all fitted, and left out in turn

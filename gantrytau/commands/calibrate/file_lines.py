@@ -13,7 +13,7 @@ from gantrytau.commands.printing.reporting import CommandError
 
 def read(file: Path, rails: Sequence[Path]) -> Any:
     """Measurements; CommandError for files that cannot be read."""
-    from gantrytau.errors import ModelError
+    from gantrytau import ModelError
     from gantrytau_optimica import Measurements
 
     try:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau.commands.calibrate import cell_file as cells
 from gantrytau.commands.calibrate.cell_file import Cell
 from gantrytau.commands.calibrate.measurement_file import OF_GUIDEWAYS, Measured
 from gantrytau.commands.calibrate.plan_command import CELL, PROGRAM
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import ModelError
 
 SAME = 1e-4  # m and rad, by which measured actuators may be off those of the plan
 FAR = 0.02  # m and rad, by which actuators of a pose with the same number may be off

@@ -7,10 +7,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from gantrytau import Model
 from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.calibrate.file_lines import in_lines, read
 from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail
-from gantrytau.language.model import Model
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
 

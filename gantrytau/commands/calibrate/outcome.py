@@ -6,6 +6,7 @@ from typing import Any
 
 import typer
 
+from gantrytau import Model
 from gantrytau.commands.calibrate import calibration_files as results
 from gantrytau.commands.calibrate import calibration_summary as wording
 from gantrytau.commands.calibrate import calibration_verdict as verdict
@@ -14,7 +15,6 @@ from gantrytau.commands.calibrate.cross_validation import Validation
 from gantrytau.commands.calibrate.measured_plan import Planned
 from gantrytau.commands.calibrate.measurement_file import Measured, calibrated
 from gantrytau.commands.printing.reporting import FAULT, as_json, note
-from gantrytau.language.model import Model
 
 
 @dataclass(frozen=True)

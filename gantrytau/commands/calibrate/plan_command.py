@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from gantrytau import ModelError
 from gantrytau.commands.calibrate import cell_file as cells
 from gantrytau.commands.calibrate.calibration_files import rehearse
 from gantrytau.commands.calibrate.cell_file import Cell
@@ -24,7 +25,6 @@ from gantrytau.commands.printing.reporting import (
     write_text,
 )
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.errors import ModelError
 
 CELL = "plan.toml"  # in the folder of a plan: the cell that it was made for
 PROGRAM = "Calibration"

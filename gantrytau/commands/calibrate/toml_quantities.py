@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gantrytau import did_you_mean
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.errors import did_you_mean
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
+from gantrytau import ModelError, did_you_mean
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.errors import ModelError, did_you_mean
 
 INTERFACES = {
     "both": ("model-exchange", "co-simulation"),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from gantrytau import SolveError, did_you_mean
 from gantrytau.commands.arguments.options import Json, Plotted, Saved, To, listed
 from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
@@ -23,10 +24,9 @@ from gantrytau.commands.printing.reporting import (
     reporting,
 )
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.errors import SolveError, did_you_mean
 
 if TYPE_CHECKING:
-    from gantrytau.results.result import Result
+    from gantrytau import Result
 
 ORDERS = ("gauss-seidel", "jacobi", "iterate")
 SPELLING = Spelling(

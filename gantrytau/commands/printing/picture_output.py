@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gantrytau.commands.printing.reporting import CommandError, writable
+from gantrytau.commands.printing.reporting import CommandError, refusing, writable
 
 if TYPE_CHECKING:
-    from gantrytau.results.result import Result
+    from gantrytau import Result
+    from gantrytau_optimica import Optimum
 
 WINDOW = "window"
 
@@ -30,7 +31,7 @@ def _rehearse(to: str) -> None:
     if to == WINDOW:
         import matplotlib.pyplot as plt
 
-        from gantrytau.results.figures import has_windows
+        from gantrytau import has_windows
 
         if not has_windows(plt.get_backend()):
             raise CommandError(
@@ -52,10 +53,10 @@ def _rehearse(to: str) -> None:
         raise CommandError(f"--to {to}: the folder '{file.parent}' does not exist; create it first")
 
 
-def draw(result: "Result", names: tuple[str, ...], to: str) -> list[str]:
+def draw(result: "Result | Optimum", names: tuple[str, ...], to: str) -> list[str]:
     """Draw the variables; the files written."""
     if to != WINDOW:
-        with writable(Path(to)):
+        with writable(Path(to)), refusing("--plot "):
             result.plot(*names, file=to)
         return [to]
     import matplotlib.pyplot as plt

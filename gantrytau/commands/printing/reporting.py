@@ -13,9 +13,8 @@ from typing import Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from gantrytau import GantryTauError
+from gantrytau import GantryTauError, heeding_interrupts
 from gantrytau.commands.printing.spelling import Spelling
-from gantrytau.interruption import heeding_interrupts
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
@@ -93,6 +92,17 @@ def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN
         fail(in_words(error, lines), FAULT, json, kind=type(error).__name__)
 
 
+@contextmanager
+def refusing(beginning: str = "") -> Iterator[None]:
+    """Errors of the toolkit inside mean that the command was called with something that it cannot use."""
+    try:
+        yield
+    except CommandError:
+        raise
+    except GantryTauError as error:
+        raise CommandError(f"{beginning}{error}") from error
+
+
 def fail(message: str, code: int, json: bool, **more: Any) -> NoReturn:
     """Say what is wrong, on stdout as JSON or else on stderr, and leave with an exit code."""
     if json:
@@ -154,7 +164,7 @@ def busy(words: str) -> Iterator[None]:
 
 def write_text(text: str, file: Path) -> None:
     """Write a text file whole; CommandError if that is not possible."""
-    from gantrytau.whole_files import replacing
+    from gantrytau import replacing
 
     with writable(file), replacing(file) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -166,10 +176,7 @@ def writable(file: Path) -> Iterator[None]:
     try:
         if file.is_dir():
             raise CommandError(f"{file} is a folder, expected the name of a file in it")
-        yield
-    except CommandError:
-        raise
-    except GantryTauError as error:  # from the writers of results: folder, suffix, extra
-        raise CommandError(str(error)) from error
+        with refusing():  # from the writers of results: folder, suffix, extra
+            yield
     except OSError as error:
         raise CommandError(f"Cannot write {file}: {error.strerror}; name another place") from error

@@ -3,16 +3,16 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gantrytau import GantryTauError
 from gantrytau.commands.printing.reporting import writable
-from gantrytau.errors import GantryTauError
 
 if TYPE_CHECKING:
-    from gantrytau.results.result import Result
+    from gantrytau import Result
 
 
 def rehearse(file: Path | None) -> None:
     """Find out before the work whether its result can be saved; CommandError if not."""
-    from gantrytau.results.result import Result
+    from gantrytau import Result
 
     if file is None:
         return

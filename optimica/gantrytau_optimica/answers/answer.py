@@ -157,8 +157,21 @@ class Answer(ABC):
         return value
 
     def plot(self, *names: str, file: Any = None):
-        """Variables over time, as Result.plot."""
-        return self.result.plot(*names, file=file)
+        """Variables over time, as Result.plot; derivatives and free numbers, too."""
+        result, (units, words) = self.result, self._labels()
+        more = [n for name in names for n in self._elements(name) if n not in result and n != "time"]
+        if more:
+            values = {n: result[n] for n in result.names} | {n: self._drawn(n) for n in more}
+            result = Result(result.time, values, units=units, descriptions=words, title=result.title)
+        return result.plot(*names, file=file)
+
+    def _drawn(self, name: str) -> Any:
+        try:
+            return self[name]
+        except ModelError as error:  # of derivatives that the problem does not hold
+            raise ModelError(
+                f"{name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
+            ) from error
 
     def save(self, path: Any):
         """Save all variables over time, as Result.save."""

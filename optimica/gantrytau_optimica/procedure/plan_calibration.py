@@ -10,11 +10,11 @@ from gantrytau import Model, ModelError
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
 from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_candidates
 from gantrytau_optimica.procedure.documents.files import check_folder
 from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
+from gantrytau_optimica.procedure.plan_goal import PlanGoal
 from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
 from gantrytau_optimica.procedure.pose_plan import PlanBasis
 from gantrytau_optimica.procedure.stages import Progress, Stages, digest
@@ -84,7 +84,7 @@ def plan_calibration(
     check_device(fleet, device)
     start = _home(fleet, home)
     check_home(fleet, start)
-    asked = Asked(
+    asked = PlanGoal(
         poses=poses,
         wanted=wanted,
         tape=tape,
@@ -100,7 +100,7 @@ def plan_calibration(
 class _Procedure:
     """The stages, each with what it depends on."""
 
-    def __init__(self, fleet: Fleet, limits: Limits, device: Device, asked: Asked, stages: Stages):
+    def __init__(self, fleet: Fleet, limits: Limits, device: Device, asked: PlanGoal, stages: Stages):
         self.fleet, self.limits, self.device, self.asked, self.stages = fleet, limits, device, asked, stages
         strict = _stricter(limits, asked.margin)
         self.strict = fleet.with_limits(strict)
@@ -263,7 +263,8 @@ def _check_numbers(*, wanted: Any, tape: Any, margin: Any, robots: Any) -> None:
 def _check_kinds(limits: Any, device: Any) -> None:
     if not isinstance(limits, Limits):
         raise ModelError(
-            f"plan_calibration.limits: found {type(limits).__name__}, expected Limits(strokes=..., ...) of kinematics",
+            f"plan_calibration.limits: found {type(limits).__name__}, expected "
+            "gantrytau.kinematics.Limits(strokes=..., ...)",
             argument="limits",
         )
     if not isinstance(device, Device):

@@ -8,9 +8,9 @@ from gantrytau_optimica.calibration.design.identifiability import Poses
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.fitting.arm_fit import scales
-from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.plan_goal import PlanGoal
 
 READINGS = 30  # of a device without a covariance of its own, from which its noise is estimated
 CRITERION = (
@@ -48,7 +48,7 @@ def choose(
     candidates: Candidates,
     device: Device,
     allowed: np.ndarray,
-    asked: Asked,
+    asked: PlanGoal,
 ) -> PoseChoice:
     """Choose as many poses as asked for among the rows `allowed` of the candidates, or all of these if they are fewer."""
     data = poses_of(fleet, candidates, allowed)

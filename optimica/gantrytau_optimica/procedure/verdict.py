@@ -7,9 +7,9 @@ import numpy as np
 from gantrytau import GantryTauError
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.plan_goal import PlanGoal
 from gantrytau_optimica.procedure.pose_choice import PoseChoice, device_noise, expected_error, poses_of
 from gantrytau_optimica.procedure.trials import Trials
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
@@ -41,7 +41,7 @@ def decide(
     candidates: Candidates,
     choice: PoseChoice,
     trials: Trials,
-    asked: Asked,
+    asked: PlanGoal,
 ) -> Verdict:
     """The verdict on a plan."""
     wanted = asked.wanted
@@ -99,7 +99,7 @@ def _noise(
     candidates: Candidates,
     choice: PoseChoice,
     trials: Trials,
-    asked: Asked,
+    asked: PlanGoal,
 ) -> str:
     """How many poses would be enough, or which other device or place."""
     wanted, tape, seed = asked.wanted, asked.tape, asked.seed

@@ -7,9 +7,9 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.asked import Asked
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.plan_goal import PlanGoal
 from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose
 from gantrytau_optimica.procedure.ways.clear_ways import clear_ways
 from gantrytau_optimica.procedure.ways.tours import PLACES, Roadmap, find_tour, spread
@@ -35,7 +35,7 @@ def ordered(
     candidates: Candidates,
     device: Device,
     choice: PoseChoice,
-    asked: Asked,
+    asked: PlanGoal,
     check: Callable[..., np.ndarray] = clear_ways,
 ) -> Order:
     """An order of the chosen poses with clear ways, from home and back; poses that have none are replaced.

@@ -6,7 +6,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class PlanGoal:
     """The numbers of a plan, as `plan_calibration` explains them; home: (n,) in m and rad."""
 
     poses: int

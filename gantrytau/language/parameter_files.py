@@ -1,8 +1,4 @@
-"""TOML files of parameters, as `gantrytau calibrate` writes them and `--set FILE.toml` reads them.
-
-They hold modifications of a model: `GantryTau(prototypes.L1, **tomllib.loads(text))` is the robot with these values,
-and so is `GantryTau(L1)` with `--set FILE.toml` on the command line.
-"""
+"""TOML files of parameters: modifications of a model, so that `Robot(**tomllib.loads(text))` has these values."""
 
 import re
 import tomllib
@@ -10,39 +6,37 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gantrytau.commands.printing.reporting import CommandError
+from gantrytau.errors import ModelError
 
-SUFFIX = ".toml"
 OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
 
 
-def read(option: str, file: Path) -> dict[str, Any]:
-    """The numbers of a file by their full names, as `arms[0].length`; CommandError if it cannot be read as TOML."""
-    table = read_toml(option, file)
+def read_parameters(file: Path) -> dict[str, Any]:
+    """The numbers of a file by their full names, as `arms[0].length`; ModelError if it cannot be read as TOML."""
+    table = read_toml(file)
     found: dict[str, Any] = {}
     for name, value in _leaves("", table):
         if not _numeric(value):
-            raise CommandError(f"{option} {file}: found {name} = {value!r}, expected a number or a vector")
+            raise ModelError(f"{file}: found {name} = {value!r}, expected a number or a vector")
         found[name] = value
     if not found:
-        raise CommandError(f"{option} {file}: found no values, expected some, as m = 2.5")
+        raise ModelError(f"{file}: found no values, expected some, as m = 2.5")
     return found
 
 
-def read_toml(option: str, file: Path) -> dict[str, Any]:
-    """A file as TOML; CommandError, which begins with the option, if that is not possible."""
-    where = f"{option} {file}".strip()
+def read_toml(file: Path) -> dict[str, Any]:
+    """A file as TOML; ModelError if that is not possible."""
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise CommandError(f"{where}: there is no such file; check its path") from None
+        raise ModelError(f"{file}: there is no such file; check its path") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise CommandError(
-            f'{where}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
+        raise ModelError(
+            f'{file}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
         ) from error
 
 
-def prototype_of(file: Path) -> str | None:
+def parameters_of(file: Path) -> str | None:
     """The prototype that a file says its values belong to, in its first line, as `# Parameters of GantryTau(L1)`."""
     with file.open(encoding="utf-8-sig") as opened:
         found = re.fullmatch(rf"# {OF}\S+\((\w+)\)\s*", opened.readline())
@@ -66,9 +60,12 @@ def _numeric(value: Any) -> bool:
     return isinstance(value, (bool, int, float))
 
 
-def text(modifications: Mapping[str, Any], heading: str) -> str:
-    """A file of nested modifications, numbers to the last digit; heading: its first lines, as comments."""
-    comment = "".join(f"# {line}".rstrip() + "\n" for line in heading.splitlines())
+def parameter_text(modifications: Mapping[str, Any], model: str, heading: str = "") -> str:
+    """The text of a file of nested modifications, numbers to the last digit.
+
+    model: whose they are, as `GantryTau(L1)`, in the first line; heading: further lines, as comments.
+    """
+    comment = "".join(f"# {line}".rstrip() + "\n" for line in (f"{OF}{model}", *heading.splitlines()))
     return comment + "".join(_tables("", modifications))
 
 

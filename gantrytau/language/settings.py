@@ -1,4 +1,4 @@
-"""`--set name=value`: one more modification of a model, deep inside if need be, without losing others.
+"""One more modification of a model, deep inside if need be, without losing others.
 
 A modification of a component keeps what was modified or redeclared there before: setting `carts[0].law.f_c`
 leaves the friction law of that cart, and its other parameters, as the model or its prototype chose them.
@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from gantrytau.commands.printing.reporting import CommandError
 from gantrytau.errors import ModelError
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start
 from gantrytau.language.model import Declared, Outer, check_member, merge
@@ -24,12 +23,12 @@ _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
 def with_setting(model: Part, name: str, value: Any) -> Part:
     """A copy of `model` in which the parameter or attribute `name` has a value.
 
-    name: `m`, `carts[0].m`, `carts.m` (of all carts), `x.start`. CommandError for what cannot be set.
+    name: `m`, `carts[0].m`, `carts.m` (of all carts), `x.start`. ModelError for what cannot be set.
     """
     try:
         return _changed(model, _steps(name), value, type(model).__name__)
     except ModelError as error:
-        raise CommandError(f"--set {name}: {error}") from error
+        raise ModelError(f"{name}: {error}") from error
 
 
 def _steps(name: str) -> list[Step]:
@@ -47,9 +46,7 @@ def _steps(name: str) -> list[Step]:
 
 def _changed(part: Part, steps: Sequence[Step], value: Any, path: str) -> Part:
     """A copy of a component with one more modification."""
-    clone = copy.copy(part)
-    clone._modifications = _modified(type(part), part.modifications, {}, steps, value, path)
-    return clone
+    return part.modified(_modified(type(part), part.modifications, {}, steps, value, path))
 
 
 def _modified(
@@ -140,7 +137,7 @@ def _quantity(member: Quantity, old: Any, steps: Sequence[Step], value: Any, pat
         if not isinstance(member, Parameter):
             raise ModelError(
                 f"{path} is a variable ({member.words()}), expected a parameter; its start value is "
-                f"{path.partition('.')[2]}.start, and inputs are given with --input"
+                f"{path.partition('.')[2]}.start, and inputs are given a value"
             )
         return {**before, "value": value}
     attribute = steps[0]

@@ -1,78 +1,16 @@
-"""What `gantrytau demo` shows: the table, the pictures of thesis Figures 3.9 and 3.10, and files."""
+"""The minimum-time motions in pictures: thesis Figures 3.9 and 3.10."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gantrytau.whole_files import replacing
+from gantrytau import replacing
+from gantrytau.commands.demo.thesis_table import ROWS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
 
 CART_COLOURS = ("#1f77b4", "#d95f02", "#2a9d5c")
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of Table 3.1 (Dressler 2012): title, energy weight, and its printed time and energy."""
-
-    key: str
-    title: str
-    weight: float
-    line: bool
-    thesis_time: float
-    thesis_energy: float
-
-
-ROWS = (
-    Row("free_w0", "free path, w = 0", 0.0, False, 0.9074, 103.84),
-    Row("free_w0001", "free path, w = 0.001", 0.001, False, 0.9191, 77.00),
-    Row("free_w001", "free path, w = 0.01", 0.01, False, 0.9968, 50.13),
-    Row("line_w0", "straight line, w = 0", 0.0, True, 0.97612, 57.33),
-)
-
-
-def summary(row: Row, optimum: Any) -> dict[str, Any]:
-    """The figures of one row, as numbers."""
-    return {
-        "row": row.title,
-        "time": optimum.final_time,
-        "energy": optimum.integral("square"),
-        "thesis_time": row.thesis_time,
-        "thesis_energy": row.thesis_energy,
-        "iterations": optimum.iterations,
-        "seconds": optimum.build_time + optimum.solve_time,
-    }
-
-
-def table(summaries: list[dict[str, Any]]) -> "Table":
-    """The rows beside Table 3.1 of the thesis."""
-    from rich.box import SIMPLE
-    from rich.table import Table
-
-    found = Table(title="Minimum-time motion of the robot L1, beside Table 3.1 of the thesis", box=SIMPLE)
-    found.add_column("motion", no_wrap=True)
-    for heading in ("T (s)", "energy", "thesis T", "energy", "iter.", "took (s)"):
-        found.add_column(heading, justify="right")
-    for row in summaries:
-        found.add_row(
-            row["row"],
-            f"{row['time']:.5f}",
-            f"{row['energy']:.2f}",
-            f"{row['thesis_time']:.4f}",
-            f"{row['thesis_energy']:.2f}",
-            str(row["iterations"]),
-            f"{row['seconds']:.1f}",
-        )
-    return found
-
-
-def save_trajectory(optimum: Any, file: Path) -> None:
-    """The motion as CSV: tool, carts, forces and torques over time."""
-    carts = [f"robot.carts[{k}].{name}" for k in range(3) for name in ("s", "v", "f", "friction")]
-    optimum.result.select(["robot.tool.r", "robot.tool.v", *carts, "torque"]).save(file)
 
 
 def draw_paths(optima: Mapping[str, Any], file: Path) -> "Figure":

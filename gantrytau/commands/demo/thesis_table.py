@@ -1,0 +1,62 @@
+"""Table 3.1 of Dressler (2012): its motions, printed figures, and those found here beside them."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+@dataclass(frozen=True)
+class ThesisMotion:
+    """One row of Table 3.1 (Dressler 2012): title, energy weight, and its printed time and energy."""
+
+    key: str
+    title: str
+    weight: float
+    line: bool
+    thesis_time: float
+    thesis_energy: float
+
+
+ROWS = (
+    ThesisMotion("free_w0", "free path, w = 0", 0.0, False, 0.9074, 103.84),
+    ThesisMotion("free_w0001", "free path, w = 0.001", 0.001, False, 0.9191, 77.00),
+    ThesisMotion("free_w001", "free path, w = 0.01", 0.01, False, 0.9968, 50.13),
+    ThesisMotion("line_w0", "straight line, w = 0", 0.0, True, 0.97612, 57.33),
+)
+
+
+def summary(row: ThesisMotion, optimum: Any) -> dict[str, Any]:
+    """The figures of one row, as numbers."""
+    return {
+        "row": row.title,
+        "time": optimum.final_time,
+        "energy": optimum.integral("square"),
+        "thesis_time": row.thesis_time,
+        "thesis_energy": row.thesis_energy,
+        "iterations": optimum.iterations,
+        "seconds": optimum.build_time + optimum.solve_time,
+    }
+
+
+def table(summaries: list[dict[str, Any]]) -> "Table":
+    """The rows beside Table 3.1 of the thesis."""
+    from rich.box import SIMPLE
+    from rich.table import Table
+
+    found = Table(title="Minimum-time motion of the robot L1, beside Table 3.1 of the thesis", box=SIMPLE)
+    found.add_column("motion", no_wrap=True)
+    for heading in ("T (s)", "energy", "thesis T", "energy", "iter.", "took (s)"):
+        found.add_column(heading, justify="right")
+    for row in summaries:
+        found.add_row(
+            row["row"],
+            f"{row['time']:.5f}",
+            f"{row['energy']:.2f}",
+            f"{row['thesis_time']:.4f}",
+            f"{row['thesis_energy']:.2f}",
+            str(row["iterations"]),
+            f"{row['seconds']:.1f}",
+        )
+    return found
