@@ -6,6 +6,7 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
+from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
@@ -47,7 +48,7 @@ def _dropped(dae: Translated, given: Sequence[str]) -> ca.SX:
     parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
     if not parameters or not dae.redundant:
         return ca.SX(0, 1)
-    return dae.reduced.written(dae.table.reduce(ca.vertcat(*(e.residual for e in dae.redundant))))
+    return dae.to_reduced(ca.vertcat(*(e.residual for e in dae.redundant)))
 
 
 def _closed(function: ca.Function) -> ca.Function:
@@ -87,18 +88,15 @@ def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) ->
     known: dict[str, ca.SX] = {}
     for name, symbols in zip(given, columns, strict=True):
         for scalar, argument in zip(dae.expand(name), symbols, strict=True):
-            base, order = split_derivative(scalar)
+            base, alias = split_derivative(scalar)[0], dae.root(scalar)
             if base in dae.table.symbols or base == dae.flat.time.name():
                 symbol, value = base, argument
-            elif base in dae.flat.definitions:
+            elif alias is None:
                 raise ModelError(f"{scalar} follows from other variables and cannot be given; name those")
             else:
-                alias = dae.reduced.aliases[base]
                 if alias.root is None:
                     raise ModelError(f"{scalar} is constant in {dae.name} and cannot be given")
-                symbol = derivative_name(alias.root, alias.order + order)
-                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
-                value = (argument - offset) / alias.factor
+                symbol, value = alias.symbol, alias.root_value(argument)
             if symbol in known:
                 raise StructureError(f"{scalar} is given twice, directly or by an alias; leave one out")
             known[symbol] = value
@@ -201,8 +199,7 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
     for block in blocks:
         definitions += block.definitions
     expressions = [*(ca.vertcat(*b.residuals) for b in implicit), *targets]
-    symbols, values = [v for v, _ in definitions], [e for _, e in definitions]
-    _, expressions = ca.substitute_inplace(symbols, values, expressions, False)
+    expressions = Substitution(tuple(definitions)).inserted(expressions)
     arguments = [ca.vertcat(*column) for column in columns]
     names_in = _legal(given, "i")
     names_out = _legal(find, "o", names_in)

@@ -28,22 +28,20 @@ def evaluate(dae: Translated, given: dict[str, Any]) -> dict[str, Any]:
     values = dict(dae.start)
     held: set[str] = set()
     for name, number in scalars.items():
-        base, order = split_derivative(name)
         if name == dae.flat.time.name():
             values[name] = number
             continue
-        if base not in dae.reduced.aliases:
+        alias = dae.root(name)
+        if alias is None:
             raise ModelError(f"{dae.name}: {name} is propagated, not a variable; give what it follows from")
-        alias = dae.reduced.aliases[base]
-        offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
         if alias.root is None:
+            offset = dae.number(alias.offset)
             if abs(number - offset) > 1e-9 * max(1.0, abs(offset)):
                 raise InitializationError(
                     f"{name}: found {number:g}, but it is constant and equal to {offset:g}"
                 )
             continue
-        symbol = derivative_name(alias.root, alias.order + order)
-        value = (number - offset) / alias.factor
+        symbol, value = alias.symbol, dae.number(alias.root_value(number))
         if symbol in held and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
             raise InitializationError(
                 f"{name}: found {number:g}, which contradicts another given value of the same quantity"
@@ -77,16 +75,14 @@ def _complete(dae: Translated, values: dict[str, float], held: frozenset[str]) -
     guess = StartValues(values, dae.asked.started, frozenset())
     derivatives = [n for n in values if split_derivative(n)[0] in dae.known]
     try:
-        return consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess, held | set(derivatives))
+        return consistent_start(dae.flat, dae.reduced, dae.indexed, guess, held | set(derivatives))
     except InitializationError as error:
         free = tuple(n for n in dae.known if n not in held)
         still = held | (set(derivatives) - set(free))
         try:
             if not free:
                 raise error
-            return consistent_start(
-                dae.flat, dae.table, dae.reduced, dae.indexed, guess, frozenset(still), free
-            )
+            return consistent_start(dae.flat, dae.reduced, dae.indexed, guess, frozenset(still), free)
         except InitializationError:
             return _jointly(dae, guess, frozenset(still), free, error)
 
@@ -158,5 +154,5 @@ def named_values(dae: Translated, values: Mapping[str, float]) -> dict[str, Any]
 def _available(
     dae: Translated, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]
 ) -> bool:
-    alias = dae.reduced.aliases[name]
-    return alias.root is None or derivative_name(alias.root, alias.order + order) in values
+    alias = dae.reduced.aliases[name].shifted(order)
+    return alias.root is None or alias.symbol in values

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
+from gantrytau.compiler.alphabets import column, values_at
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
@@ -22,7 +23,7 @@ from gantrytau.compiler.translation import all_symbols, retranslate, translate_f
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
-from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.language.symbols import split_derivative
 
 POOR = 1e6  # condition of the equations, scaled, above which other states are looked for at the point
 LEAST_COLUMN = 1e-4  # a column that is smaller is meant to be small
@@ -190,24 +191,21 @@ def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float
     """Enter given values; names of the symbols that they fix."""
     held: set[str] = set()
     for name, number in scalars.items():
-        base, order = split_derivative(name)
         if name == dae.flat.time.name():
             values[name] = number
             continue
-        if base not in dae.reduced.aliases:
+        alias = dae.root(name)
+        if alias is None:
             raise ModelError(f"at: {name} follows from other variables of {dae.name}; give those")
-        alias = dae.reduced.aliases[base]
-        offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
-        symbol = None if alias.root is None else derivative_name(alias.root, alias.order + order)
-        moving = symbol is not None and split_derivative(symbol)[1] > 0
-        value = (number - offset) / alias.factor if symbol else number - offset
-        if (moving or symbol is None) and abs(value) > 1e-9 * max(1.0, abs(number)):
+        offset, still = dae.number(alias.offset), alias.root is None or alias.order > 0
+        value = number - offset if alias.root is None else dae.number(alias.root_value(number))
+        if still and abs(value) > 1e-9 * max(1.0, abs(number)):
             raise InitializationError(
                 f"at: {name} is {number:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
             )
-        if symbol is not None and not moving:
-            values[symbol] = value
-            held.add(symbol)
+        if not still:
+            values[alias.symbol] = value
+            held.add(alias.symbol)
     return frozenset(held)
 
 
@@ -223,11 +221,11 @@ class _Slopes:
         self.driving = [
             n for n in symbols if split_derivative(n)[0] in dae.reduced.known and n not in dae.known
         ]
-        self.x = _column([chains.named(n) for n in dae.choice.states])
-        self.y = _column([chains.named(n) for n in self.inner])
-        self.u = _column([*(chains.sx(n) for n in dae.known), *(chains.named(n) for n in self.driving)])
+        self.x = column([chains.named(n) for n in dae.choice.states])
+        self.y = column([chains.named(n) for n in self.inner])
+        self.u = column([*(chains.sx(n) for n in dae.known), *(chains.named(n) for n in self.driving)])
         self.keys = list(dae.indexed.residuals)
-        residuals = _column([dae.indexed.residuals[k] for k in self.keys])
+        residuals = column([dae.indexed.residuals[k] for k in self.keys])
         R_x, R_y, R_u = (self._numbers(ca.jacobian(residuals, v)) for v in (self.x, self.y, self.u))
         self.matrix, rows, columns = _scaled(R_y, np.hstack([R_x, R_y, R_u]))
         self.condition = _condition(self.matrix)
@@ -235,9 +233,7 @@ class _Slopes:
         self.rates = -_solve(self.matrix, right) / columns[:, None] if self.condition < SINGULAR else None
 
     def _numbers(self, matrix: ca.SX) -> np.ndarray:
-        leaves = ca.symvar(matrix)
-        function = ca.Function("slopes", [ca.vertcat(*leaves)], [ca.densify(matrix)])
-        found = np.array(function(ca.DM([self.values[leaf.name()] for leaf in leaves]))).reshape(matrix.shape)
+        found = values_at(matrix, self.values)
         if not np.all(np.isfinite(found)):
             raise StructureError(
                 f"{self.dae.name}: the derivatives of its equations are not finite at the operating point; choose a point "
@@ -260,7 +256,7 @@ class _Slopes:
     def of(self, expressions: Sequence[ca.SX], rows: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of expressions by the states and by the inputs; StructureError where inputs' rates enter."""
         n, m = self.x.numel(), len(self.dae.known)
-        vector = _column(list(expressions))
+        vector = column(list(expressions))
         direct, through = ca.jacobian(vector, ca.vertcat(self.x, self.u)), ca.jacobian(vector, self.y)
         assert self.rates is not None
         total = self._numbers(direct) + self._numbers(through) @ self.rates
@@ -272,10 +268,6 @@ class _Slopes:
                 "cannot say; pass the input through a filter, or translate with another given="
             )
         return total[:, :n], total[:, n : n + m]
-
-
-def _column(elements: Sequence[ca.SX]) -> ca.SX:
-    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
 
 
 def _scaled(matrix: np.ndarray, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -20,23 +20,37 @@ LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
 
 @dataclass(frozen=True, eq=False)
 class Alias:
-    """variable = factor * (order-th derivative of root) + offset; root None: a constant."""
+    """variable = factor * (order-th derivative of root) + offset, of parameters; root None: a constant."""
 
     root: str | None
     order: int
     factor: float
     offset: ca.SX
 
+    @property
+    def symbol(self) -> str:
+        """Name of the reduced symbol: the root or a derivative of it, "" for a constant."""
+        return "" if self.root is None else derivative_name(self.root, self.order)
+
+    def shifted(self, order: int) -> "Alias":
+        """What the order-th derivative of the variable is."""
+        return Alias(self.root, self.order + order, self.factor, ZERO) if order else self
+
+    def root_value(self, value: ca.SX | float) -> ca.SX:
+        """The value of the symbol where the variable has this value."""
+        return (ca.SX(value) - self.offset) / self.factor
+
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
     """Equations that are left, and for every variable what it is an alias of.
 
-    residuals: one scalar SX per remaining equation, in symbols of `chains`; compact: the same in the symbols
-    of the definitions as well; equations: where they come from; redundant: equations that turned out to
+    table: the parameters; residuals: one scalar SX per remaining equation, in reduced symbols; compact: the same
+    in the symbols of the definitions as well; equations: where they come from; redundant: equations that turned out to
     say 0 == 0.
     """
 
+    table: ParameterTable
     residuals: tuple[ca.SX, ...]
     compact: tuple[ca.SX, ...]
     definitions: Definitions
@@ -48,21 +62,18 @@ class Reduced:
     redundant: tuple[Equation, ...] = ()
     rates: Mapping[int, ca.SX] = field(default_factory=dict)
 
-    def written(self, expression: ca.SX) -> ca.SX:
-        """An expression of the model's variables in the symbols of the reduced equations; others stay."""
-        expression = self.definitions.resolve(expression)
-        old, new = [], []
-        for leaf in ca.symvar(expression):
-            base, order = split_derivative(leaf.name())
-            alias = self.aliases.get(base)
-            if alias is not None:
-                offset = alias.offset if order == 0 else ZERO
-                old.append(leaf)
-                new.append(
-                    alias_expression(
-                        Alias(alias.root, alias.order + order, alias.factor, offset), self.chains
-                    )
-                )
+    def root(self, name: str) -> Alias | None:
+        """What a variable or a derivative is of its root; None for what is no variable."""
+        base, order = split_derivative(name)
+        alias = self.aliases.get(base)
+        return None if alias is None else alias.shifted(order)
+
+    def to_reduced(self, expression: ca.SX) -> ca.SX:
+        """An expression of the model's symbols in those of the reduced equations; others stay."""
+        expression = self.definitions.to_reduced(self.table.to_reduced(expression))
+        found = [(leaf, self.root(leaf.name())) for leaf in ca.symvar(expression)]
+        old = [leaf for leaf, alias in found if alias is not None]
+        new = [alias_expression(alias, self.chains) for _, alias in found if alias is not None]
         return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
 
 
@@ -101,7 +112,7 @@ def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[s
 
 class _Elimination:
     def __init__(self, flat: FlatModel, table: ParameterTable, known: frozenset[str]):
-        self.flat, self.known = flat, known
+        self.flat, self.table, self.known = flat, table, known
         self.chains = Chains(flat)
         self.parents: dict[str, Alias] = {}
         self.parameters = set(table.independent)
@@ -110,17 +121,17 @@ class _Elimination:
             for name in variable.elements:
                 self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
         self.rated = [i for i, e in enumerate(flat.equations) if e.rate is not None]
-        sides = table.reduce(
+        sides = table.to_reduced(
             ca.vertcat(
                 *(e.residual for e in flat.equations),
                 *(e.rate for e in flat.equations if e.rate is not None),
             )
         )
         names = list(flat.definitions)
-        defined = table.reduce(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
+        defined = table.to_reduced(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
         self.defined = dict(zip(names, defined.elements(), strict=True))
         self.rates = (
-            dict(zip(flat.rates, table.reduce(ca.vertcat(*flat.rates.values())).elements(), strict=True))
+            dict(zip(flat.rates, table.to_reduced(ca.vertcat(*flat.rates.values())).elements(), strict=True))
             if flat.rates
             else {}
         )
@@ -152,7 +163,7 @@ class _Elimination:
         redundant = [i for i in remaining if self.residuals[i].is_zero()]
         remaining = [i for i in remaining if i not in redundant]
         names = [n for v in self.flat.variables for n in v.elements]
-        aliases = {n: self.resolve(n, 0) for n in names}
+        aliases = {n: self.root(n, 0) for n in names}
         used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
         unknowns = tuple(n for n in names if n in used_names and n not in self.known)
         compact = [self.residuals[i] for i in remaining]
@@ -160,7 +171,8 @@ class _Elimination:
         rates = self._substitute(self.residuals[len(self.flat.equations) :])
         rate_of = dict(zip(self.rated, rates, strict=True))
         return Reduced(
-            tuple(definitions.resolve(ca.vertcat(*compact)).elements()) if compact else (),
+            self.table,
+            tuple(definitions.to_reduced(ca.vertcat(*compact)).elements()) if compact else (),
             tuple(compact),
             definitions,
             tuple(self.flat.equations[i] for i in remaining),
@@ -217,7 +229,7 @@ class _Elimination:
             leaf.name() in self.parameters for leaf in ca.symvar(expression)
         )
 
-    def resolve(self, name: str, order: int) -> Alias:
+    def root(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""
         factor, offset = 1.0, ZERO
         while (alias := self.parents.get(name)) is not None:
@@ -272,7 +284,7 @@ class _Elimination:
         factors: dict[tuple[str, int], float] = {}
         offset = terms.offset
         for name, factor in terms.factors.items():
-            alias = self.resolve(*split_derivative(name))
+            alias = self.root(*split_derivative(name))
             offset = _plus(offset, factor, alias.offset)
             if alias.root is not None:
                 key = (alias.root, alias.order)
@@ -305,7 +317,7 @@ class _Elimination:
         for leaf in ca.symvar(vector):
             name, order = split_derivative(leaf.name())
             if name in self.parents:
-                alias = self.resolve(name, order)
+                alias = self.root(name, order)
                 old.append(leaf)
                 new.append(self.expression(alias))
         return ca.substitute(vector, ca.vertcat(*old), ca.vertcat(*new)).elements() if old else residuals

@@ -31,7 +31,7 @@ class Definitions:
         self._expressions = dict(expressions)
         self._rates = rates
         self._variable = variable
-        self._resolved: dict[str, ca.SX] = {}
+        self._reduced: dict[str, ca.SX] = {}
 
     def __contains__(self, name: str) -> bool:
         return split_derivative(name)[0] in self._expressions
@@ -75,17 +75,17 @@ class Definitions:
         rates = ca.vertcat(*(self.rate(leaf) for leaf in leaves))
         return ca.densify(ca.jtimes(expression, ca.vertcat(*leaves), rates))
 
-    def resolved(self, name: str) -> ca.SX:
+    def reduced(self, name: str) -> ca.SX:
         """A definition, or a derivative of one, in variables alone."""
-        if not self._resolved:
+        if not self._reduced:
             names = list(self._expressions)
-            found = self.resolve(ca.vertcat(*(self.symbol(n) for n in names))).elements()
-            self._resolved.update(zip(names, found, strict=True))
-        if name not in self._resolved:
-            self._resolved[name] = self.resolve(self.expression(name))
-        return self._resolved[name]
+            found = self.to_reduced(ca.vertcat(*(self.symbol(n) for n in names))).elements()
+            self._reduced.update(zip(names, found, strict=True))
+        if name not in self._reduced:
+            self._reduced[name] = self.to_reduced(self.expression(name))
+        return self._reduced[name]
 
-    def resolve(self, expression: ca.SX) -> ca.SX:
+    def to_reduced(self, expression: ca.SX) -> ca.SX:
         """The expression in variables alone."""
         order: dict[str, None] = {}
         stack = [(leaf.name(), False) for leaf in ca.symvar(expression) if leaf.name() in self]

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.errors import StructureError
@@ -28,8 +29,7 @@ def refuse_undetermined(
     residual = ca.vertcat(*(r for b in watched for r in b.residuals))
     leaves = ca.symvar(residual)
     jacobian = ca.jacobian(residual, ca.vertcat(*leaves))
-    function = ca.Function("terms", [ca.vertcat(*leaves)], [ca.densify(ca.vertcat(*jacobian.nonzeros()))])
-    entries = np.array(function([sample[leaf.name()] for leaf in leaves])).ravel()
+    entries = values_at(ca.vertcat(*jacobian.nonzeros()), sample).ravel()
     rows, columns = (np.array(x, dtype=int) for x in jacobian.sparsity().get_triplet())
     largest = np.zeros(residual.numel())
     np.maximum.at(largest, rows, np.nan_to_num(np.abs(entries)))

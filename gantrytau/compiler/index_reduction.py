@@ -119,7 +119,7 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
     named = [*reduced.aliases, *flat.derivatives, *wanted]
     for name in wanted:
         if name in reduced.definitions:  # follows from derivatives of variables
-            named += [leaf.name() for leaf in ca.symvar(reduced.definitions.resolved(name))]
+            named += [leaf.name() for leaf in ca.symvar(reduced.definitions.reduced(name))]
     for name in named:
         base, order = split_derivative(name)
         alias = reduced.aliases.get(base)
@@ -143,7 +143,7 @@ def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
         keys += [(i, level) for i in rows]
         compact += new
     if keys:
-        resolved = reduced.definitions.resolve(ca.vertcat(*compact))
+        resolved = reduced.definitions.to_reduced(ca.vertcat(*compact))
         residuals.update(zip(keys, ca.densify(resolved).elements(), strict=True))
     return residuals
 

@@ -23,7 +23,7 @@ class ParameterTable:
     expressions: Mapping[str, ca.SX]
     symbols: Mapping[str, ca.SX]
 
-    def reduce(self, expression: ca.SX) -> ca.SX:
+    def to_reduced(self, expression: ca.SX) -> ca.SX:
         """The expression with dependent and folded parameters replaced."""
         if not self.expressions or expression.numel() == 0:
             return expression

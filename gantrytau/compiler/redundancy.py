@@ -67,8 +67,8 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
         return Settled(flat)
     bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
     reduced = eliminate_aliases(bare, table, known)
-    constraints = _constraints(flat, table, reduced, duals)
-    guess = start_values(flat, table, reduced, list(constraints.level.leaves))
+    constraints = _constraints(flat, reduced, duals)
+    guess = start_values(flat, reduced, list(constraints.level.leaves))
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
@@ -110,16 +110,14 @@ def _open_loops(flat: FlatModel, error: InitializationError) -> InitializationEr
     )
 
 
-def _constraints(
-    flat: FlatModel, table: ParameterTable, reduced: Reduced, duals: Sequence[Equation]
-) -> Constraints:
+def _constraints(flat: FlatModel, reduced: Reduced, duals: Sequence[Equation]) -> Constraints:
     """The equations between positions on which the droppable ones depend.
 
     Positions and forces are told apart by the connectors: an equation with a flow in it is one of forces.
     """
     forces = {n for v in flat.variables if v.kind == "flow" for n in v.elements} | {e.dual for e in duals}
     roots = {reduced.aliases[n].root for n in forces}
-    closing = reduced.written(table.reduce(ca.vertcat(*(e.residual for e in duals))))
+    closing = reduced.to_reduced(ca.vertcat(*(e.residual for e in duals)))
     positions = {}
     for i, residual in enumerate(reduced.residuals):
         names = [leaf.name() for leaf in ca.symvar(residual)]

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.blocks.pivots import sample_values
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.errors import StructureError
 from gantrytau.language.declarations import StateSelect
@@ -74,7 +74,7 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
     """Which variables become dependent: as many as there are rows, the least preferred first."""
     x = ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in columns))
     f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
-    matrix = sample_values(ca.jacobian(f, x), sample)
+    matrix = values_at(ca.jacobian(f, x), sample)
     matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
     asked = {split_derivative(n)[0] for n in wanted}
     groups: dict[int, list[int]] = {}

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
+import numpy as np
 
+from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import split_derivative
 
@@ -45,31 +47,12 @@ class System:
     ode: ca.SX
     residuals: ca.SX
 
-    def express(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        """Expressions of the model's symbols as expressions of (time, x, z, u, p) and input derivatives."""
-        return self.resolve([self.dae.reduce(e) for e in expressions])
-
-    def resolve(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        """Like `express`, for expressions in the reduced symbols."""
-        vector = ca.vertcat(*(ca.vec(ca.densify(e)) for e in expressions))
-        (_, (found,)) = self._inserted((vector,))
-        pieces = ca.vertsplit(found, [0, *_cumulative(e.numel() for e in expressions)])
-        return [ca.reshape(piece, *e.shape) for piece, e in zip(pieces, expressions, strict=True)]
-
-    def _inserted(self, expressions: Sequence[ca.SX]):
-        symbols = [v for v, _ in self.definitions]
-        values = [e for _, e in self.definitions]
-        return (
-            ca.substitute_inplace(symbols, values, list(expressions), False) if symbols else ((), expressions)
-        )
-
-
-def _cumulative(sizes) -> list[int]:
-    total, found = 0, []
-    for size in sizes:
-        total += size
-        found.append(total)
-    return found
+    def to_system(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """Expressions in reduced symbols as expressions of (time, x, z, u, p) and derivatives of inputs."""
+        dense = [ca.densify(e) for e in expressions]
+        (found,) = Substitution(self.definitions).inserted([column([ca.vec(e) for e in dense])])
+        pieces = ca.vertsplit(found, np.cumsum([0, *(e.numel() for e in dense)]).tolist())
+        return [ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True)]
 
 
 def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
@@ -81,19 +64,19 @@ def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
         dae=dae,
         time=dae.flat.time,
         states=dae.states,
-        x=_column([chains.named(n) for n in dae.choice.states]),
+        x=column([chains.named(n) for n in dae.choice.states]),
         algebraics=tuple(algebraics),
-        z=_column([a.symbol for a in algebraics]),
+        z=column([a.symbol for a in algebraics]),
         inputs=dae.known,
-        u=_column([chains.sx(n) for n in dae.known]),
+        u=column([chains.sx(n) for n in dae.known]),
         parameters=table.independent,
-        p=_column([table.symbols[n] for n in table.independent]),
+        p=column([table.symbols[n] for n in table.independent]),
         definitions=tuple(definitions),
-        ode=_column(rates),
-        residuals=_column([a.residual for a in algebraics]),
+        ode=column(rates),
+        residuals=column([a.residual for a in algebraics]),
     )
     closed = [a.closed for a in algebraics if a.closed is not None]
-    ode, residuals, *closed = draft.resolve([draft.ode, draft.residuals, *closed])
+    ode, residuals, *closed = draft.to_system([draft.ode, draft.residuals, *closed])
     given = iter(closed)
     resolved = tuple(
         replace(a, residual=residuals[i], closed=None if a.closed is None else next(given))
@@ -127,7 +110,3 @@ def _left_implicit(
             definitions += zip(block.tears, block.solution, strict=True)
         definitions += block.inner
     return definitions, algebraics
-
-
-def _column(elements: Sequence[ca.SX]) -> ca.SX:
-    return ca.vertcat(*elements) if elements else ca.SX(0, 1)

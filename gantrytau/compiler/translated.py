@@ -7,7 +7,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.aliases import Reduced, alias_expression
+from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed, Key
 from gantrytau.compiler.parameters import ParameterTable
@@ -17,6 +17,20 @@ from gantrytau.compiler.states import StateChoice
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The equations of one block, by name, and the symbols that they give.
+
+    tears: found together; inner: what follows from these, one after another; root: whether the one tear is the root
+    of a quadratic.
+    """
+
+    equations: tuple[str, ...]
+    tears: tuple[str, ...]
+    inner: tuple[str, ...]
+    root: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +44,6 @@ class Translated:
 
     request: Request
     flat: FlatModel
-    table: ParameterTable
     reduced: Reduced
     indexed: Indexed
     choice: StateChoice
@@ -52,7 +65,7 @@ class Translated:
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states (scalars), as the model calls them: a speed by its own name, not `der(...)`."""
-        return tuple(self.spoken(name) for name in self.choice.states)
+        return tuple(self._own_names.get(name, name) for name in self.choice.states)
 
     @property
     def algebraics(self) -> tuple[str, ...]:
@@ -81,6 +94,39 @@ class Translated:
         return (*(n for v in self.flat.variables for n in v.elements), *self.flat.definitions)
 
     @property
+    def table(self) -> ParameterTable:
+        """The parameters sorted out."""
+        return self.reduced.table
+
+    @property
+    def parameter_values(self) -> Mapping[str, float]:
+        """Numbers of all parameters, by scalar name."""
+        return self.table.values
+
+    @property
+    def parameter_symbols(self) -> Mapping[str, ca.SX]:
+        """Symbols of all parameters, by scalar name; in the equations only those of `adjustable` are left."""
+        return self.table.symbols
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:
+        """Parameters that are symbols of the equations; the others follow from them, or shape the equations."""
+        return self.table.independent
+
+    @cached_property
+    def origins(self) -> tuple[Origin, ...]:
+        """Which equations give which symbols, block by block."""
+        return tuple(
+            Origin(
+                tuple(self.equation_name(key) for key in block.equations),
+                tuple(y.name() for y in block.tears),
+                tuple(symbol.name() for symbol, _ in block.inner),
+                block.root is not None,
+            )
+            for block in self.blocks
+        )
+
+    @property
     def mobility(self) -> int:
         """Number of ways in which the positions can change."""
         return sum(1 for n in self.choice.states if self.indexed.orders.get(n, 0) > 1)
@@ -95,7 +141,7 @@ class Translated:
         return self.flat.expand(name)
 
     @cached_property
-    def _spoken_names(self) -> dict[str, str]:
+    def _own_names(self) -> dict[str, str]:
         """Names of variables that are exactly a derivative of another one."""
         found: dict[str, str] = {}
         for name, alias in self.reduced.aliases.items():
@@ -107,35 +153,37 @@ class Translated:
         return found
 
     def spoken(self, name: str) -> str:
-        """What the model calls a symbol: a speed by its own name, not `der(...)`."""
-        return self._spoken_names.get(name, name)
+        """What the model calls a symbol: `tool.v[0]` for `der(tool.r[0])`, `der(tool.v[0])` for its derivative."""
+        base, order = split_derivative(name)
+        for k in range(order, 0, -1):
+            own = self._own_names.get(derivative_name(base, k))
+            if own is not None:
+                return derivative_name(own, order - k)
+        return name
 
     def expression(self, name: str) -> ca.SX:
-        """A scalar variable, derivative or parameter in the symbols of the reduced equations."""
+        """A scalar variable, derivative or parameter in reduced symbols."""
         base, order = split_derivative(name)
         if base == self.flat.time.name():
-            return self.flat.time
+            return self.flat.time if order == 0 else ca.SX(order == 1)
         if base in self.table.symbols:
-            return self.table.expressions.get(base, self.table.symbols[base])
-        if base in self.flat.definitions:
-            return self.reduced.definitions.resolved(name)
-        alias = self.reduced.aliases[base]
-        if alias.root is not None:
-            shifted = type(alias)(
-                alias.root, alias.order + order, alias.factor, alias.offset if order == 0 else ca.SX(0)
-            )
-            found = alias_expression(shifted, self.reduced.chains)
-        else:
-            found = alias.offset if order == 0 else ca.SX(0)
-        return found if alias.offset.is_constant() else self.table.reduce(found)
+            return self.table.expressions.get(base, self.table.symbols[base]) if order == 0 else ca.SX(0)
+        alias = self.root(name)
+        if alias is None:
+            return self.reduced.definitions.reduced(name)
+        return alias_expression(alias, self.reduced.chains)
 
-    def reduce(self, expression: ca.SX) -> ca.SX:
-        """An expression of the flat model's symbols in the symbols of the reduced equations; others stay."""
-        leaves = [
-            leaf for leaf in ca.symvar(expression) if split_derivative(leaf.name())[0] in self.flat.scalars
-        ]
-        new = [self.expression(leaf.name()) for leaf in leaves]
-        return ca.substitute(expression, ca.vertcat(*leaves), ca.vertcat(*new)) if leaves else expression
+    def to_reduced(self, expression: ca.SX) -> ca.SX:
+        """An expression of the model's symbols in reduced symbols; others stay."""
+        return self.reduced.to_reduced(expression)
+
+    def root(self, name: str) -> Alias | None:
+        """What a scalar variable or derivative is of its root; None for what is no variable."""
+        return self.reduced.root(name)
+
+    def number(self, expression: ca.SX | float) -> float:
+        """The value of an expression of parameters."""
+        return float(self.table.number(ca.SX(expression))[0])
 
     def numbers(self, names: Iterable[str], values: Mapping[str, float]) -> np.ndarray:
         """Values of scalars, from numbers of all symbols of the reduced equations."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import casadi as ca
 
@@ -89,14 +88,14 @@ def _translated(
     wanted = _wanted_derivatives(flat, request.find)
     indexed = reduce_index(reduced, flat, wanted)
     _refuse_differentiated(flat, reduced, indexed, wanted)
-    asked = start_values(flat, table, reduced, all_symbols(indexed, reduced.known))
+    asked = start_values(flat, reduced, all_symbols(indexed, reduced.known))
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in asked.values}
     asked = replace(asked, values={**asked.values, **better})
     try:
-        sample = consistent_start(flat, table, reduced, indexed, asked)
+        sample = consistent_start(flat, reduced, indexed, asked)
     except InitializationError as error:
         raise massless(indexed, reduced, flat) or error from None
-    states = [_state_name(reduced.aliases, n) for name in request.states for n in flat.expand(name)]
+    states = [_state_name(reduced, n) for name in request.states for n in flat.expand(name)]
     choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), states, flat.name)
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.residuals, unknowns)
@@ -105,7 +104,7 @@ def _translated(
     blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
     refuse_undetermined(blocks, indexed, reduced, sample, flat)
     return Translated(
-        request, flat, table, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
+        request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )
 
 
@@ -138,13 +137,12 @@ def all_symbols(indexed: Indexed, known: frozenset[str]) -> list[str]:
     return list(names)
 
 
-def _state_name(aliases: Mapping[str, Any], name: str) -> str:
-    base, order = split_derivative(name)
-    alias = aliases.get(base)
+def _state_name(reduced: Reduced, name: str) -> str:
+    alias = reduced.root(name)
     if alias is None or alias.root is None:
         what = "constant" if alias else "no variable"
         raise StructureError(f"{name} is {what} and cannot be a state")
-    return derivative_name(alias.root, alias.order + order)
+    return alias.symbol
 
 
 def _wanted_derivatives(flat: FlatModel, find: Sequence[str]) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ class Kinematics:
         self._tool = tool
         self._tolerance = _length(tolerance)
         joints = None if joints is None else (joints,) if isinstance(joints, str) else tuple(joints)
-        self._values = dict(self.dae.table.values)
+        self._values = dict(self.dae.parameter_values)
         if f"{tool}.r" not in self.dae.vectors:
             raise ModelError(
                 f"Kinematics: {self.dae.name} has no '{tool}.r', expected the position of a tool"
@@ -86,7 +86,7 @@ class Kinematics:
             variable = self.dae.flat.find(name)
             for column, bound in enumerate((variable.min, variable.max) if variable else ()):
                 if bound is not None:
-                    found[row, column] = self.dae.table.number(bound[0])[0]
+                    found[row, column] = self.dae.number(bound[0])
         return found
 
     def ik(self, r: Any, R: Any = None) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.blocks.pivots import sample_values
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.tearing import tear
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -24,7 +24,7 @@ def dependents(dae: Translated) -> list[tuple[int, str]]:
     f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
     x = ca.vertcat(*(chains.sx(n, indexed.orders[n]) for n in columns))
     jacobian = ca.jacobian(f, x)
-    numbers = sample_values(jacobian, dae.start)[None]
+    numbers = values_at(jacobian, dae.start)[None]
     # only an equation that is differentiated as often as the variable gives it as it is
     slopes = ca.jacobian(
         ca.vertcat(*(indexed.residuals[i, 0] for i in rows)), ca.vertcat(*(chains.sx(n) for n in columns))

@@ -114,7 +114,7 @@ class Coordinates:
         if self.known:
             values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
         guess = StartValues(values, dae.asked.started | frozenset(self.known), dae.asked.fixed)
-        found = consistent_start(dae.flat, dae.table, dae.reduced, dae.indexed, guess)
+        found = consistent_start(dae.flat, dae.reduced, dae.indexed, guess)
         x = np.array([found[n] for n in self.states])
         return x, np.array([found[n] for n in self.algebraics])
 

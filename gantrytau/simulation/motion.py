@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
+from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
@@ -45,24 +46,20 @@ def all_coordinates(
         if len(b.unknowns) > 1 and b.tears
     ]
     levels, rows = _invariants(dae, {i for i, _ in given})
-    left_out = dae.table.reduce(_column([e.residual for e in dae.redundant]))
     wanted = [
-        _column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
-        _column([r for b in implicit for r in b.residuals]),
-        ca.densify(ca.jacobian(_column(list(last.values())), _column(list(highest.values())))),
-        dae.reduced.written(left_out),
-        dae.reduce(_column([s.expression for s in dae.flat.sampled])),
+        column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
+        column([r for b in implicit for r in b.residuals]),
+        ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
+        dae.to_reduced(column([e.residual for e in dae.redundant])),
+        dae.to_reduced(column([s.expression for s in dae.flat.sampled])),
         *matrices,
         *levels,
     ]
-    symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
-    _, (ode, algebraic, pivots, dropped, renewed, *rest) = ca.substitute_inplace(
-        symbols, values, wanted, False
-    )
+    ode, algebraic, pivots, dropped, renewed, *rest = Substitution(tuple(definitions)).inserted(wanted)
     matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
     divisors = [pivots[row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
-    x, z = _column([chains.named(n) for n in states]), _column(tears)
+    x, z = column([chains.named(n) for n in states]), column(tears)
     constraints = _constraints(dae, invariants, states)
     return Coordinates(
         dae=dae,
@@ -85,10 +82,6 @@ def all_coordinates(
         renewed=ca.Function("renewed", [x, z, time, t0, w], [ca.densify(renewed)], {"cse": True}),
         conditioning=Conditioning(*constraints, divisors, matrices, [x, z, time, t0, w]),
     )
-
-
-def _column(elements: Sequence[ca.SX]) -> ca.SX:
-    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
 
 
 def _states(dae: Translated, follow: Collection[str]) -> tuple[str, ...]:
@@ -148,14 +141,13 @@ def _known_symbols(
     outputs: Sequence[str],
 ) -> dict[str, ca.SX]:
     """Inputs and those of their derivatives that occur, as expressions of time and samples."""
-    sampled_at = dae.reduce(_column([s.expression for s in dae.flat.sampled]))
+    sampled_at = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
     used = [sampled_at, *dae.indexed.residuals.values()]
     occurring = {leaf.name() for expression in used for leaf in ca.symvar(expression)}
     for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
-        base, order = split_derivative(asked)
-        alias = dae.reduced.aliases.get(base)
+        alias = dae.root(asked)
         if alias is not None and alias.root in dae.known:
-            occurring.add(derivative_name(alias.root, alias.order + order))
+            occurring.add(alias.symbol)
     starts = {n for v in dae.flat.variables if v.start is not None for n in v.elements}
     known: dict[str, ca.SX] = {}
     for name in dae.inputs:

@@ -208,7 +208,7 @@ class Prepared:
     ) -> FreeNumber:
         if not number.held:
             return replace(number, guess=number_guess(number.name, guess, number.guess))
-        value = values.get(number.name, self.built.read.dae.table.values[number.name])
+        value = values.get(number.name, self.built.read.dae.parameter_values[number.name])
         return replace(number, guess=value, min=value, max=value)
 
 
@@ -286,6 +286,6 @@ def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
 def parameter_names(read: SymbolicProblem, name: str) -> tuple[str, ...]:
     """Scalar names of a parameter; ModelError if it is none."""
     elements = read.dae.expand(name)
-    if elements[0] not in read.dae.table.symbols:
+    if elements[0] not in read.dae.parameter_symbols:
         raise ModelError(f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter")
     return tuple(elements)

@@ -141,7 +141,7 @@ class Numbers:
         self.x = np.array([dae.start[n] for n in dae.choice.states])
         self.u = np.array([dae.start.get(n, 0.0) for n in system.inputs])
         self.p = np.array([dae.table.values[n] for n in system.parameters])
-        wanted = system.resolve([dae.expression(n) for n in outputs]) if outputs else []
+        wanted = system.to_system([dae.expression(n) for n in outputs]) if outputs else []
         found = ca.densify(ca.vertcat(system.ode, *wanted))
         arguments = [system.time, system.x, system.u, system.p, system.z]
         self.found = ca.Function("found", arguments, [found])

@@ -52,7 +52,7 @@ def laws(dae, at):
     system = dae.system()
     (friction,) = dae.flat.frictions
     wanted = [friction.coulomb, friction.smooth, friction.breakaway]
-    found = [*system.express(wanted), *system.ode.elements()]
+    found = [*system.to_system([dae.to_reduced(e) for e in wanted]), *system.ode.elements()]
     numbers = [dae.table.values[n] for n in system.parameters]
     function = casadi.Function("laws", [system.x, system.u, system.p], [casadi.vertcat(*found)])
     return np.array(function(at[0], at[1], numbers)).ravel()

@@ -162,7 +162,7 @@ def test_redundant_constraints_are_replaced_by_forces_that_are_zero(four_bar):
 def rank(dae, equations):
     """Rank of the slopes of equations by all variables and their derivatives, at the consistent start."""
     values = {**dae.evaluate({}), **dae.table.values}
-    residuals = dae.reduced.definitions.resolve(ca.vertcat(*(e.residual for e in equations)))
+    residuals = dae.reduced.definitions.to_reduced(ca.vertcat(*(e.residual for e in equations)))
     symbols = ca.vertcat(*ca.symvar(residuals))
     unknown = ca.vertcat(*(s for s in symbols.elements() if s.name() not in dae.parameters))
     slopes = ca.Function("slopes", [symbols], [ca.densify(ca.jacobian(residuals, unknown))])

@@ -90,7 +90,7 @@ def _declared(dae: Dae, system: System) -> list[_Declared]:
     """Starts in parameters, and those that are fixed; the fixed first."""
     known = {*dae.known, *(s.name for s in dae.flat.sampled)}
     found = [
-        (name, dae.table.reduce(start), v.fixed)
+        (name, dae.to_reduced(start), v.fixed)
         for v in dae.flat.variables
         if v.start
         for name, start in zip(v.elements, v.start, strict=True)
@@ -98,7 +98,7 @@ def _declared(dae: Dae, system: System) -> list[_Declared]:
     ]
     if not found:
         return []
-    expressions = system.resolve([dae.expression(name) for name, _, _ in found])
+    expressions = system.to_system([dae.expression(name) for name, _, _ in found])
     made = [_Declared(n, e, s, fixed) for (n, s, fixed), e in zip(found, expressions, strict=True)]
     return sorted(made, key=lambda d: not d.fixed)
 
@@ -171,6 +171,6 @@ def _held_starts(dae: Dae, numbers: Mapping[str, np.ndarray]) -> list[ca.SX]:
     return [
         ca.SX(float(numbers["u"][first + k]))
         if (start := declared.get(s.name)) is None
-        else dae.table.reduce(start)
+        else dae.to_reduced(start)
         for k, s in enumerate(dae.flat.sampled)
     ]

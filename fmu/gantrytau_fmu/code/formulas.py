@@ -77,13 +77,13 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     outputs = _evaluated(dae, outputs)
     flat = dae.flat
     sampled, frictions = flat.sampled, flat.frictions
-    wanted = system.resolve([dae.expression(n) for n in outputs]) if outputs else []
-    updates = system.express([s.expression for s in sampled])
+    wanted = system.to_system([dae.expression(n) for n in outputs]) if outputs else []
+    updates = system.to_system([dae.to_reduced(s.expression) for s in sampled])
     laws = [[f.coulomb, f.smooth, f.breakaway] for f in frictions]
-    laws = [system.express(law) for law in laws]
-    speeds = system.resolve([dae.expression(f.speed) for f in frictions])
-    accelerations = system.resolve([dae.expression(f"der({f.speed})") for f in frictions])
-    initial = system.express([e.residual for e in flat.initial_equations])
+    laws = [system.to_system([dae.to_reduced(e) for e in law]) for law in laws]
+    speeds = system.to_system([dae.expression(f.speed) for f in frictions])
+    accelerations = system.to_system([dae.expression(f"der({f.speed})") for f in frictions])
+    initial = system.to_system([dae.to_reduced(e.residual) for e in flat.initial_equations])
     everything = [system.ode, system.residuals, *wanted, *updates, *speeds, *accelerations, *initial]
     differentiated = _input_derivatives(dae, column(everything))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
@@ -194,7 +194,7 @@ def _roots(system: System) -> dict[str, ca.SX]:
             found[block.tears[0].name()] = ca.det(
                 ca.jacobian(ca.vertcat(*block.residuals), ca.vertcat(*block.tears))
             )
-    return dict(zip(found, system.resolve(list(found.values())), strict=True)) if found else {}
+    return dict(zip(found, system.to_system(list(found.values())), strict=True)) if found else {}
 
 
 def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:
@@ -202,7 +202,7 @@ def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:
     periods: list[ca.SX] = []
     texts: list[str] = []
     clocks = []
-    for expression in system.express([s.period for s in sampled]):
+    for expression in system.to_system([system.dae.to_reduced(s.period) for s in sampled]):
         if str(expression) not in texts:
             texts.append(str(expression))
             periods.append(expression)

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
+from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
@@ -54,16 +55,14 @@ class Cut:
         """The blocks without closed form."""
         return tuple(b for b in self.blocks if b.solution is None)
 
-    def resolved(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+    def in_known(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """The residuals of blocks without closed form, then the expressions, in what is known and what these blocks find."""
         dae = self.strata.dae
         definitions = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
         definitions += [d for block in self.blocks for d in block.definitions]
         found = [*(r for b in self.implicit for r in b.residuals), *expressions]
-        if definitions:
-            symbols, values = [s for s, _ in definitions], [e for _, e in definitions]
-            _, found = ca.substitute_inplace(symbols, values, [_column(found)], False)
-            found = ca.densify(found[0]).elements()
+        (whole,) = Substitution(tuple(definitions)).inserted([column(found)])
+        found = ca.densify(whole).elements()
         if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
             raise StructureError(
                 f"{dae.name}: its equations depend on time explicitly, expected a mechanism whose equations do not; make "
@@ -76,10 +75,10 @@ class Cut:
 
         Where there is no solution its results are NaN.
         """
-        strata, found = self.strata, self.resolved(expressions)
+        strata, found = self.strata, self.in_known(expressions)
         arguments = [*(strata.columns[k] for k in self.kinds), strata.p]
         inside = [*self.kinds, "p"]
-        value = _column(found[len(found) - len(expressions) :])
+        value = column(found[len(found) - len(expressions) :])
         if not self.implicit:
             return ca.Function(name, arguments, [value], inside, ["value"], {"cse": True})
         implicit: list[Implicit] = []
@@ -103,14 +102,14 @@ class Strata:
 
     def __init__(self, dae: Translated, roles: Mapping[str, Sequence[str]]):
         self.dae, self.roles = dae, roles
-        self.columns = {k: _column([ca.SX.sym(n) for n in self.names(k)]) for k in EVERYTHING}
-        self.p = _column([dae.table.symbols[n] for n in dae.table.independent])
+        self.columns = {k: column([ca.SX.sym(n) for n in self.names(k)]) for k in EVERYTHING}
+        self.p = column([dae.table.symbols[n] for n in dae.table.independent])
         self.numbers = ca.DM([dae.table.values[n] for n in dae.table.independent])
         self.constraints: frozenset[int] = frozenset()
         self.distance = self._distances()
         self.constraints = frozenset(i for i, _ in self.cut(("T", "q")).left)
         self.passive = self._passive()
-        self.columns["s"] = _column([ca.SX.sym(n) for n in self.passive])
+        self.columns["s"] = column([ca.SX.sym(n) for n in self.passive])
 
     def names(self, kind: str) -> list[str]:
         """Scalar names of a kind: `der(x)` for rates."""
@@ -133,7 +132,7 @@ class Strata:
             for name, value in zip(vector.elements, vector.value, strict=True)
             if name in table.independent and value.is_zero()
         ]
-        return _column(found), ca.SX.zeros(len(found))
+        return column(found), ca.SX.zeros(len(found))
 
     def cut(self, kinds: Sequence[str], find: str = "", why: str = "") -> Cut:
         """The blocks from `kinds` to `find`, or to the equations left over; `why`: opens the error if there is no way."""
@@ -169,7 +168,7 @@ class Strata:
         }
         found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
         forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
-        needed = {s.name() for s in ca.symvar(_column(forces))} - set(self._known(EVERYTHING)[0])
+        needed = {s.name() for s in ca.symvar(column(forces))} - set(self._known(EVERYTHING)[0])
         return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
 
     def _left(self, unknowns: Sequence[str]) -> tuple[Key, ...]:
@@ -178,7 +177,7 @@ class Strata:
         keys = sorted(residuals)
         leaves = list(dict.fromkeys(s.name() for r in residuals.values() for s in ca.symvar(r)))
         symbols = ca.vertcat(*{s.name(): s for r in residuals.values() for s in ca.symvar(r)}.values())
-        slopes = ca.jacobian(_column([residuals[k] for k in keys]), symbols)
+        slopes = ca.jacobian(column([residuals[k] for k in keys]), symbols)
         numbers = ca.Function("slopes", [symbols], [ca.densify(slopes)])(
             ca.DM([dae.start[n] for n in leaves])
         )
@@ -201,11 +200,9 @@ class Strata:
         twins: list[ca.SX] = []
         for kind in kinds:
             for name, argument in zip(self.names(kind), self.columns[kind].elements(), strict=True):
-                base, order = split_derivative(name)
-                alias = dae.reduced.aliases[base]
-                offset = dae.table.reduce(alias.offset) if order == 0 else ca.SX(0)
-                symbol = derivative_name(alias.root or "", alias.order + order)
-                value = (argument - offset) / alias.factor
+                alias = dae.root(name)
+                assert alias is not None  # roles are variables
+                symbol, value = alias.symbol, alias.root_value(argument)
                 if symbol in known:
                     twins.append(value - known[symbol])
                 else:
@@ -253,7 +250,3 @@ def _independent(matrix: np.ndarray, sizes: np.ndarray, ranks: Sequence[int]) ->
                 direction = rest[row] / left[best]
                 rest -= np.outer(rest @ direction, direction)
     return chosen
-
-
-def _column(elements: Sequence[ca.SX]) -> ca.SX:
-    return ca.vertcat(*elements) if elements else ca.SX(0, 1)

@@ -328,7 +328,7 @@ def _written_by_residuals(strata: Strata) -> Sections:
     """The constraints as equations of tool, joints and what is found from them by iteration."""
     positions = strata.cut(("T", "q"))
     rest = [*(strata.dae.indexed.residuals[k] for k in positions.left), *positions.twins]
-    text = _text(strata, {"constraints": ca.vertcat(*positions.resolved(rest))})
+    text = _text(strata, {"constraints": ca.vertcat(*positions.in_known(rest))})
     rows = [f"0 = {value.text}" for value in text.expressions]
     found = ", ".join(s.name() for block in positions.implicit for s in block.tears)
     words = NO_FORM + (f", beginning with the constraints: {found}" if found else "")

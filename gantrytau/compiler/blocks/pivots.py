@@ -9,6 +9,8 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import Substitution, values_at
+
 COUNT = 12
 SPREAD = (
     0.5  # of the points about the start, relative to the values there, or absolute in SI where they are small
@@ -29,24 +31,19 @@ class Guide:
         self.parameters = parameters
         self.rates = frozenset(f"der({name})" for name in states)
         self.partners: dict[int, str] = {}
-        self._symbols: list[ca.SX] = []
-        self._solutions: list[ca.SX] = []
+        self._solved: list[tuple[ca.SX, ca.SX]] = []
 
     def define(self, solved: Sequence[tuple[ca.SX, ca.SX]]) -> None:
         """From now on these symbols follow from others, as (symbol, expression) in order of solution."""
-        self._symbols += [symbol for symbol, _ in solved]
-        self._solutions += [solution for _, solution in solved]
+        self._solved += solved
 
     def at_start(self, expression: ca.SX) -> np.ndarray:
         """The numbers of an expression at the start, as a dense array."""
-        return sample_values(expression, self.start)
+        return values_at(expression, self.start)
 
     def around(self, expression: ca.SX) -> np.ndarray:
         """The numbers of an expression at the start, then at points around it, (points, rows, columns)."""
-        if self._symbols:
-            _, (resolved,) = ca.substitute_inplace(self._symbols, self._solutions, [expression], False)
-        else:
-            resolved = expression
+        (resolved,) = Substitution(tuple(self._solved)).inserted([expression])
         leaves = ca.symvar(resolved)
         function = ca.Function("sample", [ca.vertcat(*leaves)], [ca.densify(ca.vec(resolved))])
         centre = np.array([self.start[leaf.name()] for leaf in leaves])
@@ -56,13 +53,6 @@ class Guide:
         found = np.array(function.map(COUNT)(points)).T.reshape(COUNT, *expression.shape[::-1])
         found = found.transpose(0, 2, 1)[np.isfinite(found).all(axis=(1, 2))]  # the others are out of reach
         return np.concatenate([self.at_start(expression)[None], found])
-
-
-def sample_values(expression: ca.SX, sample: Mapping[str, float]) -> np.ndarray:
-    """The numbers of an expression at the sample point, as a dense array."""
-    leaves = ca.symvar(expression)
-    function = ca.Function("sample", [ca.vertcat(*leaves)], [ca.densify(expression)])
-    return np.array(function(ca.DM([sample[leaf.name()] for leaf in leaves]))).reshape(expression.shape)
 
 
 def reliable(entries: np.ndarray, reference: np.ndarray) -> np.ndarray:

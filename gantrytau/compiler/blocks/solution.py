@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pivots import Guide, reliable
 from gantrytau.compiler.blocks.tearing import tear
@@ -20,7 +21,7 @@ LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by un
 
 
 @dataclass(frozen=True, eq=False)
-class Root:
+class QuadraticRoot:
     """tear = middle + side * sqrt(radicand): a quadratic whose branch is the sign `side`."""
 
     middle: ca.SX
@@ -44,7 +45,7 @@ class Block:
     residuals: tuple[ca.SX, ...]
     inner: tuple[tuple[ca.SX, ca.SX], ...]
     solution: tuple[ca.SX, ...] | None
-    root: Root | None = None
+    root: QuadraticRoot | None = None
     pairs: tuple[tuple[Key, str], ...] = ()  # equations solved for one unknown each
 
     @property
@@ -114,18 +115,9 @@ def solve_block(
         inner.append((columns[j], -rest / slope))
     tears = tuple(columns[j] for j in torn.tears)
     left = [rows[i] for i in torn.residuals]
-    if inner and left:
-        left = substitute_inner(inner, left)
+    left = Substitution(tuple(inner)).inserted(left)
     pairs = tuple((equations[i], unknowns[j]) for i, j in torn.assignments)
     return _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, pairs)
-
-
-def substitute_inner(inner: Sequence[tuple[ca.SX, ca.SX]], expressions: Sequence[ca.SX]) -> list[ca.SX]:
-    """Expressions with assigned symbols resolved, one after the other."""
-    if not inner or not expressions:
-        return list(expressions)
-    _, found = ca.substitute_inplace([v for v, _ in inner], [e for _, e in inner], list(expressions), False)
-    return list(found)
 
 
 def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block:
@@ -153,13 +145,13 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block
     return block("nonlinear") if found is None else block("spheres", tuple(found))
 
 
-def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, guide: Guide) -> Root:
+def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, guide: Guide) -> QuadraticRoot:
     """The root of a quadratic on the branch where the sample lies, by completing the square."""
     middle = -_at_zero(slope, x) / curvature
     # f = f(middle) + curvature / 2 * (x - middle)^2
     value = ca.substitute(f, x, middle)
     side = float(guide.at_start(slope / curvature)[0, 0])
-    return Root(middle, 1.0 if side >= 0 else -1.0, -2 * value / curvature)
+    return QuadraticRoot(middle, 1.0 if side >= 0 else -1.0, -2 * value / curvature)
 
 
 def eliminate(matrix: ca.SX, right: ca.SX, guide: Guide) -> list[ca.SX] | None:

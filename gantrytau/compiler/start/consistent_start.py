@@ -4,7 +4,6 @@ import casadi as ca
 
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import InitializationError
@@ -13,7 +12,6 @@ from gantrytau.flattening.flat_model import FlatModel
 
 def consistent_start(
     flat: FlatModel,
-    table: ParameterTable,
     reduced: Reduced,
     indexed: Indexed,
     guess: StartValues,
@@ -40,14 +38,13 @@ def consistent_start(
         except InitializationError:
             raise error from None
     if flat.initial_equations and not held:
-        extra = _initial_level(flat, table, reduced, stages)
+        extra = _initial_level(flat, reduced, stages)
         values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
     return values
 
 
-def _initial_level(flat: FlatModel, table: ParameterTable, reduced: Reduced, stages: list[Level]) -> Level:
-    residual = table.reduce(ca.vertcat(*(e.residual for e in flat.initial_equations)))
-    rows = reduced.written(residual).elements()
+def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:
+    rows = reduced.to_reduced(ca.vertcat(*(e.residual for e in flat.initial_equations))).elements()
     return Level(
         tuple(r for s in stages for r in s.residuals) + tuple(rows),
         tuple(n for s in stages for n in s.names)

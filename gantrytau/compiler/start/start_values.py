@@ -9,7 +9,6 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
-from gantrytau.language.symbols import derivative_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +20,9 @@ class StartValues:
     fixed: frozenset[str]
 
 
-def start_values(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbols: list[str]) -> StartValues:
+def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> StartValues:
     """Start attributes carried over to the symbols of the reduced equations."""
-    values: dict[str, float] = dict.fromkeys(symbols, 0.0)
+    table, values = reduced.table, dict.fromkeys(symbols, 0.0)
     owners: dict[str, tuple[bool, int]] = {}
     fixed: dict[str, str] = {}
     for variable in flat.variables:
@@ -31,7 +30,7 @@ def start_values(flat: FlatModel, table: ParameterTable, reduced: Reduced, symbo
             continue
         numbers = table.number(ca.vertcat(*variable.start))
         for name, number in zip(variable.elements, numbers, strict=True):
-            _place(variable, name, float(number), table, reduced, values, owners, fixed)
+            _place(variable, name, float(number), reduced, values, owners, fixed)
     for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
         values[event.name] = _own_start(flat, table, event.name)
     values.update(table.values)
@@ -46,8 +45,8 @@ def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
     return float(table.number(variable.start[variable.elements.index(name)])[0])
 
 
-def _place(variable: FlatVariable, name: str, number: float, table, reduced, values, owners, fixed) -> None:
-    alias = reduced.aliases[name]
+def _place(variable: FlatVariable, name: str, number: float, reduced, values, owners, fixed) -> None:
+    alias, table = reduced.aliases[name], reduced.table
     if alias.root is None:
         constant = float(table.number(alias.offset)[0])
         if variable.fixed and abs(number - constant) > 1e-9 * max(1.0, abs(constant)):
@@ -55,8 +54,7 @@ def _place(variable: FlatVariable, name: str, number: float, table, reduced, val
                 f"{name}: found the fixed start {number:g}, but it is constant and equal to {constant:g}; leave it out"
             )
         return
-    symbol = derivative_name(alias.root, alias.order)
-    value = (number - float(table.number(alias.offset)[0])) / alias.factor
+    symbol, value = alias.symbol, float(table.number(alias.root_value(number))[0])
     if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
         raise InitializationError(
             f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "

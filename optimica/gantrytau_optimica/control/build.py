@@ -45,14 +45,14 @@ def build(
     system = dae.system("lifted")
     chosen = _free_numbers(dae, guess, held)
     open_names = {n.name for n in chosen}
-    numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in open_names}
+    numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
     conditions = (start_conditions(dae), link_conditions(read))
     points = (*read.points, *(p for more, _ in conditions for p in more))
     constraints = (*read.constraints, *(c for _, more in conditions for c in more))
     limits = (*constraints, *_declared_limits(dae))
 
     def resolve(expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        return with_values(system.express([ca.SX(e) for e in expressions]), read, numbers)
+        return with_values(system.to_system([dae.to_reduced(ca.SX(e)) for e in expressions]), read, numbers)
 
     rows = resolve([e for c in limits for e in (c.expression, c.lower, c.upper)])
     values = resolve([p.expression for p in points])
@@ -218,28 +218,28 @@ def _nominals(variable: FlatVariable, dae: Dae) -> list[tuple[str, float]]:
     """Declared typical sizes by scalar name."""
     if variable.nominal is None:
         return []
-    numbers = (abs(float(dae.table.number(x)[0])) for x in variable.nominal)
+    numbers = (abs(dae.number(x)) for x in variable.nominal)
     return [(n, x) for n, x in zip(variable.elements, numbers, strict=True) if x > 0]
 
 
 def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tuple[FreeNumber, ...]:
     """Numbers that the optimiser chooses, and parameters that are held for one solve."""
-    table = dae.table
+    values, symbols = dae.parameter_values, dae.parameter_symbols
     found = []
     for parameter in dae.flat.parameters:
         for k, name in enumerate(parameter.elements):
-            if parameter.free and name in table.independent:
+            if parameter.free and name in dae.adjustable:
                 low, high = _range(parameter, k, dae, held)
-                start = number_guess(name, guess, table.values[name])
-                found.append(FreeNumber(name, table.symbols[name], low, high, start))
+                start = number_guess(name, guess, values[name])
+                found.append(FreeNumber(name, symbols[name], low, high, start))
             elif name in held:
-                if name not in table.independent:
+                if name not in dae.adjustable:
                     raise ModelError(
                         f"parameters: {name} follows from others or shapes the equations, expected one that can "
                         "change; change what it follows from, or build a new problem for each value"
                     )
-                value = table.values[name]
-                found.append(FreeNumber(name, table.symbols[name], value, value, value, held=True))
+                value = values[name]
+                found.append(FreeNumber(name, symbols[name], value, value, value, held=True))
     return tuple(found)
 
 
@@ -258,16 +258,14 @@ def _declared_limits(dae: Dae) -> list[ConstraintRow]:
 
 def _range(parameter: FlatVariable, k: int, dae: Dae, held: Sequence[str]) -> tuple[float, float]:
     for limit in (parameter.min, parameter.max):
-        leaves = (
-            {leaf.name() for leaf in ca.symvar(dae.table.reduce(limit[k]))} if limit is not None else set()
-        )
+        leaves = {leaf.name() for leaf in ca.symvar(dae.to_reduced(limit[k]))} if limit is not None else set()
         for name in leaves & set(held):
             raise ModelError(
                 f"{parameter.name}: its limits depend on {name}, which is to change, expected numbers; write the limit in "
                 "constraints()"
             )
-    low = -np.inf if parameter.min is None else float(dae.table.number(parameter.min[k])[0])
-    high = np.inf if parameter.max is None else float(dae.table.number(parameter.max[k])[0])
+    low = -np.inf if parameter.min is None else dae.number(parameter.min[k])
+    high = np.inf if parameter.max is None else dae.number(parameter.max[k])
     if not low <= high:
         raise ModelError(f"{parameter.name}: limits {low:g} and {high:g} cross; make min the smaller")
     return low, high

@@ -30,7 +30,7 @@ class Built:
 
         Raises ModelError for derivatives that the problem does not hold.
         """
-        found = self.system.resolve([self.read.dae.expression(name) for name in names])
+        found = self.system.to_system([self.read.dae.expression(name) for name in names])
         column = ca.vertcat(ca.SX(0, 1), *with_values(found, self.read, self.numbers))
         problem = self.problem
         own = [problem.time, problem.numbers, *(s.symbol for s in problem.signals)]
@@ -47,7 +47,7 @@ class Built:
 
 def with_values(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mapping[str, float]) -> list[ca.SX]:
     """Parameters that are not free replaced by their numbers, inputs by their courses where these are expressions."""
-    old = [read.dae.table.symbols[n] for n in numbers]
+    old = [read.dae.parameter_symbols[n] for n in numbers]
     new = [ca.SX(x) for x in numbers.values()]
     expressions = _with_courses(expressions, read)
     return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions

@@ -95,7 +95,7 @@ def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> 
     span = horizon[1] - horizon[0]
     for name, value in given.items():
         elements = dae.expand(name)
-        if elements[0] in dae.table.symbols:
+        if elements[0] in dae.parameter_symbols:
             continue
         for k, element in enumerate(elements):
             target = derivative_symbol(dae, element)
@@ -223,11 +223,11 @@ def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None
     """The value of an expression of parameters, or None if others occur in it."""
     if bound.is_constant():
         return float(bound)
-    bound = dae.table.reduce(bound)
+    bound = dae.to_reduced(bound)
     leaves = ca.symvar(bound)
-    if any(leaf.name() not in dae.table.values for leaf in leaves):
+    if any(leaf.name() not in dae.parameter_values for leaf in leaves):
         return None
-    numbers = {**dae.table.values, **chosen}
+    numbers = {**dae.parameter_values, **chosen}
     return float(
         ca.evalf(ca.substitute(bound, ca.vertcat(*leaves), ca.DM([numbers[s.name()] for s in leaves])))
     )
@@ -271,7 +271,7 @@ def _algebraics(
 ) -> dict[str, Guess]:
     """Algebraics from their closed forms along the guess of the rest, where they have one, one after another."""
     dae, free = built.read.dae, built.problem.free
-    old = ca.vertcat(*(dae.table.symbols[n] for n in built.numbers), built.problem.numbers)
+    old = ca.vertcat(*(dae.parameter_symbols[n] for n in built.numbers), built.problem.numbers)
     values = ca.DM([*built.numbers.values(), *(n.guess for n in free)])
     leaves = [s.symbol for s in (*phase.states, *phase.inputs, *phase.courses)]
     signals = [symbols[s.name()] for s in leaves]
@@ -328,9 +328,7 @@ def typical_size(problem: ControlProblem, signal: Signal, bounds: tuple[float, f
 
 def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:
     """(symbol, factor, offset) with name = factor * symbol + offset, or None for a constant."""
-    base, order = split_derivative(name)
-    alias = dae.reduced.aliases.get(base)
+    alias = dae.root(name)
     if alias is None or alias.root is None:
         return None
-    offset = float(dae.table.number(dae.table.reduce(alias.offset))[0]) if order == 0 else 0.0
-    return derivative_name(alias.root, alias.order + order), alias.factor, offset
+    return alias.symbol, alias.factor, dae.number(alias.offset)

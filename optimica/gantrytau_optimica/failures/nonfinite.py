@@ -80,7 +80,9 @@ def _expressions(built: Built, phases: Sequence[Trajectory]) -> Iterator[tuple[c
     words = definition_words(dae)
     symbols = [symbol for symbol, _ in built.system.definitions]
     resolved = (
-        with_values(built.system.resolve([e for _, e in built.system.definitions]), built.read, built.numbers)
+        with_values(
+            built.system.to_system([e for _, e in built.system.definitions]), built.read, built.numbers
+        )
         if symbols
         else []
     )

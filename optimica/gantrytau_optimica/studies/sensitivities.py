@@ -187,7 +187,7 @@ def _parameter(optimum: Optimum, name: str) -> tuple[str, ...]:
                 f"{optimum.name}: {element} is chosen by the optimiser, expected a parameter; ask for the sensitivity of "
                 f"{element} with `.free[{element!r}, parameter]`"
             )
-        if element not in optimum.dae.table.symbols:
+        if element not in optimum.dae.parameter_symbols:
             raise ModelError(
                 f"{optimum.name}: {name} is no parameter, expected one; declare it as a Parameter"
             )
@@ -196,13 +196,12 @@ def _parameter(optimum: Optimum, name: str) -> tuple[str, ...]:
 
 def _check_limits(optimum: Optimum, wanted: Sequence[str]) -> None:
     """ModelError where a limit of a free number follows from a parameter: the program knows its number only."""
-    table = optimum.dae.table
     for parameter in optimum.dae.flat.parameters:
         for limit in (parameter.min, parameter.max) if parameter.free else ():
             leaves = (
                 set()
                 if limit is None
-                else {leaf.name() for leaf in ca.symvar(table.reduce(ca.vertcat(*limit)))}
+                else {leaf.name() for leaf in ca.symvar(optimum.dae.to_reduced(ca.vertcat(*limit)))}
             )
             for name in wanted:
                 if name in leaves:

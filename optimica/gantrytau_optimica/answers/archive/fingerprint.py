@@ -74,7 +74,7 @@ def _statements(read: SymbolicProblem) -> Iterator[str]:
         start = quantity.start if quantity.fixed else None
         yield f"{quantity.name} {quantity.fixed} {start} {quantity.min} {quantity.max} {quantity.free}"
     free = {n for p in read.dae.flat.parameters if p.free for n in p.elements}
-    yield from (f"{n} = {x!r}" for n, x in sorted(read.dae.table.values.items()) if n not in free)
+    yield from (f"{n} = {x!r}" for n, x in sorted(read.dae.parameter_values.items()) if n not in free)
 
 
 def _samples(samples: Any) -> str:

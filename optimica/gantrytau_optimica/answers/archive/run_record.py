@@ -132,7 +132,7 @@ def _source(kind: type) -> Path | None:
 def _parameters(optimum: Optimum) -> dict[str, Any]:
     """Values of all parameters that are not free, held ones as they were for this solve."""
     held = {n.name: n.guess for n in optimum.program.problem.free if n.held}
-    values = {**optimum.dae.table.values, **held}
+    values = {**optimum.dae.parameter_values, **held}
     return {name: values[name] for name in sorted(values) if name not in optimum.free}
 
 

@@ -1,0 +1,46 @@
+"""The three alphabets in which expressions are written, and the ways from one to the next.
+
+| alphabet | symbols | who writes in it |
+|---|---|---|
+| of the model | variables, propagated quantities, their derivatives, parameters, time, as users name them | `FlatModel` |
+| reduced | roots of aliases and their derivatives, independent parameters, time | residuals of `Indexed`, blocks |
+| of a system | states, algebraics, inputs, independent parameters, time | `System`, and the solvers above it |
+
+Each alphabet holds symbols of the one before it, so that what is in the later one already stays as it is.
+`Reduced.to_reduced` leads from the first to the second (`Translated.expression` for one name, `Reduced.root` for the
+root behind it), `System.to_system` from the second to the third. What is solved block by block leads on by a
+`Substitution`, whatever the last symbols are.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Substitution:
+    """Symbols and what they stand for, in an order in which each needs only symbols before it."""
+
+    definitions: tuple[tuple[ca.SX, ca.SX], ...]
+
+    def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """The expressions without any of the symbols; what they have in common is written once."""
+        if not self.definitions or not expressions:
+            return list(expressions)
+        symbols, values = [s for s, _ in self.definitions], [e for _, e in self.definitions]
+        _, found = ca.substitute_inplace(symbols, values, list(expressions), False)
+        return list(found)
+
+
+def column(elements: Sequence[ca.SX]) -> ca.SX:
+    """Scalars and columns below each other; (0, 1) for none."""
+    return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+
+def values_at(expression: ca.SX, point: Mapping[str, float]) -> np.ndarray:
+    """The numbers of an expression where its symbols have these values, as a dense array of its shape."""
+    leaves = ca.symvar(expression)
+    function = ca.Function("values", [ca.vertcat(*leaves)], [ca.densify(expression)])
+    return np.array(function(ca.DM([point[leaf.name()] for leaf in leaves]))).reshape(expression.shape)
