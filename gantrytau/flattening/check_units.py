@@ -53,7 +53,7 @@ POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction
 SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 
 
-class Term(NamedTuple):
+class Dimensioned(NamedTuple):
     """An expression as it is written, its unit, and what is wrong with it."""
 
     unit: Unit
@@ -109,17 +109,19 @@ def _read(unit: str, path: str) -> Dimension:
         raise ModelError(f"{path}: {error}") from None
 
 
-def _terms(symbols: Sequence[ca.SX], units: Mapping[str, Unit], expressions: Sequence[ca.SX]) -> list[Term]:
+def _terms(
+    symbols: Sequence[ca.SX], units: Mapping[str, Unit], expressions: Sequence[ca.SX]
+) -> list[Dimensioned]:
     """Scalar expressions with their units."""
-    terms = [Term(units[s.name()], s.name()) for s in symbols]
+    terms = [Dimensioned(units[s.name()], s.name()) for s in symbols]
     function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
     found = computed(
-        function, lambda k, _: terms[k], lambda x: Term(NUMBER if x else ANY, f"{x:g}"), _operation
+        function, lambda k, _: terms[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
     )
-    return [one[0] if one else Term(ANY, "0") for one in found]
+    return [one[0] if one else Dimensioned(ANY, "0") for one in found]
 
 
-def _operation(operator: int, operands: Sequence[Term]) -> Term:
+def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
     """The term that an operation makes; what is wrong with an operand goes on."""
     units, words = [term.unit for term in operands], [term.text for term in operands]
     constant = None
@@ -127,7 +129,7 @@ def _operation(operator: int, operands: Sequence[Term]) -> Term:
         constant = Fraction(words[1]).limit_denominator(1000)
     unit, fault = _unit(operator, units, words, constant)
     carried = next((term.fault for term in operands if term.fault), "")
-    return Term(unit, _words(operator, words), carried or fault or "")
+    return Dimensioned(unit, _words(operator, words), carried or fault or "")
 
 
 def _unit(

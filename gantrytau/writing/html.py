@@ -10,25 +10,22 @@ from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
+from gantrytau.writing.pages import folded, page, table
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.sharing import written_at
 from gantrytau.writing.text import PlainSyntax, event_lines, plain_number
 
 STYLE = """
-:root { color-scheme: light dark; --line: #8886; --soft: #888; }
-body { font: 16px/1.5 Georgia, serif; max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
-h1, h2, summary, table, nav, .origin { font-family: system-ui, sans-serif; }
+body { max-width: 76rem; }
 nav a { margin-right: 1.2rem; }
-details { border-left: 3px solid var(--line); padding-left: 1rem; margin: .4rem 0; }
-summary { cursor: pointer; }
+details { border-left: 3px solid #8886; padding-left: 1rem; margin: .4rem 0; }
 .equation { overflow-x: auto; padding: .3rem 0; }
-.origin { color: var(--soft); font-size: .8rem; }
+.origin { color: #888; font-size: .8rem; }
 math a { color: inherit; text-decoration: none; }
 math a:hover { text-decoration: underline; }
 math { text-align: left; font-size: 1.05rem; }
-table { border-collapse: collapse; font-size: .85rem; width: 100%; }
-th, td { text-align: left; padding: .15rem .7rem .15rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
-td:first-child { font-family: ui-monospace, monospace; white-space: nowrap; }
+table { width: 100%; }
+td:first-child { white-space: nowrap; }
 :target { outline: 2px solid orange; }
 """
 HEAD = ("name", "unit", "description", "role", "start or value")
@@ -66,11 +63,9 @@ class _Page:
         return f"{name}{unit}: {prefix}{variable.description or variable.kind}"
 
     def text(self, summary: str) -> str:
-        name = escape(self.dae.name)
+        title = f"Equations of {self.dae.name}"
         parts = [
-            f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Equations of {name}</title>',
-            f"<style>{STYLE}</style></head><body>",
-            f"<h1>Equations of {name}</h1>",
+            f"<h1>{escape(title)}</h1>",
             '<nav><a href="#components">by component</a><a href="#blocks">by block</a>'
             '<a href="#tables">variables and parameters</a></nav>',
             f"<pre>{escape(summary)}</pre>",
@@ -81,9 +76,8 @@ class _Page:
             *(self._block(section) for section in sections(self.dae)),
             '<h2 id="tables">Variables and parameters</h2>',
             *self._tables(),
-            "</body></html>",
         ]
-        return "\n".join(parts) + "\n"
+        return page(title, parts, STYLE)
 
     def _components(self) -> list[str]:
         groups: dict[str, list[Equation]] = {}
@@ -99,7 +93,7 @@ class _Page:
 
     def _events(self) -> list[str]:
         lines = [f"<pre>{escape(line)}</pre>" for line in event_lines(self.dae)]
-        return [_details("<b>set at instants</b>", lines, opened=True)] if lines else []
+        return [folded("<b>set at instants</b>", lines, opened=True)] if lines else []
 
     def _component(self, heading: str, equations: list[Equation]) -> str:
         sides = [side for e in equations for side in (e.left, e.right)]
@@ -112,7 +106,7 @@ class _Page:
             lines.append(_row(equality(left.text, right.text), equation.name + note))
         count = len(equations)
         summary = f"<b>{escape(heading)}</b>: {count} equation{'' if count == 1 else 's'}"
-        return _details(summary, [*lines, self._glossary(sides)])
+        return folded(summary, [*lines, self._glossary(sides)])
 
     def _block(self, section: Section) -> str:
         text = written_at(section.origin, (line.right for line in section.lines), self.syntax)
@@ -127,7 +121,7 @@ class _Page:
         more = f" and {len(section.unknowns) - 4} more" if len(section.unknowns) > 4 else ""
         summary = f"[{section.number}] {', '.join(unknowns)}{more} ({escape(section.title)})"
         used = [line.right for line in section.lines]
-        return _details(
+        return folded(
             summary, [*lines, origin, self._glossary(used, section.unknowns)], opened=section.single
         )
 
@@ -135,13 +129,8 @@ class _Page:
         """What the names in some expressions mean."""
         used = dict.fromkeys([*more, *(s.name() for s in ca.symvar(ca.SX(ca.vertcat(*expressions))))])
         bases = dict.fromkeys(split_derivative(n)[0] for n in used)
-        rows = [
-            f"<tr>{''.join(f'<td>{c}</td>' for c in self._cells(n)[:3])}</tr>"
-            for n in bases
-            if n in self.declared
-        ]
-        table = f"<table>{_head(HEAD[:3])}{''.join(rows)}</table>"
-        return _details("names", [table]) if rows else ""
+        rows = [self._cells(name)[:3] for name in bases if name in self.declared]
+        return folded("names", [table(HEAD[:3], rows)]) if rows else ""
 
     def _tables(self) -> list[str]:
         states = list(dict.fromkeys(split_derivative(n)[0] for n in self.dae.states))
@@ -149,29 +138,26 @@ class _Page:
         parameters = [n for p in self.flat.parameters for n in p.elements]
         groups = [("states", states), ("inputs", list(self.dae.known)), ("outputs", list(self.dae.outputs))]
         found = [
-            _details(f"{word}: {len(names)}", [self._table(names)], opened=True)
+            folded(f"{word}: {len(names)}", [self._table(names)], opened=True)
             for word, names in groups
             if names
         ]
-        found.append(_details(f"parameters: {len(parameters)}", [self._table(parameters, anchored=True)]))
-        found.append(_details(f"variables: {len(variables)}", [self._table(variables, anchored=True)]))
+        found.append(folded(f"parameters: {len(parameters)}", [self._table(parameters, anchored=True)]))
+        found.append(folded(f"variables: {len(variables)}", [self._table(variables, anchored=True)]))
         if self.flat.definitions:
             found.append(
-                _details(f"propagated quantities: {len(self.flat.definitions)}", [self._definitions()])
+                folded(f"propagated quantities: {len(self.flat.definitions)}", [self._definitions()])
             )
         return found
 
     def _table(self, names: Iterable[str], anchored: bool = False) -> str:
-        rows = []
-        for name in names:
-            cells = "".join(f"<td>{c}</td>" for c in self._cells(name))
-            rows.append(f'<tr id="{self.anchors[name]}">{cells}</tr>' if anchored else f"<tr>{cells}</tr>")
-        return f"<table>{_head(HEAD)}{''.join(rows)}</table>"
+        names = list(names)
+        marks = [f'id="{self.anchors[name]}"' for name in names] if anchored else None
+        return table(HEAD, map(self._cells, names), marks=marks)
 
     def _cells(self, name: str) -> tuple[str, ...]:
         variable, _ = self.declared[name]
-        cells = (name, variable.unit or "", variable.description, self._role(name), self._value(name))
-        return tuple(escape(c) for c in cells)
+        return (name, variable.unit or "", variable.description, self._role(name), self._value(name))
 
     def _role(self, name: str) -> str:
         variable, _ = self.declared[name]
@@ -216,14 +202,3 @@ def _plain(expression: ca.SX) -> str:
 def _row(math: str, origin: str = "") -> str:
     words = f'<div class="origin">{escape(origin)}</div>' if origin else ""
     return f'<div class="equation">{math}{words}</div>'
-
-
-def _head(words: Iterable[str]) -> str:
-    return f"<tr>{''.join(f'<th>{w}</th>' for w in words)}</tr>"
-
-
-def _details(summary: str, lines: list[str], opened: bool = False) -> str:
-    state = " open" if opened else ""
-    return "\n".join(
-        [f"<details{state}><summary>{summary}</summary>", *(line for line in lines if line), "</details>"]
-    )

@@ -9,19 +9,14 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from itertools import groupby
 
+from gantrytau.writing.pages import folded, page, table
 from gantrytau_fmu.describing.description_checks import initial_of, limit
 from gantrytau_fmu.describing.license import BSD_3_CLAUSE
 from gantrytau_fmu.describing.xml_text import plain
 from gantrytau_fmu.description import FmuDescription, FmuVariable
 
 MANY = 300  # outputs; more of them are grouped by component and folded
-STYLE = """:root{color-scheme:light dark}
-body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem}
-table{border-collapse:collapse;font-size:.88rem;width:100%}
-th,td{text-align:left;vertical-align:top;padding:.15rem .8rem .15rem 0;border-bottom:1px solid #8885}
-td:first-child,code,pre{font-family:ui-monospace,monospace}
-pre{overflow-x:auto;padding:.6rem;border:1px solid #8885}
-summary{cursor:pointer}"""
+STYLE = "table { width: 100%; }"
 SOLVERS = {
     "dopri5": "DOPRI5, the explicit Runge-Kutta method 5(4) of Dormand and Prince with adaptive steps",
     "rodas4": "Rodas4, a linearly implicit (Rosenbrock) method of order 4 with adaptive steps, for stiff models",
@@ -46,9 +41,7 @@ def documentation(fmu: FmuDescription, solver: str = "dopri5") -> bytes:
         _use(fmu),
         _license(fmu),
     ]
-    head = f'<meta charset="utf-8"><title>{name}</title><style>{STYLE}</style>'
-    text = f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(filter(None, parts))
-    return (text + "\n</body></html>\n").encode()
+    return page(plain(fmu.name), parts, STYLE).encode()
 
 
 def licenses(fmu: FmuDescription) -> dict[str, bytes]:
@@ -92,7 +85,7 @@ def _facts(fmu: FmuDescription) -> str:
         "Made with": ", ".join(filter(None, (_tool(fmu.tool), fmu.generated))),
         "Token": fmu.token,
     }
-    return _table((), ((_text(name), _text(value)) for name, value in rows.items() if value))
+    return table((), ((name, plain(value)) for name, value in rows.items() if value))
 
 
 def _tool(name: str) -> str:
@@ -140,8 +133,8 @@ def _grouped(title: str, variables: list[FmuVariable]) -> str:
         groups.setdefault(_component(variable.name), []).append(variable)
     parts = [f"<h2>{title} ({len(variables)}), by component</h2>"]
     for component, members in groups.items():
-        table = _variable_table(_folded(members))
-        parts.append(f"<details><summary>{_text(component)} ({len(members)})</summary>\n{table}</details>")
+        summary = f"{_text(component)} ({len(members)})"
+        parts.append(folded(summary, [_variable_table(_neighbours(members))]))
     return "\n".join(parts)
 
 
@@ -151,7 +144,7 @@ def _component(name: str) -> str:
     return inner.split(".")[0] if "." in inner and "'" not in inner else "the model itself"
 
 
-def _folded(variables: list[FmuVariable]) -> Iterable[tuple[str, FmuVariable]]:
+def _neighbours(variables: list[FmuVariable]) -> Iterable[tuple[str, FmuVariable]]:
     """Neighbours that differ by their last index only, as one row: "tool.r[0] ... [2]"."""
     for _, group in groupby(
         variables, lambda v: (_base(v.name), v.unit, v.description, v.type, v.variability)
@@ -171,7 +164,7 @@ def _base(name: str) -> str:
 
 def _variable_table(rows: Iterable[tuple[str, FmuVariable]]) -> str:
     head = ("Name", "Unit", "Start", "Limits", "Description")
-    return _table(head, ((_text(name), _text(v.unit), _start(v), _limits(v), _note(v)) for name, v in rows))
+    return table(head, ((plain(name), plain(v.unit), _start(v), _limits(v), _note(v)) for name, v in rows))
 
 
 def _start(variable: FmuVariable) -> str:
@@ -183,19 +176,13 @@ def _start(variable: FmuVariable) -> str:
 def _limits(variable: FmuVariable) -> str:
     low, high = limit(variable.min), limit(variable.max)
     if low is None:
-        return "" if high is None else f"&le; {high:.9g}"
-    return f"&ge; {low:.9g}" if high is None else f"{low:.9g} to {high:.9g}"
+        return "" if high is None else f"≤ {high:.9g}"
+    return f"≥ {low:.9g}" if high is None else f"{low:.9g} to {high:.9g}"
 
 
 def _note(variable: FmuVariable) -> str:
     fixed = FIXED if (variable.causality, variable.variability) == ("parameter", "fixed") else ""
-    return "; ".join(filter(None, (_text(variable.description), fixed)))
-
-
-def _table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> str:
-    top = "".join(f"<th>{cell}" for cell in head)
-    body = "\n".join("<tr>" + "".join(f"<td>{cell}" for cell in row) for row in rows)
-    return "<table>\n" + (f"<tr>{top}\n" if top else "") + body + "\n</table>"
+    return "; ".join(filter(None, (plain(variable.description), fixed)))
 
 
 def _solution(fmu: FmuDescription, solver: str) -> str:

@@ -5,16 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.writing.pages import folded, page, table, verdict
+
 STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
-table { border-collapse: collapse; font-size: .9rem; margin: .5rem 0 1.5rem; }
-th, td { text-align: right; padding: .15rem .8rem .15rem 0; border-bottom: 1px solid #8886; }
-th:first-child, td:first-child { text-align: left; font-family: ui-monospace, monospace; }
 .matrix { overflow-x: auto; } .matrix td { font-size: .7rem; padding-right: .4rem; }
-.verdict { border-left: .5rem solid #3a3; padding: .2rem 1rem; background: #3a32; }
-.bad { border-color: #c33; background: #c332; }
-.facts td { text-align: left; }
 rect { fill: #4a7ebb; } svg text { font: 12px system-ui; fill: currentColor; }
 """
 
@@ -45,26 +39,18 @@ def html_report(numbers: dict[str, Any]) -> str:
         "<h2>Poses</h2>",
         _poses(numbers),
     ]
-    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n'
-        + "\n".join(parts)
-        + "\n</body></html>\n"
-    )
+    return page(title, parts, STYLE)
 
 
-def _verdict(verdict: dict[str, Any]) -> str:
-    if verdict["good"] is None:
+def _verdict(said: dict[str, Any]) -> str:
+    if said["good"] is None:
         return ""
-    word = "Good" if verdict["good"] else "Not good enough"
-    style = "verdict" if verdict["good"] else "verdict bad"
-    return f'<div class="{style}"><h2>{word}</h2><p>{escape(verdict["words"])}</p></div>'
+    return verdict(said["good"], "Good" if said["good"] else "Not good enough", [said["words"]])
 
 
 def _facts(numbers: dict[str, Any]) -> str:
     rows = {"date": numbers["date"].replace("T", " "), "robot": numbers["robot"], **numbers["facts"]}
-    body = "".join(f"<tr><td>{escape(a)}</td><td>{escape(b)}</td></tr>" for a, b in rows.items())
-    return f'<table class="facts">{body}</table>'
+    return table((), rows.items())
 
 
 def _summary(numbers: dict[str, Any]) -> str:
@@ -95,7 +81,7 @@ def _transformation(motion: dict[str, Any] | None) -> list[str]:
     return [
         "<h2>Frame of the measurements</h2>",
         f"<p>{words}</p>",
-        _table(["R", "", "", "t, m"], rows),
+        table(["R", "", "", "t, m"], rows, "numbers"),
     ]
 
 
@@ -122,20 +108,12 @@ def _poses(numbers: dict[str, Any]) -> str:
         rows.append([*cells, *vector])
     head = [*heads, *(name for name, _ in scales.values()), "x, um", "y, um", "z, um"]
     which = "the worst poses" if len(listed) < numbers["poses_held_out"] else "all poses"
-    return (
-        f"<details><summary>Errors of {len(listed)} poses ({which})</summary>{_table(head, rows)}</details>"
-    )
+    return folded(f"Errors of {len(listed)} poses ({which})", [table(head, rows, "numbers")])
 
 
 def _list(items: Any) -> str:
     rows = "".join(f"<li>{escape(item)}</li>" for item in items)
     return f"<ul>{rows}</ul>" if rows else "<p>none</p>"
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    top = "".join(f"<th>{escape(h)}</th>" for h in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
 
 
 def _errors(numbers: dict[str, Any]) -> str:
@@ -152,7 +130,7 @@ def _errors(numbers: dict[str, Any]) -> str:
     if numbers["errors_of"] == "fitted poses" and validation and validation["mean"] is not None:
         cells = [f"{validation[k] * 1e6:.4g}" for k in ("mean", "median", "p95", "max")]
         rows.append(["position, by fits without the pose, um", *cells])
-    return _table(["", "mean", "median", "95 %", "largest"], rows)
+    return table(["", "mean", "median", "95 %", "largest"], rows, "numbers")
 
 
 def histogram(bars: dict[str, Any], width: int = 640, height: int = 180) -> str:
@@ -178,12 +156,12 @@ def _axes(axes: dict[str, Any]) -> str:
             axes["directions"], axes["root_mean_squares_m"], axes["shares"], strict=True
         )
     ]
-    return _table(["direction", "root mean square, um", "share"], rows)
+    return table(["direction", "root mean square, um", "share"], rows, "numbers")
 
 
 def _tests(tests: list[dict[str, Any]]) -> str:
     rows = [[t["link"], t["test"], f"{t['value']:.4g}", f"{t['probability']:.3g}"] for t in tests]
-    return _table(["link", "test", "value", "probability by chance"], rows)
+    return table(["link", "test", "value", "probability by chance"], rows, "numbers")
 
 
 def _parameters(numbers: dict[str, Any]) -> str:
@@ -196,7 +174,7 @@ def _parameters(numbers: dict[str, Any]) -> str:
             before = numbers["nominal"].get(element)
             old = ["-", "-"] if before is None else [f"{before:.7f}", f"{x - before:+.7f}"]
             rows.append([element, f"{x:.7f}", shown, *old])
-    return _table(["name", "value (m, 1, rad)", "deviation, 1e-6", "nominal", "change"], rows)
+    return table(["name", "value (m, 1, rad)", "deviation, 1e-6", "nominal", "change"], rows, "numbers")
 
 
 def _correlations(covariance: dict[str, Any]) -> str:
@@ -209,4 +187,4 @@ def _correlations(covariance: dict[str, Any]) -> str:
         for k, (name, row) in enumerate(zip(names, C / np.outer(d, d), strict=True))
     ]
     words = "In per cent; the covariance itself, in m2, stands in the JSON file beside this page."
-    return f'<p>{words}</p><div class="matrix">{_table(["", *map(str, range(len(names)))], rows)}</div>'
+    return f'<p>{words}</p><div class="matrix">{table(["", *map(str, range(len(names)))], rows, "numbers")}</div>'

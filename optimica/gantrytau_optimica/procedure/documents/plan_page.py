@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gantrytau.writing.pages import page, table, verdict
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
 from gantrytau_optimica.procedure.fleet import WIDER
 from gantrytau_optimica.procedure.pose_choice import CRITERION
@@ -14,16 +15,7 @@ from gantrytau_optimica.procedure.verdict import um
 
 USUAL = 20  # robots that are drawn
 DOUBT = 0.05  # of 95 % confidence
-STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1.5rem; }
-table { border-collapse: collapse; font-size: .9rem; margin: .5rem 0 1.5rem; }
-th, td { text-align: right; padding: .15rem .8rem .15rem 0; border-bottom: 1px solid #8886; }
-th:first-child, td:first-child { text-align: left; white-space: nowrap; }
-.verdict { border-left: .5rem solid #3a3; padding: .2rem 1rem; background: #3a32; }
-.bad { border-color: #c33; background: #c332; }
-.passed { opacity: .6; } img { max-width: 100%; background: white; }
-"""
+STYLE = ".passed { opacity: .6; } img { max-width: 100%; background: white; }"
 
 
 def command(plan: PosePlan, folder: str | Path = ".") -> str:
@@ -69,18 +61,12 @@ def html_page(
         "<h2>Poses</h2>",
         _poses(plan),
     ]
-    head = (
-        '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style>"
-    )
-    body = "\n".join(parts)
-    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
+    return page(title, parts, STYLE)
 
 
 def _verdict(plan: PosePlan) -> str:
-    said = "".join(f"<p>{escape(reason)}</p>" for reason in plan.verdict.reasons)
     word = "Good: go ahead" if plan.verdict.good else "Not good enough yet"
-    return f'<div class="verdict{"" if plan.verdict.good else " bad"}"><h2>{word}</h2>{said}</div>'
+    return verdict(plan.verdict.good, word, plan.verdict.reasons)
 
 
 def _steps(plan: PosePlan, program: str, folder: str | Path, trigger: str) -> str:
@@ -146,10 +132,7 @@ def _facts(plan: PosePlan) -> str:
         ["checked", f"the nominal robot, and {drawn(plan)}"],
         ["not reached and replaced", _lost(plan)],
     ]
-    body = "".join(
-        f"<tr><td>{escape(a)}</td><td style='text-align:left'>{escape(b)}</td></tr>" for a, b in rows
-    )
-    return f"<table>{body}</table>"
+    return table((), rows)
 
 
 def _lost(plan: PosePlan) -> str:
@@ -162,32 +145,26 @@ def _angle(angle: float) -> str:
 
 def _trials(plan: PosePlan) -> str:
     trials = plan.trials
-    head = "<tr><th>robot</th><th>before</th><th>after, mean</th><th>after, largest</th><th>not seen</th><th></th></tr>"
-    rows = ""
-    for k in range(len(trials)):
-        cells = [
-            str(k + 1),
-            um(trials.before[k]),
-            um(trials.after[k]),
-            um(trials.largest[k]),
-            f"{trials.unseen[k]:.0f}",
-        ]
-        rows += "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in (*cells, trials.notes[k])) + "</tr>"
+    head = ("robot", "before", "after, mean", "after, largest", "not seen", "")
+    rows = [
+        (str(k + 1), um(before), um(after), um(largest), f"{unseen:.0f}", note)
+        for k, (before, after, largest, unseen, note) in enumerate(
+            zip(trials.before, trials.after, trials.largest, trials.unseen, trials.notes, strict=True)
+        )
+    ]
     return (
         "<p>Errors of the tool over the workspace, robots laid over each other best. With 25 readings of each pose averaged "
-        f"the worst robot has {um(trials.averaged)}.</p><table>{head}{rows}</table>"
+        f"the worst robot has {um(trials.averaged)}.</p>{table(head, rows, 'numbers')}"
     )
 
 
 def _poses(plan: PosePlan) -> str:
     names = [f"{name} [{'mm' if k < plan.carts else 'deg'}]" for k, name in enumerate(plan.joints)]
     heads = ["number", *names, "x [m]", "y [m]", "z [m]", ""]
-    rows = "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in heads) + "</tr>"
+    rows = []
     rows_of_plan = zip(plan.numbers, plan.q, plan.r, plan.measured, strict=True)
     for k, (number, q, r, measured) in enumerate(rows_of_plan):
         joints = [f"{x * 1e3:.4f}" if i < plan.carts else f"{np.degrees(x):.5f}" for i, x in enumerate(q)]
         word = "measure" if measured else "home" if k in (0, len(plan.q) - 1) else "pass"
-        cells = [str(number), *joints, *(f"{x:.3f}" for x in r), word]
-        style = "" if measured else ' class="passed"'
-        rows += f"<tr{style}>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
-    return f"<table>{rows}</table>"
+        rows.append([str(number), *joints, *(f"{x:.3f}" for x in r), word])
+    return table(heads, rows, "numbers", ["" if measured else 'class="passed"' for measured in plan.measured])
