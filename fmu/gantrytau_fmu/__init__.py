@@ -4,7 +4,21 @@ from gantrytau_fmu.description import Experiment
 from gantrytau_fmu.export import export_fmu
 from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.read_fmu import read_fmu
+from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
+from gantrytau_fmu.systems.run_fmu import run_fmu
+from gantrytau_fmu.systems.ssp.system_description import check_system, read_system
 from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 
-__all__ = ["Experiment", "check_fmu", "cosimulate", "export_fmu", "read_fmu", "write_ssp"]
+__all__ = [
+    "Experiment",
+    "UnconnectedInputs",
+    "check_fmu",
+    "check_system",
+    "cosimulate",
+    "export_fmu",
+    "read_fmu",
+    "read_system",
+    "run_fmu",
+    "write_ssp",
+]

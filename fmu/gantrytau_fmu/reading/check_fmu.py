@@ -9,14 +9,17 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.building.platforms import native
+from gantrytau_fmu.reading.findings import FmuFinding, errors_first
+from gantrytau_fmu.reading.inconsistencies import inconsistencies
+from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
+from gantrytau_fmu.reading.safety import unpack
 
-Severity = Literal["error", "warning", "note"]
 TIMEOUT = 60.0  # s for a trial run of all interfaces
 _REPORT = 1_000_000  # bytes of the report of a trial run that are read
 _PART = r"[A-Za-z_][A-Za-z_0-9]*(\[[0-9]+(,[0-9]+)*\])?"
@@ -31,23 +34,9 @@ _OURS = (  # of FMPy: said by us with names, and without its mistakes
 )
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something that a check found: an "error", a "warning" (it may work elsewhere) or a "note"; path: of what file."""
-
-    severity: Severity
-    message: str
-    path: str = field(default="", compare=False)
-
-    def __str__(self) -> str:
-        return (
-            f"{self.path}: {self.severity}: {self.message}"
-            if self.path
-            else f"{self.severity}: {self.message}"
-        )
-
-
-def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float = TIMEOUT) -> list[Finding]:
+def check_fmu(
+    path: str | os.PathLike[str], *, run: bool = False, timeout: float = TIMEOUT
+) -> list[FmuFinding]:
     """All that is wrong with an FMU, errors first; [] if nothing is.
 
     Looks at the archive (`safety`), the official schemas, what FMPy validates, and what neither of them does: limits
@@ -56,29 +45,23 @@ def check_fmu(path: str | os.PathLike[str], *, run: bool = False, timeout: float
     no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
     """
     path = Path(path)
-    found = _found(path, run, timeout)
-    order = ("error", "warning", "note")
-    found.sort(key=lambda finding: order.index(finding.severity))
-    return [replace(finding, path=str(path)) for finding in found]
+    return [replace(finding, path=str(path)) for finding in errors_first(_found(path, run, timeout))]
 
 
-def _found(path: Path, run: bool, timeout: float) -> list[Finding]:
-    from gantrytau_fmu.reading.inconsistencies import inconsistencies
-    from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
-
+def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
     try:
         files = read_files(path)
         if problems := schema_problems(files):
-            return [Finding("error", problem) for problem in problems]
+            return [FmuFinding("error", problem) for problem in problems]
         model = model_of(files)
         fmu = describe(files, model)
     except ModelError as error:
-        return [Finding("error", str(error).removeprefix(f"{path}: "))]
+        return [FmuFinding("error", str(error).removeprefix(f"{path}: "))]
     findings = list(inconsistencies(fmu, files, model))
     for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
         if not tripped and not problem.startswith(_OURS):
-            findings.append(Finding("error", problem))
+            findings.append(FmuFinding("error", problem))
     if run:
         findings += _tried(path, native().name in fmu.platforms, timeout)
     return findings
@@ -100,12 +83,10 @@ def _validated(packed: Any, names: Iterable[str]) -> list[str]:
     return []
 
 
-def _tried(path: Path, here: bool, timeout: float) -> Iterator[Finding]:
+def _tried(path: Path, here: bool, timeout: float) -> Iterator[FmuFinding]:
     """What happens when the FMU is run in a process of its own."""
-    from gantrytau_fmu.reading.safety import unpack
-
     if not here:
-        yield Finding("warning", f"not run: it has no binary for this machine ({native().name})")
+        yield FmuFinding("warning", f"not run: it has no binary for this machine ({native().name})")
         return
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         report = Path(folder) / "report"
@@ -117,9 +98,9 @@ def _tried(path: Path, here: bool, timeout: float) -> Iterator[Finding]:
     if finished:
         return
     if code is None:
-        yield Finding("error", f"{stage}: no answer after {timeout:g} s")
+        yield FmuFinding("error", f"{stage}: no answer after {timeout:g} s")
     else:
-        yield Finding("error", f"{stage}: the process ended ({_ending(code)})")
+        yield FmuFinding("error", f"{stage}: the process ended ({_ending(code)})")
 
 
 def _run_apart(arguments: list[str], folder: str, timeout: float) -> int | None:
@@ -142,7 +123,7 @@ def _run_apart(arguments: list[str], folder: str, timeout: float) -> int | None:
         process.wait()
 
 
-def _reported(report: Path) -> tuple[str, list[Finding], bool]:
+def _reported(report: Path) -> tuple[str, list[FmuFinding], bool]:
     """The last stage that a trial run began, what it found, and whether it came to its end."""
     stage, findings, finished = "start", [], False
     with report.open("rb") as file:
@@ -153,7 +134,7 @@ def _reported(report: Path) -> tuple[str, list[Finding], bool]:
             stage = str(said.get("stage", stage))
             finished = finished or said.get("finished") is True
             if said.get("severity") in ("error", "warning", "note"):
-                findings.append(Finding(said["severity"], str(said["message"])))
+                findings.append(FmuFinding(said["severity"], str(said["message"])))
     return stage, findings, finished
 
 

@@ -11,13 +11,13 @@ from xml.etree import ElementTree
 
 from gantrytau_fmu.building.platforms import ALIASES, native
 from gantrytau_fmu.description import FmuVariable
-from gantrytau_fmu.reading.check_fmu import Finding
+from gantrytau_fmu.reading.findings import FmuFinding
 from gantrytau_fmu.reading.fmu_file import FmuFile
 from gantrytau_fmu.reading.libraries import misplaced
 from gantrytau_fmu.reading.read_fmu import FmuTexts
 
 
-def inconsistencies(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[Finding]:
+def inconsistencies(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[FmuFinding]:
     """What an FMU says and does not keep. model: FMPy's ModelDescription."""
     yield from _header(fmu)
     for variable in fmu.variables:
@@ -29,41 +29,41 @@ def inconsistencies(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[Findi
     yield from _binaries(fmu, files)
 
 
-def _header(fmu: FmuFile) -> Iterator[Finding]:
+def _header(fmu: FmuFile) -> Iterator[FmuFinding]:
     """Names and numbers of the FMU as a whole."""
     if not fmu.token:
-        yield Finding(
+        yield FmuFinding(
             "error", "the GUID or instantiation token is empty, expected one to tell versions apart"
         )
     for interface in fmu.interfaces:
         if not re.fullmatch(r"[A-Za-z_]\w*", interface.identifier or "", re.ASCII):
-            yield Finding(
+            yield FmuFinding(
                 "error", f"modelIdentifier '{interface.identifier}' of {interface.kind} is no name in C"
             )
         if interface.capabilities.get("needsExecutionTool"):
-            yield Finding(
+            yield FmuFinding(
                 "note", f"{interface.kind} needs the tool {fmu.tool or 'that made it'} on this machine"
             )
     if not fmu.interfaces:
-        yield Finding("error", "it has no interface, expected Model Exchange or Co-Simulation")
+        yield FmuFinding("error", "it has no interface, expected Model Exchange or Co-Simulation")
     experiment = fmu.experiment
     if None not in (experiment.start, experiment.stop) and experiment.stop <= experiment.start:  # type: ignore[operator]
-        yield Finding(
+        yield FmuFinding(
             "warning",
             f"default experiment: stop {experiment.stop:g} s is not after start {experiment.start:g} s",
         )
     for word, value in (("tolerance", experiment.tolerance), ("step", experiment.step)):
         if value is not None and not 0 < value < math.inf:
-            yield Finding("error", f"default experiment: {word} {value:g}, expected a positive number")
+            yield FmuFinding("error", f"default experiment: {word} {value:g}, expected a positive number")
 
 
-def _values(variable: FmuVariable) -> Iterator[Finding]:
+def _values(variable: FmuVariable) -> Iterator[FmuFinding]:
     """Start value, limits and nominal value of a variable."""
     name, least, greatest = variable.name, variable.min, variable.max
     if least is not None and greatest is not None and not least <= greatest:
-        yield Finding("error", f"{name}: min {least:g} is above max {greatest:g}")
+        yield FmuFinding("error", f"{name}: min {least:g} is above max {greatest:g}")
     if variable.nominal is not None and not 0 < variable.nominal < math.inf:
-        yield Finding("error", f"{name}: nominal {variable.nominal:g}, expected a positive number")
+        yield FmuFinding("error", f"{name}: nominal {variable.nominal:g}, expected a positive number")
     starts = variable.start if isinstance(variable.start, tuple) else (variable.start,)
     count = math.prod(variable.shape)
     if (
@@ -72,20 +72,22 @@ def _values(variable: FmuVariable) -> Iterator[Finding]:
         and isinstance(variable.start, tuple)
         and len(starts) not in (1, count)
     ):
-        yield Finding("error", f"{name}: found {len(starts)} start values, expected {count} or one for all")
+        yield FmuFinding(
+            "error", f"{name}: found {len(starts)} start values, expected {count} or one for all"
+        )
     numbers = [value for value in starts if isinstance(value, (int, float)) and not isinstance(value, bool)]
     for value in numbers:
         if not math.isfinite(value):
-            yield Finding("error", f"{name}: start {value:g}, expected a finite number")
+            yield FmuFinding("error", f"{name}: start {value:g}, expected a finite number")
         elif (least is not None and value < least) or (greatest is not None and value > greatest):
             low, high = ("" if limit is None else f"{limit:.9g}" for limit in (least, greatest))
-            yield Finding("error", f"{name}: start {value:.9g} is outside of its limits [{low}, {high}]")
+            yield FmuFinding("error", f"{name}: start {value:.9g} is outside of its limits [{low}, {high}]")
         else:
             continue
         break  # one of an array is enough
 
 
-def _units(fmu: FmuFile, model: Any) -> Iterator[Finding]:
+def _units(fmu: FmuFile, model: Any) -> Iterator[FmuFinding]:
     """Units that are used and not defined; rates whose unit is not that of their state per second."""
     powers = {unit.name: _powers(unit.baseUnit) for unit in model.unitDefinitions}
     missing: dict[str, str] = {}
@@ -96,7 +98,7 @@ def _units(fmu: FmuFile, model: Any) -> Iterator[Finding]:
             state = fmu.variable(variable.derivative)
             rate, of_state = powers.get(variable.unit), powers.get(state.unit)
             if rate and of_state and rate != of_state | {"s": of_state["s"] - 1}:
-                yield Finding(
+                yield FmuFinding(
                     "warning",
                     f"{variable.name} in {variable.unit} is the rate of {state.name}, "
                     f"expected {state.unit} per s",
@@ -104,11 +106,11 @@ def _units(fmu: FmuFile, model: Any) -> Iterator[Finding]:
     for variable in model.modelVariables:
         own = variable.unit or (variable.declaredType.unit if variable.declaredType else None)
         if variable.displayUnit is not None and own is None:
-            yield Finding(
+            yield FmuFinding(
                 "error", f"{variable.name}: it has the display unit '{variable.displayUnit}' and no unit"
             )
     for unit, name in missing.items():
-        yield Finding("error", f"{name}: its unit '{unit}' is not among the UnitDefinitions")
+        yield FmuFinding("error", f"{name}: its unit '{unit}' is not among the UnitDefinitions")
 
 
 def _powers(base: Any) -> dict[str, int]:
@@ -117,22 +119,24 @@ def _powers(base: Any) -> dict[str, int]:
     return {name: getattr(base, name) for name in names} if base is not None else {}
 
 
-def _structure(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[Finding]:
+def _structure(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[FmuFinding]:
     """Whether the model structure lists each output and each rate of a state, and nothing else."""
     own = {variable.name for variable in model.modelVariables if variable.alias is None}
     declared = {variable.name for variable in fmu.variables if variable.causality == "output"} & own
     for name in sorted(declared - set(fmu.outputs)):
-        yield Finding("error", f"{name}: this output is not listed in the ModelStructure")
+        yield FmuFinding("error", f"{name}: this output is not listed in the ModelStructure")
     for name in sorted(set(fmu.outputs) - declared):
-        yield Finding("error", f"{name}: the ModelStructure lists it as output, but its causality is another")
+        yield FmuFinding(
+            "error", f"{name}: the ModelStructure lists it as output, but its causality is another"
+        )
     for name in sorted({name for name in fmu.outputs if fmu.outputs.count(name) > 1}):
-        yield Finding("error", f"{name}: the ModelStructure lists this output more than once")
+        yield FmuFinding("error", f"{name}: the ModelStructure lists this output more than once")
     yield from _initial_unknowns(model)
     if fmu.fmi == "2.0":
         yield from _indices(files, len(model.modelVariables))
 
 
-def _initial_unknowns(model: Any) -> Iterator[Finding]:
+def _initial_unknowns(model: Any) -> Iterator[FmuFinding]:
     """Whether the model structure lists what is to be found at the start; aliases are not listed apart."""
     rates = [unknown.variable for unknown in model.derivatives]
     states = [rate.derivative for rate in rates if rate.derivative is not None]
@@ -146,63 +150,65 @@ def _initial_unknowns(model: Any) -> Iterator[Finding]:
             continue
         needed = id(variable) in unknown or variable.causality == "calculatedParameter"
         if needed and id(variable) not in listed:
-            yield Finding("error", f"{variable.name}: the ModelStructure does not list it as initial unknown")
+            yield FmuFinding(
+                "error", f"{variable.name}: the ModelStructure does not list it as initial unknown"
+            )
         if not needed and id(variable) in listed:
-            yield Finding(
+            yield FmuFinding(
                 "error", f"{variable.name}: the ModelStructure lists it as initial unknown, but it is none"
             )
 
 
-def _indices(files: FmuTexts, count: int) -> Iterator[Finding]:
+def _indices(files: FmuTexts, count: int) -> Iterator[FmuFinding]:
     """FMI 2 counts variables from 1; Python would take 0 for the last one."""
     for unknown in ElementTree.fromstring(files.description).iterfind("ModelStructure/*/Unknown"):
         said = [unknown.get("index", ""), *unknown.get("dependencies", "").split()]
         if wrong := [text for text in said if not 1 <= int(text) <= count]:
-            yield Finding("error", f"ModelStructure: found the index {wrong[0]}, expected 1 to {count}")
+            yield FmuFinding("error", f"ModelStructure: found the index {wrong[0]}, expected 1 to {count}")
 
 
-def _indicators(fmu: FmuFile, model: Any) -> Iterator[Finding]:
+def _indicators(fmu: FmuFile, model: Any) -> Iterator[FmuFinding]:
     """FMI 3 wants event indicators to be continuous variables that can be read."""
     for unknown in model.eventIndicators:
         variable = fmu.variable(unknown.variable.name)
         if variable.type not in ("Float32", "Float64") or variable.variability != "continuous":
-            yield Finding(
+            yield FmuFinding(
                 "error",
                 f"{variable.name}: this event indicator is {variable.variability} {variable.type}, "
                 "expected a continuous number",
             )
         if variable.causality not in ("local", "output"):
-            yield Finding(
+            yield FmuFinding(
                 "error", f"{variable.name}: this event indicator is {variable.causality}, expected local"
             )
 
 
-def _members(fmu: FmuFile) -> Iterator[Finding]:
+def _members(fmu: FmuFile) -> Iterator[FmuFinding]:
     """Terminals that speak of variables that do not exist."""
     names = {variable.name for variable in fmu.variables}
     for terminal in fmu.terminals:
         for member, name in terminal.members.items():
             if name not in names:
-                yield Finding(
+                yield FmuFinding(
                     "error", f"terminal {terminal.name}.{member}: there is no variable '{name}' in this FMU"
                 )
 
 
-def _binaries(fmu: FmuFile, files: FmuTexts) -> Iterator[Finding]:
+def _binaries(fmu: FmuFile, files: FmuTexts) -> Iterator[FmuFinding]:
     """What can be run where, and sources that are named and missing."""
     for name in fmu.sources:
         if name not in files.names:
-            yield Finding("error", f"{name}: this source file is named but not in the archive")
+            yield FmuFinding("error", f"{name}: this source file is named but not in the archive")
     here = native().name
     if not fmu.platforms and not fmu.sources:
-        yield Finding("error", "it has neither binaries for all its interfaces nor sources")
+        yield FmuFinding("error", "it has neither binaries for all its interfaces nor sources")
     elif here not in fmu.platforms:
         remedy = "it can be compiled from its sources" if fmu.sources else "ask for an export for it"
-        yield Finding("warning", f"it has no binary for this machine ({here}); {remedy}")
+        yield FmuFinding("warning", f"it has no binary for this machine ({here}); {remedy}")
     identifiers = {interface.identifier for interface in fmu.interfaces}
     for name, head in files.libraries.items():
         _, folder, file = name.split("/")
         if fmu.fmi == "3.0" and folder in ALIASES:
-            yield Finding("error", f"{name}: FMI 3 calls this folder {ALIASES[folder]}")
+            yield FmuFinding("error", f"{name}: FMI 3 calls this folder {ALIASES[folder]}")
         if file.rpartition(".")[0] in identifiers and (problem := misplaced(folder, head)):
-            yield Finding("error", f"{name}: {problem}")
+            yield FmuFinding("error", f"{name}: {problem}")

@@ -98,7 +98,13 @@ def _loaded(folder: Path, model: Any, kind: str, identifier: str, journal: Journ
     needed = [name for name in dir(made) if name.startswith(prefix)]
     if missing := [name for name in needed if not hasattr(found, name)]:
         raise Failure(f"it does not export {', '.join(missing)}")
-    fmu = made(
+
+    class Told(made):
+        def _call(self, name: str, *arguments: Any) -> Any:
+            journal.stage(name)
+            return super()._call(name, *arguments)
+
+    return Told(
         guid=model.guid,
         unzipDirectory=str(folder),
         modelIdentifier=identifier,
@@ -106,14 +112,6 @@ def _loaded(folder: Path, model: Any, kind: str, identifier: str, journal: Journ
         libraryPath=str(library),
         requireFunctions=False,
     )
-    call: Callable[..., Any] = fmu._call
-
-    def told(name: str, *arguments: Any) -> Any:
-        journal.stage(name)
-        return call(name, *arguments)
-
-    fmu._call = told
-    return fmu
 
 
 def _instantiate(fmu: Any, model: Any, journal: Journal) -> None:

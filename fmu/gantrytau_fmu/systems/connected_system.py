@@ -23,7 +23,7 @@ class UnconnectedInputs(UserWarning):
 
 
 @dataclass(frozen=True)
-class Connection:
+class SystemConnection:
     """An output and the input that it drives, both by name: input = factor * output + offset.
 
     convert: afterwards convert between units of the same dimension, as SSP wants unless it is suppressed.
@@ -37,7 +37,7 @@ class Connection:
 
 
 @dataclass(frozen=True)
-class Link:
+class SignalLink:
     """A scalar output that drives a scalar input: input = factor * output + offset, units converted."""
 
     source: Place
@@ -47,22 +47,22 @@ class Link:
 
 
 @dataclass(frozen=True)
-class System:
+class ConnectedSystem:
     """Components, what drives their inputs, and their start values by component and scalar."""
 
     components: Mapping[str, Component]
-    links: tuple[Link, ...]
+    links: tuple[SignalLink, ...]
     drives: Mapping[Place, Drive]
     start: Mapping[str, Mapping[str, float | str]]
 
 
 def build_system(
     components: Mapping[str, Component],
-    connections: Sequence[Connection | tuple[str, str]],
+    connections: Sequence[SystemConnection | tuple[str, str]],
     start: Mapping[str, Any],
     inputs: Mapping[str, Any],
     span: tuple[float, float],
-) -> System:
+) -> ConnectedSystem:
     """The system, checked; span: begin and stop in s, which samples have to cover.
 
     Raises ModelError for unknown names, inputs that are driven twice, types and units that do not fit, start values
@@ -81,10 +81,10 @@ def build_system(
                 "leave the other one out"
             )
         taken[target] = by
-    return System(components, tuple(links), drives, _starts(components, start))
+    return ConnectedSystem(components, tuple(links), drives, _starts(components, start))
 
 
-def unconnected(system: System) -> dict[str, str]:
+def unconnected(system: ConnectedSystem) -> dict[str, str]:
     """Inputs that are numbers and that nothing drives, whose start nobody chose, by dotted name: the values they keep."""
     driven = {link.target for link in system.links} | set(system.drives)
     return {
@@ -135,11 +135,13 @@ def locate(components: Mapping[str, Component], name: str, causality: str = "") 
     return [(owner, scalar) for scalar in components[owner].expand(name[len(owner) + 1 :], causality)]
 
 
-def _links(components: Mapping[str, Component], connection: Connection | tuple[str, str]) -> list[Link]:
-    if not isinstance(connection, Connection):
+def _links(
+    components: Mapping[str, Component], connection: SystemConnection | tuple[str, str]
+) -> list[SignalLink]:
+    if not isinstance(connection, SystemConnection):
         if not (isinstance(connection, (tuple, list)) and len(connection) == 2):
             raise ModelError(f"connection {connection!r}: expected an output and an input, ('a.y', 'b.u')")
-        connection = Connection(*connection)
+        connection = SystemConnection(*connection)
     words = f"connection {connection.source} -> {connection.target}"
     try:
         sources = locate(components, connection.source, "output")
@@ -158,8 +160,12 @@ def _links(components: Mapping[str, Component], connection: Connection | tuple[s
 
 
 def _link(
-    components: Mapping[str, Component], words: str, source: Place, target: Place, connection: Connection
-) -> Link:
+    components: Mapping[str, Component],
+    words: str,
+    source: Place,
+    target: Place,
+    connection: SystemConnection,
+) -> SignalLink:
     start, end = (components[owner].scalars[name] for owner, name in (source, target))
     if end.causality != "input" or start.causality == "input":
         raise ModelError(
@@ -179,7 +185,7 @@ def _link(
     if connection.convert and end.kind == "real":
         ratio, shift = _conversion(words, components[source[0]], start, components[target[0]], end)
         factor, offset = ratio * factor, ratio * offset + shift
-    return Link(source, target, factor, offset)
+    return SignalLink(source, target, factor, offset)
 
 
 def _conversion(

@@ -3,8 +3,8 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,10 +13,11 @@ import numpy as np
 from gantrytau.errors import ModelError, SolveError, did_you_mean
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
+from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (
-    Connection,
-    System,
+    ConnectedSystem,
+    SystemConnection,
     build_system,
     locate,
     unconnected,
@@ -24,14 +25,14 @@ from gantrytau_fmu.systems.connected_system import (
 )
 from gantrytau_fmu.systems.initialize import initialize
 from gantrytau_fmu.systems.isolation import Isolated
-from gantrytau_fmu.systems.master import Grid, Master, Order, Part, make_grid, paces_of
+from gantrytau_fmu.systems.master import Grid, Master, Order, RunningComponent, make_grid, paces_of
 from gantrytau_fmu.systems.recorder import Recorder
 from gantrytau_fmu.systems.slave import Slave
-from gantrytau_fmu.systems.ssp.read_ssp import Structure, matching, read_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
 from gantrytau_fmu.systems.step_order import sequence_of
 
 FileName = str | os.PathLike[str]
-Wires = Sequence[Connection | tuple[str, str]]
+Wires = Sequence[SystemConnection | tuple[str, str]]
 
 
 def cosimulate(
@@ -62,14 +63,11 @@ def cosimulate(
     connections: pairs (output, input), scalars or whole vectors; units are converted, dimensions have to match.
     stop, step, begin: s; if the step does not divide the span, the last one is shorter.
     start: name -> value of parameters, inputs and states before initialisation.
-    order: "gauss-seidel": one after the other, sampled components first, those with direct feedthrough last (see
-        step_order.py, or give `sequence`); "jacobi": all with what was known at the last point; "iterate": steps are
-        repeated from saved states until every input is the mean of the output that drives it at both ends of the step,
-        within `agreement` (relative), in at most `iterations`; of second order, where no component samples.
-    inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k))
-        joined by straight lines; held over each step of the component at its value in the middle, for components that
-        sample at its beginning. What nothing drives
-        keeps its start value; a warning (`UnconnectedInputs`) lists such inputs of two or more components.
+    order: "gauss-seidel": one after the other, by step_order.py or in a `sequence`; "jacobi": all with what was known at
+        the last point; "iterate": steps are repeated from saved states until every input is the mean of the output that
+        drives it at both ends of the step, within `agreement` (relative), in at most `iterations`.
+    inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k)), joined
+        by straight lines. A warning (`UnconnectedInputs`) lists what nothing drives, of two or more components.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).
     steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
@@ -78,46 +76,30 @@ def cosimulate(
         takes longer than `timeout`, s.
     progress: called with the time reached; by default a bar on the terminal when it takes long.
 
-    An input shows the output that drives it at that point. A component takes a sample when a step begins, so at a sampling
-    instant its outputs still have their values from before it, where the result of `simulate` has the new ones.
+    An input shows the output that drives it at that point. A sample is taken when a step begins, and seen a step later,
+    where the result of `simulate` has the new one at once.
     Raises ModelError for a system that does not fit, InitializationError if the components cannot begin, SolveError with
     `.time` and the partial `.result` when a component fails, gives values that are not finite, or on Ctrl-C.
     """
-    with ExitStack() as stack:
-        folder = Path(
-            stack.enter_context(
-                tempfile.TemporaryDirectory(prefix="cosimulation-", ignore_cleanup_errors=True)
-            )
-        )
-        structure = _structure(components, connections, folder)
-        begin = structure.begin or 0.0 if begin is None else begin
-        chosen_stop, chosen_step = _either(stop, structure.stop), _either(step, structure.step)
-        check_times(begin, chosen_stop, chosen_step)
+    with tempfile.TemporaryDirectory(prefix="cosimulation-", ignore_cleanup_errors=True) as folder:
+        told = _structure(components, connections, Path(folder))
+        grid = _grid(told, begin, stop, step)
         _check(order, tolerance, agreement, iterations)
-        grid = make_grid(float(begin), float(chosen_stop), float(chosen_step))
-        alone = isolate if isinstance(isolate, Sequence) else tuple(structure.components) if isolate else ()
-        parts = _read(structure.components, folder, alone)
-        wires = [*structure.connections, *connections] if structure.connections else connections
-        values = {**matching(parts, structure.start), **(start or {})}
-        system = build_system(parts, wires, values, inputs or {}, (grid.begin, grid.stop))
-        if len(parts) > 1:
-            warn_of(unconnected(system), stacklevel=2)
-        plan = _Plan(
-            system, order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations
-        )
-        result = _run(plan, grid, progress)
+        alone = isolate if isinstance(isolate, Sequence) else tuple(told.components) if isolate else ()
+        system = _system(told, start or {}, inputs or {}, grid, alone, Path(folder))
+        plan = _Plan(order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations)
+        result = _run(system, plan, grid, progress)
         if error_estimate:
-            finer = _Plan(**{**vars(plan), "steps": {name: own / 2 for name, own in plan.steps.items()}})
-            half = _run(finer, make_grid(grid.begin, grid.stop, grid.step / 2), progress)
+            finer = replace(plan, steps={name: own / 2 for name, own in plan.steps.items()})
+            half = _run(system, finer, make_grid(grid.begin, grid.stop, grid.step / 2), progress)
             result = _with_errors(result, half)
     return result
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """A system, and how it is to be simulated."""
+    """How a system is to be simulated."""
 
-    system: System
     order: Order
     sequence: Sequence[str] | None
     steps: Mapping[str, float]
@@ -129,9 +111,10 @@ class _Plan:
     iterations: int
 
 
-def _run(plan: _Plan, grid: Grid, progress: Callable[[float], None] | None) -> Result:
+def _run(
+    system: ConnectedSystem, plan: _Plan, grid: Grid, progress: Callable[[float], None] | None
+) -> Result:
     """Simulate over the grid; a failure carries what was computed until then."""
-    system = plan.system
     paces = paces_of(system, grid.step, plan.steps)
     _check_abilities(system, plan, grid, {name for name, pace in paces.items() if pace.multiple > 1})
     recorder = Recorder(system, _wanted(system, plan.outputs), grid)
@@ -175,9 +158,9 @@ def _advance(
 
 
 @contextmanager
-def _running(system: System, plan: _Plan) -> Iterator[dict[str, Part]]:
+def _running(system: ConnectedSystem, plan: _Plan) -> Iterator[dict[str, RunningComponent]]:
     """The components, instantiated; ended and freed in every case."""
-    parts: dict[str, Part] = {}
+    parts: dict[str, RunningComponent] = {}
     try:
         for name, component in system.components.items():
             parts[name] = Isolated(component, plan.timeout) if name in plan.isolate else Slave(component)
@@ -187,7 +170,9 @@ def _running(system: System, plan: _Plan) -> Iterator[dict[str, Part]]:
             part.close()
 
 
-def _structure(components: Mapping[str, FileName] | FileName, connections: Wires, folder: Path) -> Structure:
+def _structure(
+    components: Mapping[str, FileName] | FileName, connections: Wires, folder: Path
+) -> SystemStructure:
     """The files and connections of the system, from the arguments or from an SSP."""
     if isinstance(components, (str, os.PathLike)):
         if connections:
@@ -201,13 +186,36 @@ def _structure(components: Mapping[str, FileName] | FileName, connections: Wires
         )
     if isinstance(connections, str) or not isinstance(connections, Sequence):
         raise ModelError(f"connections: found {connections!r}, expected [('a.y', 'b.u'), ...]")
-    return Structure(components={name: Path(path) for name, path in components.items()})
+    return SystemStructure({name: Path(path) for name, path in components.items()}, tuple(connections))
+
+
+def _grid(told: SystemStructure, begin: float | None, stop: float | None, step: float | None) -> Grid:
+    """The communication points; what is not given is as the file says."""
+    begin = told.begin or 0.0 if begin is None else begin
+    stop, step = told.stop if stop is None else stop, told.step if step is None else step
+    check_times(begin, stop, step)
+    return make_grid(*map(float, (begin, stop, step)))  # pyright: ignore[reportArgumentType]
+
+
+def _system(
+    told: SystemStructure,
+    start: Mapping[str, Any],
+    inputs: Mapping[str, Any],
+    grid: Grid,
+    isolate: Sequence[str],
+    folder: Path,
+) -> ConnectedSystem:
+    """The components, unpacked and connected; a warning of inputs that nothing drives."""
+    parts = _read(told.components, folder, isolate)
+    values = {**matching(parts, told.start), **start}
+    system = build_system(parts, told.connections, values, inputs, (grid.begin, grid.stop))
+    if len(parts) > 1:
+        warn_of(unconnected(system), stacklevel=3)
+    return system
 
 
 def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> dict[str, Component]:
     """Unpack and describe each component."""
-    from gantrytau_fmu.reading.safety import unpack
-
     for name in isolate:
         if name not in files:
             raise ModelError(f"isolate: there is no component '{name}'{did_you_mean(str(name), files)}")
@@ -236,7 +244,7 @@ def _check_alone(components: Mapping[str, Component], isolate: Sequence[str]) ->
         seen[component.token] = name
 
 
-def _wanted(system: System, outputs: Sequence[str] | None) -> list[tuple[str, str]]:
+def _wanted(system: ConnectedSystem, outputs: Sequence[str] | None) -> list[tuple[str, str]]:
     """Component and scalar of what the result shows."""
     if outputs is None:
         return [
@@ -252,7 +260,7 @@ def _wanted(system: System, outputs: Sequence[str] | None) -> list[tuple[str, st
     return found
 
 
-def _check_abilities(system: System, plan: _Plan, grid: Grid, slow: set[str]) -> None:
+def _check_abilities(system: ConnectedSystem, plan: _Plan, grid: Grid, slow: set[str]) -> None:
     """ModelError for what a component cannot do but would have to."""
     for name, component in system.components.items():
         if plan.order == "iterate" and not component.can_save:
@@ -290,10 +298,6 @@ def _with_errors(result: Result, half: Result) -> Result:
     units |= {f"error({name})": unit for name, unit in units.items()}
     words |= {f"error({name})": f"estimated error of {name}" for name in values}
     return Result(result.time, {**values, **errors}, units=units, descriptions=words, title=result.title)
-
-
-def _either(value: float | None, default: float | None) -> Any:
-    return default if value is None else value
 
 
 def check_times(begin: Any, stop: Any, step: Any) -> None:

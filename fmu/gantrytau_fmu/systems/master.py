@@ -16,14 +16,14 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError
-from gantrytau_fmu.systems.connected_system import Drive, System
+from gantrytau_fmu.systems.connected_system import ConnectedSystem, Drive
 from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
 SMALL = 1e-6  # magnitude below which agreement is absolute: noise around zero never agrees relatively
 
 
-class Part(Protocol):
+class RunningComponent(Protocol):
     """A running component, in this process or in one of its own; see `Slave`."""
 
     def begin(
@@ -100,8 +100,8 @@ class Master:
 
     def __init__(
         self,
-        system: System,
-        parts: Mapping[str, Part],
+        system: ConnectedSystem,
+        parts: Mapping[str, RunningComponent],
         sequence: Sequence[str],
         paces: Mapping[str, Pace],
         grid: Grid,
@@ -283,7 +283,7 @@ class Master:
         return worst[1] if worst[0] > agreement else ""
 
 
-def paces_of(system: System, step: float, steps: Mapping[str, Any]) -> dict[str, Pace]:
+def paces_of(system: ConnectedSystem, step: float, steps: Mapping[str, Any]) -> dict[str, Pace]:
     """How often each component steps; ModelError for steps that are no multiple and no fraction of `step`."""
     found = {name: Pace() for name in system.components}
     for name, own in steps.items():

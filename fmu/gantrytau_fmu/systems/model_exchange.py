@@ -11,11 +11,11 @@ from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
 from gantrytau_fmu.systems.component import Component
-from gantrytau_fmu.systems.connected_system import System
+from gantrytau_fmu.systems.connected_system import ConnectedSystem
 from gantrytau_fmu.systems.master import Grid
 
 
-def integrate(component: Component, system: System, grid: Grid, tolerance: float | None) -> Result:
+def integrate(component: Component, system: ConnectedSystem, grid: Grid, tolerance: float | None) -> Result:
     """Integrate the only component of a system over the grid; its inputs and outputs by their own names.
 
     Raises ModelError for arrays of FMI 3, SolveError with `.time` and the partial `.result` where the integration
@@ -83,7 +83,7 @@ def _failure(
     )
 
 
-def _inputs(component: Component, system: System, grid: Grid) -> np.ndarray:
+def _inputs(component: Component, system: ConnectedSystem, grid: Grid) -> np.ndarray:
     """The inputs at the points of the grid, as FMPy takes them: those that nothing drives, too, or it warns of them."""
     times = np.array([grid.time(k) for k in range(grid.count + 1)])
     columns = {name: [drive(t) for t in times] for (_, name), drive in system.drives.items()}

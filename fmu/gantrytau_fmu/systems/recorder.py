@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau.results.result import Result
-from gantrytau_fmu.systems.connected_system import Drive, Link, Place, System
+from gantrytau_fmu.systems.connected_system import ConnectedSystem, Drive, Place, SignalLink
 from gantrytau_fmu.systems.master import Grid, Master
 
 ROWS = 1024  # made room for at first; then always twice as many
@@ -18,9 +18,9 @@ class Recorder:
     Connected and driven inputs are not read but computed from what drives them.
     """
 
-    def __init__(self, system: System, places: Sequence[Place], grid: Grid):
+    def __init__(self, system: ConnectedSystem, places: Sequence[Place], grid: Grid):
         self.system, self.places, self.grid = system, tuple(places), grid
-        self.links: dict[Place, Link] = {link.target: link for link in system.links}
+        self.links: dict[Place, SignalLink] = {link.target: link for link in system.links}
         self.count = 0
         self.rows = np.empty((0, 0))
         self.columns: dict[Place, int] = {}
@@ -72,7 +72,7 @@ class Recorder:
         title = f"co-simulation of {', '.join(self.system.components)}"
         return Result(times, values, units=units, descriptions=words, title=title, aliases=aliases)
 
-    def _values(self, place: Place, link: Link | None, times: np.ndarray) -> np.ndarray:
+    def _values(self, place: Place, link: SignalLink | None, times: np.ndarray) -> np.ndarray:
         if link:
             return self.rows[: self.count, self.columns[link.source]] * link.factor + link.offset
         drive: Drive | None = self.system.drives.get(place)

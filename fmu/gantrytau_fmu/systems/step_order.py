@@ -14,10 +14,10 @@ from collections.abc import Collection, Sequence
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.systems.component import Component
-from gantrytau_fmu.systems.connected_system import Link, System
+from gantrytau_fmu.systems.connected_system import ConnectedSystem, SignalLink
 
 
-def sequence_of(system: System, given: Sequence[str] | None = None) -> tuple[str, ...]:
+def sequence_of(system: ConnectedSystem, given: Sequence[str] | None = None) -> tuple[str, ...]:
     """Names of components in the order of their steps; given: that order from outside, checked."""
     if given is not None:
         return _checked(tuple(given), system.components)
@@ -26,7 +26,7 @@ def sequence_of(system: System, given: Sequence[str] | None = None) -> tuple[str
     return tuple(name for group in groups for name in _downstream(group, system.links))
 
 
-def is_sampled(system: System, name: str) -> bool:
+def is_sampled(system: ConnectedSystem, name: str) -> bool:
     """Whether a component is driven and has real variables that change at events only."""
     driven = any(link.target[0] == name for link in system.links)
     return driven and takes_samples(system.components[name])
@@ -37,7 +37,7 @@ def takes_samples(component: Component) -> bool:
     return any(component.sampled(scalar) for scalar in component.scalars)
 
 
-def _rank(system: System, name: str) -> int:
+def _rank(system: ConnectedSystem, name: str) -> int:
     """0 for a sampled component, 1 for one with outputs from states alone, 2 for one with direct feedthrough."""
     if is_sampled(system, name):
         return 0
@@ -47,7 +47,7 @@ def _rank(system: System, name: str) -> int:
     return 2 if any(known & component.feedthrough.get(output, frozenset()) for output in wanted) else 1
 
 
-def _downstream(names: Sequence[str], links: Sequence[Link]) -> list[str]:
+def _downstream(names: Sequence[str], links: Sequence[SignalLink]) -> list[str]:
     """The names so that each is driven by those before; in a loop the one with the fewest drives missing is next."""
     left, found = list(names), []
     while left:

@@ -15,8 +15,10 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
+from gantrytau_fmu.reading.safe_xml import check_xml
+from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component
-from gantrytau_fmu.systems.connected_system import Connection, locate
+from gantrytau_fmu.systems.connected_system import SystemConnection, locate
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
@@ -29,11 +31,11 @@ Node = tuple[str, str]  # element, "" for the outermost system, and connector
 
 
 @dataclass(frozen=True)
-class Structure:
+class SystemStructure:
     """A system as its file describes it: FMU files by component, connections, start values, default times in s."""
 
     components: Mapping[str, Path]
-    connections: tuple[Connection, ...] = ()
+    connections: tuple[SystemConnection | tuple[str, str], ...] = ()
     start: Mapping[str, float | str] = field(default_factory=dict)
     begin: float | None = None
     stop: float | None = None
@@ -50,14 +52,12 @@ class _Wire:
     convert: bool
 
 
-def read_ssp(path: str | os.PathLike[str], folder: Path) -> Structure:
+def read_ssp(path: str | os.PathLike[str], folder: Path) -> SystemStructure:
     """Unpack a system into `folder` and read its structure.
 
     Raises ModelError for an unsafe or damaged archive, XML that is no SSP 1.0, and what is not supported: signal
     dictionaries, mappings of parameters and of enumerations, components that are no FMUs for Co-Simulation.
     """
-    from gantrytau_fmu.reading.safety import check_xml, unpack
-
     if Path(path).suffix.lower() == ".fmu":
         raise ModelError(f"{path} is one FMU, expected a system (.ssp) or {{name: FMU file}}")
     unpack(path, folder, needs=STRUCTURE)
@@ -76,7 +76,7 @@ def read_ssp(path: str | os.PathLike[str], folder: Path) -> Structure:
     begin, stop = (
         reader.number("DefaultExperiment", attributes.get(name)) for name in ("startTime", "stopTime")
     )
-    return Structure(
+    return SystemStructure(
         reader.components, reader.connections(), reader.start, begin, stop, reader.step(experiment)
     )
 
@@ -122,7 +122,7 @@ class _Reader:
             self._connection(connection, path)
         self._bindings(element, path)
 
-    def connections(self) -> tuple[Connection, ...]:
+    def connections(self) -> tuple[SystemConnection, ...]:
         """From outputs of components to inputs of components, through the connectors of systems."""
         found = []
         for target in self.wires:
@@ -137,7 +137,7 @@ class _Reader:
                 factor, offset = factor * wire.factor, factor * wire.offset + offset
                 source, convert = wire.source, convert and wire.convert
             if source[0] not in self.systems:
-                found.append(Connection(".".join(source), ".".join(target), factor, offset, convert))
+                found.append(SystemConnection(".".join(source), ".".join(target), factor, offset, convert))
         return tuple(found)
 
     def step(self, experiment: Any) -> float | None:
@@ -229,8 +229,6 @@ class _Reader:
                 self._parameter(where, _joined(path, name), parameter)
 
     def _parameter_file(self, where: str, source: str) -> Any:
-        from gantrytau_fmu.reading.safety import check_xml
-
         parts = PurePosixPath(unquote(source))
         if ":" in source or parts.is_absolute() or ".." in parts.parts or not (self.folder / parts).is_file():
             self.refuse(f"{where} has the source '{source}', which is no file of this archive")

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.reading.check_fmu import TIMEOUT, Finding, check_fmu
+from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
+from gantrytau_fmu.reading.findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.fmu_file import SHOWN
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
-from gantrytau_fmu.systems.connected_system import System, build_system, unconnected
-from gantrytau_fmu.systems.ssp.read_ssp import Structure, matching, read_ssp
+from gantrytau_fmu.systems.connected_system import ConnectedSystem, build_system, unconnected
+from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
 
 
 @dataclass(frozen=True)
@@ -101,22 +102,20 @@ def read_system(path: str | os.PathLike[str]) -> SystemDescription:
 
 def check_system(
     path: str | os.PathLike[str], *, run: bool = False, timeout: float = TIMEOUT
-) -> list[Finding]:
+) -> list[FmuFinding]:
     """All that is wrong with a system, errors first: with each of its FMUs, and with how they are connected.
 
-    run: also try each FMU, as `check_fmu` does. `Finding.path` names the file in the archive.
+    run: also try each FMU, as `check_fmu` does. `FmuFinding.path` names the file in the archive.
     """
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
-        found = list(_found(Path(path), Path(folder), run, timeout))
-    order = ("error", "warning", "note")
-    return sorted(found, key=lambda finding: order.index(finding.severity))
+        return errors_first(_found(Path(path), Path(folder), run, timeout))
 
 
-def _found(path: Path, folder: Path, run: bool, timeout: float) -> Iterator[Finding]:
+def _found(path: Path, folder: Path, run: bool, timeout: float) -> Iterator[FmuFinding]:
     try:
         structure = read_ssp(path, folder / "system")
     except ModelError as error:
-        yield Finding("error", str(error).removeprefix(f"{path}: "), str(path))
+        yield FmuFinding("error", str(error).removeprefix(f"{path}: "), str(path))
         return
     whole = True
     for file in dict.fromkeys(structure.components.values()):
@@ -129,10 +128,10 @@ def _found(path: Path, folder: Path, run: bool, timeout: float) -> Iterator[Find
     try:
         system = _system(structure, folder)
     except ModelError as error:
-        yield Finding("error", str(error), str(path))
+        yield FmuFinding("error", str(error), str(path))
         return
     for name, value in unconnected(system).items():
-        yield Finding("note", f"nothing drives {name}, which keeps its value {value}", str(path))
+        yield FmuFinding("note", f"nothing drives {name}, which keeps its value {value}", str(path))
 
 
 def _described(name: str, file: Path, root: Path) -> SystemPart:
@@ -148,7 +147,7 @@ def _described(name: str, file: Path, root: Path) -> SystemPart:
     )
 
 
-def _system(structure: Structure, folder: Path) -> System:
+def _system(structure: SystemStructure, folder: Path) -> ConnectedSystem:
     """The components joined; binaries are not looked for."""
     parts: dict[str, Component] = {}
     for count, (name, file) in enumerate(structure.components.items()):

@@ -14,9 +14,9 @@ from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, Scalar, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (
     KILOGRAM_FIRST,
-    Connection,
-    Link,
-    System,
+    ConnectedSystem,
+    SignalLink,
+    SystemConnection,
     build_system,
     unit_of,
 )
@@ -30,7 +30,7 @@ TYPES = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "text": "St
 def write_ssp(
     path: str | os.PathLike[str],
     components: Mapping[str, str | os.PathLike[str]],
-    connections: Sequence[Connection | tuple[str, str]],
+    connections: Sequence[SystemConnection | tuple[str, str]],
     *,
     stop: float,
     step: float,
@@ -77,7 +77,7 @@ def write_ssp(
     return path
 
 
-def _check(path: Path, system: System) -> None:
+def _check(path: Path, system: ConnectedSystem) -> None:
     for name, component in system.components.items():
         if not name.replace("_", "a").isalnum():
             raise ModelError(
@@ -107,7 +107,7 @@ def _sources(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 def _structure(
-    name: str, system: System, sources: Mapping[str, str], begin: float, stop: float, step: float
+    name: str, system: ConnectedSystem, sources: Mapping[str, str], begin: float, stop: float, step: float
 ) -> str:
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -173,7 +173,7 @@ def _value(scalar: Scalar, value: float | str) -> str:
     return f"<ssv:Parameter name={quoteattr(scalar.name)}>{inner}</ssv:Parameter>"
 
 
-def _connection(link: Link) -> str:
+def _connection(link: SignalLink) -> str:
     ends = zip(
         ("startElement", "startConnector", "endElement", "endConnector"),
         (*link.source, *link.target),
@@ -188,7 +188,7 @@ def _connection(link: Link) -> str:
     )
 
 
-def _units(system: System) -> list[str]:
+def _units(system: ConnectedSystem) -> list[str]:
     """Definitions of the units of all connectors."""
     found: dict[str, str] = {}
     for component in system.components.values():
