@@ -13,9 +13,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.matching import best_matching, largest_matching
+from gantrytau.compiler.matching import best_matching
+from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.consistency import Level
-from gantrytau.errors import StructureError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -73,7 +73,7 @@ def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) 
     """
     signature = _signature(reduced)
     if len(reduced.residuals) != len(reduced.unknowns):
-        raise StructureError(unbalanced(reduced, signature, flat))
+        raise unbalanced(reduced, signature, flat)
     counts, tops = _offsets(reduced, signature, _mentioned(reduced, flat, wanted), flat)
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
@@ -99,7 +99,7 @@ def _offsets(reduced: Reduced, signature: list[dict[int, int]], mentioned: np.nd
     n = len(signature)
     matched = best_matching(signature)
     if matched is None:
-        raise StructureError(unbalanced(reduced, signature, flat))
+        raise unbalanced(reduced, signature, flat)
     counts = np.zeros(n, dtype=int)
     while True:
         tops = mentioned.copy()
@@ -146,77 +146,3 @@ def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
         resolved = reduced.definitions.to_reduced(ca.vertcat(*compact))
         residuals.update(zip(keys, ca.densify(resolved).elements(), strict=True))
     return residuals
-
-
-def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel) -> str:
-    """Which unknowns stay undetermined and which equations are one too many, in the model's words."""
-    of_row = largest_matching(signature, len(reduced.unknowns))
-    of_column = {int(j): i for i, j in enumerate(of_row) if j >= 0}
-    free = [j for j in range(len(reduced.unknowns)) if j not in of_column]
-    extra = [i for i in range(len(signature)) if of_row[i] < 0]
-    n, m = (
-        sum(len(v.elements) for v in flat.variables) - len(reduced.known),
-        len(flat.equations) - len(reduced.redundant),
-    )
-    text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
-    if free:
-        reached = {reduced.unknowns[j]: j in free for j in _reach_columns(free, signature, of_column)}
-        text += _undetermined(reached, len(free), reduced, flat)
-    if extra:
-        text += _overdetermined(sorted(_reach_rows(extra, signature, of_row)), len(extra), reduced, signature)
-    return text
-
-
-def _undetermined(reached: Mapping[str, bool], count: int, reduced: Reduced, flat: FlatModel) -> str:
-    """reached: names of which `count` are free, True for those that no equation was found for."""
-    inputs = {reduced.aliases[n].root: n for n in flat.inputs if n not in reduced.known}
-    names = sorted(reached, key=lambda n: (n not in inputs, not reached[n], n.count(".")))
-    first = inputs.get(names[0], names[0])
-    hint = flat.hints.get(names[0])
-    others = ", ".join(inputs.get(n, n) for n in names[1:6]) + (", ..." if len(names) > 6 else "")
-    text = f" Undetermined: {first}" + (f" ({hint})" if hint else "")
-    text += f"; {count} of it and {others} {'is' if count == 1 else 'are'} free" if others else ""
-    if names[0] in inputs:
-        return f"{text}. Name {first} among the given, or add {count} equation{'s' if count > 1 else ''}."
-    where = first.rpartition(".")[0] or "the model"
-    return (
-        f"{text}. Add {count} equation{'s' if count > 1 else ''} for it in {where}, declare it an Input, or "
-        "connect a component that determines it."
-    )
-
-
-def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: list[dict[int, int]]) -> str:
-    lines = []
-    for i in rows[:4]:
-        found = "" if signature[i] else ", whose variables all follow from other equations"
-        lines.append(f"{reduced.equations[i].name} `{reduced.equations[i].text[:80]}`{found}")
-    more = f"; and {len(rows) - 4} others" if len(rows) > 4 else ""
-    return (
-        f" Overdetermined by {count}: these equations contradict or repeat each other: "
-        f"{'; '.join(lines)}{more}. "
-        "Remove one of them, or let one more variable be unknown."
-    )
-
-
-def _reach_columns(
-    start: list[int], signature: list[dict[int, int]], of_column: Mapping[int, int]
-) -> set[int]:
-    row_of = {i: j for j, i in of_column.items()}
-    reached, queue = set(start), list(start)
-    for j in queue:
-        for i, row in enumerate(signature):
-            if j in row and i in row_of and row_of[i] not in reached:
-                reached.add(row_of[i])
-                queue.append(row_of[i])
-    return reached
-
-
-def _reach_rows(start: list[int], signature: list[dict[int, int]], of_row) -> set[int]:
-    row_of = {int(j): i for i, j in enumerate(of_row) if j >= 0}
-    reached, queue = set(start), list(start)
-    for i in queue:
-        for j in signature[i]:
-            if j in row_of and row_of[j] not in reached:
-                reached.add(row_of[j])
-                queue.append(row_of[j])
-    return reached

@@ -14,9 +14,10 @@ import numpy as np
 
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.compiler.refusals import open_loops, overdriven
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues, start_values
-from gantrytau.errors import InitializationError, StructureError
+from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 
@@ -72,42 +73,13 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
-        raise _open_loops(flat, error) from None
+        raise open_loops(flat, error) from None
     matrices = [_matrix(constraints, closed)]
     matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, flat.name)]
     kept = _independent(matrices, constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
     return Settled(_with_zero_forces(flat, redundant), redundant, closed)
-
-
-def _open_loops(flat: FlatModel, error: InitializationError) -> InitializationError:
-    """Which loops stay open and by how much, where the failure is one of closing."""
-    words = []
-    for loop in flat.loops:
-        place = f"{loop.a} - {loop.b}, "
-        gaps = {
-            kind: np.linalg.norm([v for n, v in error.residuals.items() if n.startswith(place + kind)])
-            for kind in ("position", "orientation")
-        }
-        # least squares leave a share of the gap in every part of the loop
-        for member in loop.members:
-            shares = [v for n, v in error.residuals.items() if n.startswith(f"{member} (")]
-            gaps["position"] += np.linalg.norm(shares)
-        if any(gaps.values()):
-            # the residual of orientation is 2 tan(angle / 2)
-            angle = np.degrees(2 * np.arctan(gaps["orientation"] / 2))
-            words.append(
-                f"the loop through {', '.join(loop.members)} stays open between {loop.a} and {loop.b}, by "
-                f"{gaps['position']:.3g} m and {angle:.3g} deg"
-            )
-    if not words:
-        return error
-    return InitializationError(
-        f"{flat.name}: {'; '.join(words)}. Expected frames that meet: correct lengths, offsets or joint axes, or, if it "
-        "can be closed, give start values of its joints nearer to that",
-        residuals=error.residuals,
-    )
 
 
 def _constraints(flat: FlatModel, reduced: Reduced, duals: Sequence[Equation]) -> Constraints:
@@ -223,11 +195,7 @@ def _refuse_conflicts(
     rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)
     against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
     if against:
-        raise StructureError(
-            f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
-            "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: "
-            "leave one drive out, or drive by a force"
-        )
+        raise overdriven(flat, inputs, against)
 
 
 def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:

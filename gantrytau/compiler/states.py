@@ -14,7 +14,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.errors import StructureError
+from gantrytau.compiler.refusals import dependent, no_state
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -62,11 +62,7 @@ def choose_states(
     )
     missing = [n for n in wanted if n not in states]
     if missing:
-        raise StructureError(
-            f"{title}: {missing[0]} cannot be a state together with the others asked for; the states of this "
-            f"model can be {', '.join(states)} ({len(states)} in all). Name other variables in "
-            "states=, or fewer"
-        )
+        raise no_state(title, missing[0], states)
     return StateChoice(states, tuple(sorted(dummies)), condition)
 
 
@@ -98,18 +94,6 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
             rest -= np.outer(direction, direction @ rest)
             chosen.append(column)
     if len(chosen) < len(rows):
-        raise StructureError(_singular(reduced, rows, matrix, title))
+        raise dependent(title, [reduced.equations[i] for i in rows], matrix, LEAST_PIVOT)
     singular_values = np.linalg.svd(matrix[:, chosen], compute_uv=False)
     return [columns[j] for j in sorted(chosen)], float(singular_values[0] / singular_values[-1])
-
-
-def _singular(reduced: Reduced, rows: Sequence[int], matrix: np.ndarray, title: str) -> str:
-    left, values, _ = np.linalg.svd(matrix)
-    weak = [i for i in np.argsort(-np.abs(left[:, -1]))[:4] if abs(left[i, -1]) > 0.1]
-    names = "; ".join(
-        f"{reduced.equations[rows[i]].name} `{reduced.equations[rows[i]].text[:80]}`" for i in sorted(weak)
-    )
-    return (
-        f"{title}: constraints depend on each other at the start (smallest singular value {values[-1]:.2g}, expected "
-        f"above {LEAST_PIVOT:g}): {names}. Start from another pose, or remove the constraint that repeats another"
-    )

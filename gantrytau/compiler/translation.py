@@ -6,13 +6,14 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
+from gantrytau.compiler.blocks.determinacy import massless, refuse_undetermined
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import solve_blocks
-from gantrytau.compiler.determinacy import massless, refuse_undetermined
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.parameters import ParameterTable, parameter_table
 from gantrytau.compiler.redundancy import Settled, without_redundant
+from gantrytau.compiler.refusals import differentiated
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import start_values
@@ -179,7 +180,4 @@ def _refuse_differentiated(
     for name, order, place in where:
         if name in events and order:
             what = "sampled" if any(s.name == name for s in flat.sampled) else "friction that sticks"
-            raise ModelError(
-                f"{name} is {what} and jumps at instants, but {place} has it differentiated; pass it through a filter "
-                "(gantrytau.mechanics.filters.LowPass), or let it drive a force instead of a motion"
-            )
+            raise differentiated(name, what, place)

@@ -12,9 +12,9 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
+from gantrytau.compiler.refusals import undetermined, without_inertia
 from gantrytau.errors import StructureError
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.language.symbols import split_derivative
 
 LEAST = 1e-12  # of a coefficient, or of a singular value, relative to the terms of its equation
 
@@ -45,7 +45,8 @@ def refuse_undetermined(
         free = _free(block, matrix, largest[begin : begin + count, None])
         begin += count
         if free:
-            raise StructureError(_message(block, free, indexed, reduced, flat))
+            names = [indexed.names[i] for i, _ in block.equations]
+            raise undetermined(flat, reduced, free, names)
 
 
 def _free(block: Block, matrix: np.ndarray, terms: np.ndarray) -> list[str]:
@@ -59,26 +60,6 @@ def _free(block: Block, matrix: np.ndarray, terms: np.ndarray) -> list[str]:
     return [block.tears[k].name() for k in np.argsort(-shares) if shares[k] > 0.1 * shares.max()]
 
 
-def _message(block: Block, free: Sequence[str], indexed: Indexed, reduced: Reduced, flat: FlatModel) -> str:
-    hints = {
-        (alias.root, alias.order): flat.hints[name]
-        for name, alias in reduced.aliases.items()
-        if name in flat.hints
-    }
-    words = []
-    for name in free[:4]:
-        base, order = split_derivative(name)
-        hint = next((hints[base, k] for k in range(order, -1, -1) if (base, k) in hints), "")
-        words.append(name + (f" ({hint})" if hint else ""))
-    equations = dict.fromkeys(indexed.names[i] for i, _ in block.equations)
-    shown = "; ".join(list(equations)[:4]) + (f" and {len(equations) - 4} more" if len(equations) > 4 else "")
-    return (
-        f"{flat.name}: {', '.join(words)} {'is' if len(words) == 1 else 'are'} not determined at the start: the "
-        f"coefficients in {shown} leave it free. Expected mass, inertia or a drive for every motion: give it one, hold "
-        "the motion, or start from another pose"
-    )
-
-
 def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureError | None:
     """What a failed start may come from: a motion without inertia, such as that of a bar about itself.
 
@@ -90,10 +71,5 @@ def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureEr
         names = [leaf.name() for leaf in ca.symvar(residual)]
         slow = [n for n in names if indexed.orders.get(n) == 1 and n in flat.hints]
         if slow and any(n in roots for n in names):
-            words = ", ".join(f"{n} ({flat.hints[n]})" for n in slow[:4])
-            return StructureError(
-                f"{flat.name}: {words} would have to follow from a balance of forces, {indexed.names[i]}, because this "
-                "motion has neither mass nor inertia. Expected a mass or an inertia for every motion: put a Body "
-                "there, or hold the motion"
-            )
+            return without_inertia(flat, slow, indexed.names[i])
     return None
