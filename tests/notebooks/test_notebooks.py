@@ -1,23 +1,34 @@
 """Every notebook runs from top to bottom, and so does the code of the README."""
 
 import re
+import runpy
 from pathlib import Path
 
 import jupytext
+import matplotlib
+import matplotlib.pyplot as plt
 import pytest
-from nbclient import NotebookClient
+
+matplotlib.use("Agg")
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 
 
+@pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_runs_and_its_assertions_hold(path):
-    notebook = jupytext.read(path)
-    NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
-    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
-    assert outputs
-    assert not [output for output in outputs if output.output_type == "error"]
+def test_notebook_runs_and_its_assertions_hold(path, capsys):
+    runpy.run_path(str(path))
+    plt.close("all")
+    assert len(capsys.readouterr().out.splitlines()) > 10
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_opens_as_cells_that_assert(path):
+    cells = jupytext.read(path).cells
+    assert {cell.cell_type for cell in cells} == {"code", "markdown"}
+    assert cells[0].source.startswith("# ")
+    assert sum("assert " in cell.source for cell in cells if cell.cell_type == "code") > 3
 
 
 def test_code_of_the_readme_runs(tmp_path, monkeypatch, capsys):
