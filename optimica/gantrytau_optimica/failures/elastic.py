@@ -181,7 +181,7 @@ class Elastic:
         self, start: np.ndarray, which: Sequence[int] | range, end: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Unknowns, yields of all conditions relative to their size, and their worth; None if none was found in time."""
-        left = end - time.perf_counter()
+        left = end - time.process_time()
         if left < 0.05:
             return None
         nlp, derivatives = self.functions
@@ -199,7 +199,7 @@ class Elastic:
             "mu_strategy": "adaptive",
             "tol": 1e-8,
             "max_iter": 500,
-            "max_wall_time": left,
+            "max_cpu_time": left,
         }
         solver = ca.nlpsol("relaxed", "ipopt", nlp, options | derivatives | {"ipopt": ipopt})
         most = np.zeros(m)

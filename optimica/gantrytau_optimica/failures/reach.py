@@ -84,7 +84,7 @@ def _nearest(radicands: Sequence[ca.SX], states: Mapping[int, Limit]) -> str:
     wanted = np.array([row.lower for row in rows])
     x = ca.vertcat(*leaves.values())
     nlp = {"x": x, "f": ca.sumsqr(x - wanted), "g": ca.vertcat(*radicands)}
-    ipopt = {"print_level": 0, "sb": "yes", "max_wall_time": 1.0, "max_iter": 200}
+    ipopt = {"print_level": 0, "sb": "yes", "max_cpu_time": 1.0, "max_iter": 200}
     solver = ca.nlpsol("nearest", "ipopt", nlp, {"print_time": False, "ipopt": ipopt})
     found = np.array(solver(x0=wanted, lbg=0.0)["x"]).ravel()
     if not solver.stats()["success"]:

@@ -66,8 +66,8 @@ def worth_relaxing(program: Program, solution: Solution) -> bool:
 
 
 def relax(built: Built, program: Program, solution: Solution, seconds: float = 5.0) -> Relaxed:
-    """The least that would have to give, looked for during `seconds` from where `solution` ended, and from the guess."""
-    end = time.perf_counter() + seconds
+    """The least that would have to give, sought from where `solution` ended, and from the guess; seconds: of computing."""
+    end = time.process_time() + seconds
     guess = first_guess(program)
     softs = soft_conditions(program, guess)
     elastic = Elastic(program, softs)
