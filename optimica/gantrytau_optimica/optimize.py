@@ -6,14 +6,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Literal, Unpack
 
-import numpy as np
-
 from gantrytau import SolveError
 from gantrytau.compiler.request import names
 from gantrytau_optimica.answers.archive.run_record import require_place, write_record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
-from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.failures.dependence import check_freedom
 from gantrytau_optimica.policy import Guesses, Policy, PolicyKeywords, policy_of
@@ -24,7 +21,7 @@ from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.ipopt import Progress, Solver
-from gantrytau_optimica.transcription.mesh import Mesh, with_borders
+from gantrytau_optimica.transcription.mesh import with_jumps
 from gantrytau_optimica.transcription.shooting import shoot
 from gantrytau_optimica.transcription.transcribe import transcribe
 
@@ -107,7 +104,7 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
         policy = replace(
             policy, elements=1, points=1, scheme="radau", lengths="given", controls=None, refine=None
         )
-    meshes = [_with_jumps(policy.mesh, phase) for phase in built.problem.phases]
+    meshes = [with_jumps(policy.mesh, phase) for phase in built.problem.phases]
     if policy.refine is not None or (policy.mesh.moving and policy.points > 1):
         # free borders would be moved to where limits are passed
         built = replace(built, problem=with_ramps(built.problem, meshes))
@@ -121,12 +118,3 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     return Prepared(
         built, program, solver, guess, time.perf_counter() - begin, policy.refine, policy.starts, near
     )
-
-
-def _with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
-    """The mesh with borders where a known input jumps."""
-    jumps = [course.jumps for course in phase.courses if course.jumps.size]
-    if not jumps or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
-        return mesh
-    start, final = float(phase.start_time), float(phase.final_time)
-    return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))

@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import with_guesses
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit, Phase, Signal
+from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
@@ -114,9 +114,9 @@ class Prepared:
         solver = Solver(coarse, replace(settings, max_iterations=min(settings.max_iterations, MOST_TRIED)))
 
         def solve(problem: ControlProblem) -> Optimum:
-            guessed = coarse.with_numbers(
-                replace(coarse.problem, phases=_guessed(coarse.problem, problem), free=problem.free)
-            )
+            guesses = {s.name: s.guess for s in problem.signals}
+            same = coarse.problem.with_signals(lambda _, s: replace(s, guess=guesses[s.name]))
+            guessed = coarse.with_numbers(replace(same, free=problem.free))
             return self._solved(
                 replace(built, problem=guessed.problem), guessed, solver, first_guess(guessed)
             )
@@ -210,19 +210,6 @@ class Prepared:
             return replace(number, guess=number_guess(number.name, guess, number.guess))
         value = values.get(number.name, self.built.read.dae.parameter_values[number.name])
         return replace(number, guess=value, min=value, max=value)
-
-
-def _guessed(coarse: ControlProblem, problem: ControlProblem) -> tuple[Phase, ...]:
-    """The phases of a program with the guesses of another."""
-    guesses = {s.name: s.guess for s in problem.signals}
-
-    def done(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
-        return tuple(replace(s, guess=guesses[s.name]) for s in signals)
-
-    return tuple(
-        replace(p, states=done(p.states), algebraics=done(p.algebraics), inputs=done(p.inputs))
-        for p in coarse.phases
-    )
 
 
 def solved_or_raise(optimum: Optimum) -> Optimum:

@@ -1,6 +1,6 @@
 """From a problem in the model's symbols to a control problem in states, algebraics and inputs."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -122,26 +122,14 @@ def _in_order(draft: ControlProblem) -> list[Limit]:
 def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
     """The control problem with first guesses along its free and held numbers as they are."""
     guesses = first_guesses(built, guess)
-    return _changed(built.problem, lambda phase, signal: replace(signal, guess=guesses[signal.name]))
+    return built.problem.with_signals(lambda _, signal: replace(signal, guess=guesses[signal.name]))
 
 
 def _with_sizes(draft: ControlProblem) -> ControlProblem:
     bounds = {name: ends for phase in draft.phases for name, ends in signal_limits(phase, draft.name).items()}
-    return _changed(
-        draft, lambda phase, signal: replace(signal, nominal=typical_size(draft, signal, bounds[signal.name]))
+    return draft.with_signals(
+        lambda _, signal: replace(signal, nominal=typical_size(draft, signal, bounds[signal.name]))
     )
-
-
-def _changed(draft: ControlProblem, change: Callable[[Phase, Signal], Signal]) -> ControlProblem:
-    """The problem with every signal changed."""
-    phases = []
-    for phase in draft.phases:
-        parts = (
-            tuple(change(phase, s) for s in part) for part in (phase.states, phase.algebraics, phase.inputs)
-        )
-        states, algebraics, inputs = parts
-        phases.append(replace(phase, states=states, algebraics=algebraics, inputs=inputs))
-    return replace(draft, phases=tuple(phases))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ subject to  x' = ode(t, x, z, u, free), 0 = residuals(t, x, z, u, free)        i
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import casadi as ca
@@ -155,6 +155,16 @@ class ControlProblem:
     def signals(self) -> tuple[Signal, ...]:
         """Signals of all phases."""
         return tuple(s for phase in self.phases for s in phase.signals)
+
+    def with_signals(self, change: Callable[[Phase, Signal], Signal]) -> "ControlProblem":
+        """The problem with every signal changed."""
+
+        def changed(phase: Phase) -> Phase:
+            parts = (phase.states, phase.algebraics, phase.inputs)
+            states, algebraics, inputs = (tuple(change(phase, s) for s in part) for part in parts)
+            return replace(phase, states=states, algebraics=algebraics, inputs=inputs)
+
+        return replace(self, phases=tuple(changed(phase) for phase in self.phases))
 
     @property
     def points(self) -> tuple[PointValue, ...]:

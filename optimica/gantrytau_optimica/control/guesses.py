@@ -12,6 +12,7 @@ from gantrytau import Dae, ModelError, Result
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
+from gantrytau_optimica.control.limits import value_at
 from gantrytau_optimica.problem.optimization import Point
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
@@ -228,9 +229,7 @@ def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None
     if any(leaf.name() not in dae.parameter_values for leaf in leaves):
         return None
     numbers = {**dae.parameter_values, **chosen}
-    return float(
-        ca.evalf(ca.substitute(bound, ca.vertcat(*leaves), ca.DM([numbers[s.name()] for s in leaves])))
-    )
+    return value_at(bound, {leaf.element_hash(): numbers[leaf.name()] for leaf in leaves})
 
 
 def _from_ends(dae: Dae, symbol: str, ends: Mapping[str, Mapping[str, float]], span: float) -> Guess:

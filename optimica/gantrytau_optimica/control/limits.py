@@ -1,5 +1,6 @@
 """Limits and conditions sorted: on the path or at a time, on one signal or on an expression, repeated or not."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import casadi as ca
@@ -145,7 +146,7 @@ def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tup
     """
     states = {s.symbol.element_hash() for phase in draft.phases for s in phase.states}
     meaning = _meanings(draft)
-    fixed: dict[Moment, dict[int, tuple[ca.SX, float]]] = {}
+    fixed: dict[Moment, dict[int, float]] = {}
     kept: list[Limit] = []
     for row in boundary:
         when, value = meaning.get(row.expression.element_hash(), (None, row.expression))
@@ -155,9 +156,7 @@ def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tup
         known = fixed.setdefault(when, {})
         leaves = ca.symvar(value)
         if all(leaf.element_hash() in known for leaf in leaves):
-            pairs = [known[leaf.element_hash()] for leaf in leaves]
-            inside, numbers = ca.vertcat(*(p[0] for p in pairs)), ca.DM([p[1] for p in pairs])
-            found = float(ca.evalf(ca.substitute(value, inside, numbers))) if leaves else float(value)
+            found = value_at(value, known)
             if abs(found - row.lower) > 1e-7 * max(1.0, abs(row.lower)):
                 raise ModelError(
                     f"{name}: `{row.name}` contradicts other conditions at the same time, from which it follows that "
@@ -165,9 +164,16 @@ def _independent(draft: ControlProblem, boundary: list[Limit], name: str) -> tup
                 )
             continue
         if value.is_symbolic() and value.element_hash() in states:
-            known[value.element_hash()] = (value, row.lower)
+            known[value.element_hash()] = row.lower
         kept.append(row)
     return tuple(kept)
+
+
+def value_at(expression: ca.SX, numbers: Mapping[int, float]) -> float:
+    """The value of a scalar whose symbols have these numbers, by their hashes."""
+    leaves = ca.symvar(expression)
+    values = ca.DM([numbers[leaf.element_hash()] for leaf in leaves])
+    return float(ca.evalf(ca.substitute(expression, ca.vertcat(*leaves), values) if leaves else expression))
 
 
 def known_states(problem: ControlProblem) -> dict[Moment, dict[int, Limit]]:

@@ -30,10 +30,11 @@ from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_
 from gantrytau_optimica.estimation.experiments import Experiment, named
 from gantrytau_optimica.estimation.mesh_shift import mesh_shift
 from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
+from gantrytau_optimica.estimation.robust_weights import huber_weights, median_deviation
 from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
 from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.solving.ipopt import Solver, SolverSettings
-from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_borders
+from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_jumps
 from gantrytau_optimica.transcription.scheme import Collocation, collocation
 from gantrytau_optimica.transcription.transcribe import transcribe
 
@@ -41,7 +42,6 @@ EXPECTED_NOISE = (
     0.01  # of the spread of the data, where no deviations were given: for the solver's scaling only
 )
 AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
-TUNING = 1.345  # deviations beyond which a robust fit counts linearly: 95 % efficient for normal noise (Huber, 1981)
 ROUNDS, SETTLED = 30, 1e-6  # of reweighing, and the relative change of the weights at which it ends
 
 
@@ -148,9 +148,7 @@ def _mesh(read: Plan, number: int, phase: Phase, mesh: Mesh) -> Mesh:
     if read.static:
         steps = np.diff(sample_times(read.experiments[number]))
         return mesh_of([steps[0] if steps.size else 1.0, *steps])
-    jumps = [course.jumps for course in phase.courses if course.jumps.size]
-    start, final = read.experiments[number].horizon
-    return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start)) if jumps else mesh
+    return with_jumps(mesh, phase)
 
 
 def _without_start(read: Plan) -> dict[str, list[str]]:
@@ -176,9 +174,9 @@ def _robust(
     """Least squares again with stray values weighted down, until the weights settle."""
     weights = np.ones(sum(found.sizes))
     for _ in range(ROUNDS):
-        errors = np.abs(found.values(optimum.solution.w))
-        size = 1.0 if known else float(np.median(errors)) * 1.4826 or 1.0  # 1.4826: of normal noise
-        before, weights = weights, np.minimum(1.0, TUNING * size / np.maximum(errors, 1e-300))
+        errors = found.values(optimum.solution.w)
+        size = 1.0 if known else float(median_deviation(errors)) or 1.0
+        before, weights = weights, huber_weights(errors, size)
         if np.max(np.abs(weights - before)) < SETTLED:
             break
         problem = _weighted(found.program.problem, weights)

@@ -10,6 +10,7 @@ from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.estimation.robust_weights import median_deviation
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
 COARSE = 0.2  # deviations by which a halved mesh may move a parameter
@@ -58,9 +59,9 @@ class ParameterFit:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of the residuals, of a robust fit 1.4826 times the median of their amounts."""
+        """Standard deviation of the residuals, of a robust fit by the median of their amounts."""
         if self.loss == "robust":
-            return 1.4826 * float(np.median(np.abs(self.errors)))
+            return float(median_deviation(self.errors))
         return float(np.sqrt(self.variance))
 
     @property

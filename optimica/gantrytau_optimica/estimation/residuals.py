@@ -55,7 +55,7 @@ class Residuals:
     def jacobian(self, w: np.ndarray) -> np.ndarray:
         """Slopes (N, k) with respect to the free numbers in their units."""
         program, free = self.program, self.program.places.free
-        slopes = _csc(self.assembled.jac_g(w / program.places.scale, [])[1])
+        slopes = self.assembled.jac_g(w / program.places.scale, [])[1].sparse()
         found = slopes[:, free].toarray()
         if self.others.size:
             equations, factors = self._factorised(w)
@@ -83,7 +83,7 @@ class Residuals:
 
     def _factorised(self, w: np.ndarray) -> tuple[Any, SuperLU]:
         """Slopes of the equations, and the factors of those with respect to the other unknowns."""
-        whole = _csc(self.program.assembled.jac_g(w / self.program.places.scale, [])[1]).tocsr()
+        whole = self.program.assembled.jac_g(w / self.program.places.scale, [])[1].sparse().tocsr()
         equations = whole[self.equations].tocsc()
         try:
             return equations, splu(equations[:, self.others].tocsc())
@@ -120,12 +120,6 @@ def residuals(program: Program) -> Residuals:
 def _assembled(places: Places, terms: Sequence[Term], rows: int) -> Assembled:
     """The residuals as rows of a program without an objective."""
     return assemble([], terms, sparse.csr_matrix((rows, places.size)), 0)
-
-
-def _csc(matrix: ca.DM) -> Any:
-    """A sparse matrix of CasADi for SciPy."""
-    columns, rows = matrix.sparsity().get_ccs()
-    return sparse.csc_matrix((np.array(matrix.nonzeros()), rows, columns), shape=matrix.shape)
 
 
 def check_determined(found: Residuals, states: dict[str, list[str]]) -> None:

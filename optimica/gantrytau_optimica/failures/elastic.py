@@ -24,6 +24,7 @@ from gantrytau.interruption import on_interrupt
 from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.failures.row_meanings import row_sizes
 from gantrytau_optimica.solving.ipopt import Watch
+from gantrytau_optimica.transcription.assemble import to_dm
 from gantrytau_optimica.transcription.program import Program
 
 START = 2.0  # price of a start against other conditions: it is a fact more often than a wish
@@ -160,7 +161,7 @@ class Elastic:
         x, p = ca.MX.sym("x", n + m), ca.MX.sym("p", 0)
         w, s = x[:n], x[n:]
         price = ca.DM([soft.price for soft in self.softs]) if m else ca.DM(0, 1)
-        select, pick, yielding = _dm(self.select), _dm(self.pick), _dm(self.yielding)
+        select, pick, yielding = to_dm(self.select), to_dm(self.pick), to_dm(self.yielding)
         g = ca.mtimes(select, assembled.nlp(w, p)[1]) + ca.mtimes(pick, w) + ca.mtimes(yielding, s)
         jacobian = ca.horzcat(ca.mtimes(select, assembled.jac_g(w, p)[1]) + pick, yielding)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
@@ -253,10 +254,3 @@ def _matrix(column: np.ndarray, value: np.ndarray, shape: tuple[int, int]) -> sp
     """One entry in every row whose column is not negative."""
     row = np.flatnonzero(column >= 0)
     return sparse.csr_matrix((value[row], (row, column[row])), shape=shape)
-
-
-def _dm(matrix: Any) -> ca.DM:
-    columns = matrix.tocsc()
-    columns.sort_indices()
-    pattern = ca.Sparsity(*matrix.shape, columns.indptr.tolist(), columns.indices.tolist())
-    return ca.DM(pattern, columns.data)

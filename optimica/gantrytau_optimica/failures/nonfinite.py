@@ -104,7 +104,7 @@ def _expressions(built: Built, phases: Sequence[Trajectory]) -> Iterator[tuple[c
             if all(leaf.element_hash() in mine for leaf in ca.symvar(expression)):
                 yield expression, text, table, k < len(origins)
         for point in phase.points:
-            when = _time(trajectory, point.time)
+            when = trajectory.moment(point.time)
             at = trajectory.values(point.expression, np.array([when]))[:, 0]
             values += zip(point.symbol.elements(), at, strict=True)
     free = zip(problem.free, phases[0].numbers, strict=True)
@@ -120,12 +120,6 @@ def _expressions(built: Built, phases: Sequence[Trajectory]) -> Iterator[tuple[c
     yield problem.objective, "the objective", table, False
     for limit in problem.boundary:
         yield limit.expression, f"`{limit.name}`", table, False
-
-
-def _time(trajectory: Trajectory, time: str | ca.SX) -> float:
-    if isinstance(time, str):
-        return trajectory.start_time if time == "initial" else trajectory.final_time
-    return float(ca.Function("time", [trajectory.problem.numbers], [time])(ca.DM(trajectory.numbers)))
 
 
 def _table(trajectory: Trajectory) -> _Table:

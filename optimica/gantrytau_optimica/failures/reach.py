@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Limit
-from gantrytau_optimica.control.limits import known_states
+from gantrytau_optimica.control.limits import known_states, value_at
 
 WORDS = {"initial": "start", "final": "end"}
 
@@ -44,7 +44,7 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
     found: list[OutOfReach] = []
     for (number, when), states in known_states(problem).items():
         phase = problem.phases[number]
-        values = {h: (row.lower, row.name) for h, row in states.items()}
+        values = {**held, **{h: row.lower for h, row in states.items()}}
         radicands: list[ca.SX] = []
         lost: list[OutOfReach] = []
         for k, algebraic in enumerate(phase.algebraics):
@@ -52,17 +52,13 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
                 continue
             radicand = ca.substitute(-phase.residuals[k], algebraic.symbol, 0)
             leaves = ca.symvar(radicand)
-            if not all(leaf.element_hash() in values or leaf.element_hash() in held for leaf in leaves):
+            if not all(leaf.element_hash() in values for leaf in leaves):
                 continue
-            numbers = [values[h][0] if (h := leaf.element_hash()) in values else held[h] for leaf in leaves]
-            value = (
-                float(ca.evalf(ca.substitute(radicand, ca.vertcat(*leaves), ca.DM(numbers))))
-                if leaves
-                else 0.0
-            )
+            numbers = [values[leaf.element_hash()] for leaf in leaves]
+            value = value_at(radicand, values) if leaves else 0.0
             radicands.append(_with_held(radicand, held))
             if value < -1e-9 * max(1.0, float(np.max(np.abs(numbers), initial=0.0)) ** 2):
-                names = tuple(values[h][1] for leaf in leaves if (h := leaf.element_hash()) in values)
+                names = tuple(states[h].name for leaf in leaves if (h := leaf.element_hash()) in states)
                 where = f"{WORDS[when]} of {phase.name}" if phase.name else WORDS[when]
                 lost.append(OutOfReach(where, phase.residual_names[k].rstrip(","), names, -value))
         if lost:

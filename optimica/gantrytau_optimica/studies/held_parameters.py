@@ -9,7 +9,6 @@ from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
 from gantrytau_optimica.studies.kkt import stationarity
 from gantrytau_optimica.transcription.program import Program
@@ -53,20 +52,15 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
 def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
     """The control problem with values of its numbers, and guesses and typical sizes, as another one has them."""
     known = {s.name: s for s in old.problem.signals}
-
-    def sized(part: tuple[Signal, ...]) -> tuple[Signal, ...]:
-        return tuple(replace(s, nominal=known[s.name].nominal, guess=known[s.name].guess) for s in part)
-
-    phases = tuple(
-        replace(p, states=sized(p.states), algebraics=sized(p.algebraics), inputs=sized(p.inputs))
-        for p in built.problem.phases
+    sized = built.problem.with_signals(
+        lambda _, s: replace(s, nominal=known[s.name].nominal, guess=known[s.name].guess)
     )
     numbers = []
     for number in built.problem.free:
         value = float(values.get(number.name, number.guess))
         ends = {"min": value, "max": value} if number.held else {}
         numbers.append(replace(number, guess=value, **ends))
-    return replace(built, problem=replace(built.problem, phases=phases, free=tuple(numbers)))
+    return replace(built, problem=replace(sized, free=tuple(numbers)))
 
 
 def _carried(old: Program, new: Program, solution: Solution, w: np.ndarray) -> Solution | None:

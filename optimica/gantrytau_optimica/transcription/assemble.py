@@ -55,7 +55,7 @@ class Term:
     ) -> ca.MX:
         """All copies of an expression of the local variables, stacked into one column."""
         symbols = [self.local, self.parameters, self.constants]
-        local = ca.reshape(ca.mtimes(_dm(self.gather), w), self.local.numel(), self.copies)
+        local = ca.reshape(ca.mtimes(to_dm(self.gather), w), self.local.numel(), self.copies)
         arguments = [local, ca.repmat(p, 1, self.copies), ca.MX(ca.DM(self.constant_values))]
         if weights is not None and weight_values is not None:
             symbols.append(weights)
@@ -83,7 +83,7 @@ def assemble(
     rows, n = linear.shape
     w, p = ca.MX.sym("x", n), ca.MX.sym("p", parameters)
     f = sum((_values(term, w, p) for term in objective), ca.MX(0))
-    g = sum((_values(term, w, p) for term in constraints), ca.mtimes(_dm(linear), w))
+    g = sum((_values(term, w, p) for term in constraints), ca.mtimes(to_dm(linear), w))
     gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
     jacobian = _jacobian(constraints, linear, w, p)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
@@ -108,7 +108,7 @@ def assemble(
 
 
 def _values(term: Term, w: ca.MX, p: ca.MX) -> ca.MX:
-    return ca.mtimes(_dm(term.scatter), term.call("values", term.values, w, p))
+    return ca.mtimes(to_dm(term.scatter), term.call("values", term.values, w, p))
 
 
 def _jacobian(terms: Sequence[Term], linear: Sparse, w: ca.MX, p: ca.MX) -> ca.MX:
@@ -135,7 +135,7 @@ def _hessian(terms: Sequence[tuple[Term, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
         small = ca.triu(ca.hessian(ca.dot(weights, term.values), term.local)[0])
         if small.nnz() == 0:
             continue
-        values = ca.mtimes(_dm(term.scatter.T.tocsr()), multipliers)
+        values = ca.mtimes(to_dm(term.scatter.T.tocsr()), multipliers)
         nonzeros.append(term.call("hessian", small.nz[:], w, p, weights, values))
         row, column = (np.array(part) for part in small.sparsity().get_triplet())
         # the other triangle of a small Hessian may reach the upper one of the large
@@ -179,11 +179,11 @@ def _sum_into(entries: Sequence[Entries], nonzeros: Sequence[ca.MX], fixed: Spar
     if nonzeros:
         place, factor = (np.concatenate([part[i] for part in parts]) for i in (2, 3))
         total = sparse.csr_matrix((factor, (slot[:moving], place)), shape=(len(keys), int(offsets[-1])))
-        values = values + ca.mtimes(_dm(total), ca.vertcat(*nonzeros))
+        values = values + ca.mtimes(to_dm(total), ca.vertcat(*nonzeros))
     return ca.MX(pattern, values)
 
 
-def _dm(matrix: Sparse) -> ca.DM:
+def to_dm(matrix: Sparse) -> ca.DM:
     """A constant sparse matrix for CasADi; zeros stay structural."""
     columns = matrix.tocsc()
     columns.sum_duplicates()

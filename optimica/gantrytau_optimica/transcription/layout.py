@@ -48,6 +48,17 @@ def lagrange(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
     return found
 
 
+def polynomials(nodes: np.ndarray, place: ca.SX) -> ca.SX:
+    """Lagrange's polynomials through nodes (m,) at a symbolic place, (m,)."""
+    found = []
+    for j, node in enumerate(nodes):
+        value = ca.SX(1)
+        for other in np.delete(nodes, j):
+            value *= (place - float(other)) / float(node - other)
+        found.append(value)
+    return ca.vertcat(*found)
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """The unknowns of one phase on n elements with k points.

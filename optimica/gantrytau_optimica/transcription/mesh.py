@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau_optimica.control.control_problem import Phase
 
 SHORTEST = 0.1  # of its length in the guess, for a stretch between two moving borders
 
@@ -86,6 +87,15 @@ def mesh_of(elements: Any, free_lengths: bool = False) -> Mesh:
             argument="elements",
         )
     return Mesh(borders, tuple(range(1, borders.size - 1)) if free_lengths else ())
+
+
+def with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
+    """The mesh with borders where a known input jumps, if the times of the phase are fixed."""
+    jumps = [course.jumps for course in phase.courses if course.jumps.size]
+    if not jumps or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
+        return mesh
+    start, final = float(phase.start_time), float(phase.final_time)
+    return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
 
 
 def with_borders(mesh: Mesh, shares: np.ndarray) -> Mesh:

@@ -15,7 +15,7 @@ from scipy import sparse
 from gantrytau import ModelError
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, PointValue
 from gantrytau_optimica.transcription.assemble import Term
-from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
+from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, polynomials
 from gantrytau_optimica.transcription.mesh import Mesh
 
 
@@ -245,7 +245,7 @@ def _moving(places: Places, layout: Layout, one: Place):
     for track in layout.tracks:
         nodes, size = track.nodes[e], track.nodes.shape[1]
         at_nodes = ca.SX.sym("node", size)
-        here.append(ca.dot(_basis(nodes, place), at_nodes))
+        here.append(ca.dot(polynomials(nodes, place), at_nodes))
         symbols.append(at_nodes)
         rows.append(count + np.arange(size))
         unknowns.append(track.unknowns[e])
@@ -253,15 +253,3 @@ def _moving(places: Places, layout: Layout, one: Place):
         count += size
     matrix = places.pick(rows, unknowns, values, count) if rows else sparse.csr_matrix((0, places.size))
     return ca.vertcat(ca.SX(0, 1), *here), ca.vertcat(ca.SX(0, 1), *symbols), matrix, time
-
-
-def _basis(nodes: np.ndarray, place: ca.SX) -> ca.SX:
-    """Lagrange's polynomials through the nodes at a symbolic place, (m,)."""
-    found = []
-    for j, node in enumerate(nodes):
-        others = np.delete(nodes, j)
-        value = ca.SX(1)
-        for other in others:
-            value *= (place - float(other)) / float(node - other)
-        found.append(value)
-    return ca.vertcat(*found)

@@ -53,6 +53,12 @@ class Trajectory:
         """End in s."""
         return self.horizon[1]
 
+    def moment(self, time: str | ca.SX) -> float:
+        """The time in s of a point: "initial", "final", or an expression of free numbers."""
+        if isinstance(time, str):
+            return self.start_time if time == "initial" else self.final_time
+        return float(ca.Function("time", [self.problem.numbers], [time])(ca.DM(self.numbers)))
+
     def times(self, shares: np.ndarray) -> np.ndarray:
         """Shares of the horizon as times in s."""
         return self.start_time + (self.final_time - self.start_time) * shares

@@ -174,7 +174,8 @@ def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, l
     for phase, played in zip(problem.phases, phases, strict=True):
         for point in phase.points:
             symbols.append(point.symbol)
-            values.append(ca.DM(_point(played, point.expression, point.time)))
+            when = np.array([played.trajectory.moment(point.time)])
+            values.append(ca.DM(played.at(point.expression, when)[:, 0]))
         sums: dict[int, float] = {}
         for one in phase.sums:
             error = (played.at(one.expression, one.times)[0] - one.values) / one.deviations
@@ -207,16 +208,6 @@ def _size(problem: ControlProblem, limit: Limit) -> float:
     sizes = [s.nominal for s in problem.signals if s.symbol.element_hash() in names]
     sizes += [abs(b) for b in (limit.lower, limit.upper) if np.isfinite(b) and b != 0.0]
     return max(sizes, default=1.0)
-
-
-def _point(played: Replayed, expression: ca.SX, time: str | ca.SX) -> np.ndarray:
-    trajectory = played.trajectory
-    if isinstance(time, str):
-        when = trajectory.start_time if time == "initial" else trajectory.final_time
-    else:
-        problem = trajectory.problem
-        when = float(ca.Function("time", [problem.numbers], [time])(trajectory.numbers))
-    return played.at(expression, np.array([when]))[:, 0]
 
 
 def _running(played: Replayed) -> float:

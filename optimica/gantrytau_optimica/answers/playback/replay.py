@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.control.built import Built, with_values
-from gantrytau_optimica.transcription.layout import lagrange
+from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
 TOLERANCE = 1e-10
@@ -215,7 +215,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     nodes = _nodes(trajectory)
     inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]
     values = ca.SX.sym("values", nodes.size * len(inputs))
-    basis = _basis(nodes, place)
+    basis = polynomials(nodes, place)
     courses = [ca.dot(basis, values[nodes.size * i : nodes.size * (i + 1)]) for i in range(len(inputs))]
     old, new = ca.vertcat(problem.time, *inputs), ca.vertcat(begin + place * span, *courses)
     ode, residuals, algebraics = ca.substitute(everything, [old], [new])
@@ -234,18 +234,3 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     return _System(
         integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
     )
-
-
-def _basis(nodes: np.ndarray, place: ca.SX) -> ca.SX:
-    found = []
-    for j, node in enumerate(nodes):
-        factors = [(place - float(other)) / float(node - other) for other in np.delete(nodes, j)]
-        found.append(ca.SX(1) if not factors else _product(factors))
-    return ca.vertcat(*found)
-
-
-def _product(factors: list[ca.SX]) -> ca.SX:
-    result = factors[0]
-    for factor in factors[1:]:
-        result = result * factor
-    return result
