@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.control.control_problem import ControlProblem, Phase, PointValue
+from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, PointValue
 from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, polynomials
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -83,12 +83,7 @@ class Running:
         wanted = [c for c in phase.courses if ca.depends_on(values, c.symbol)]
         if not wanted:
             return [], []
-        if mesh.moving or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
-            raise ModelError(
-                f"{self.places.problem.name}: {wanted[0].name} is known by samples, which needs fixed times; give "
-                "start_time and final_time as numbers, or the course as a function of time"
-            )
-        start, final = float(phase.start_time), float(phase.final_time)
+        start, final = _fixed_horizon(self.places, phase, wanted[0], moves=bool(mesh.moving))
         share = mesh.borders[element] + place * mesh.widths[element]
         # a place next to a border keeps to its own side of a jump
         inside = 1e-9 * mesh.widths[element] * (0.5 - place)
@@ -101,6 +96,16 @@ def running(places: Places, layout: Layout) -> Running:
     moving = layout.knots.size > 0
     left, right = (ca.SX.sym(n) if moving else ca.SX(0) for n in ("left", "right"))
     return Running(places, layout, ca.SX.sym("place"), left, right, ca.SX.sym("ends", 2))
+
+
+def _fixed_horizon(places: Places, phase: Phase, course: Course, moves: bool) -> tuple[float, float]:
+    """Start and end of a phase in s. ModelError where they, or a place in it, change: samples have fixed times."""
+    if moves or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
+        raise ModelError(
+            f"{places.problem.name}: {course.name} is known by samples, which needs fixed times; give start_time and "
+            "final_time as numbers, or the course as a function of time"
+        )
+    return float(phase.start_time), float(phase.final_time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +200,9 @@ def _with_courses(places: Places, layout: Layout, one: Place, value: ca.SX) -> c
     if not wanted:
         return value
     phase = layout.phase
-    if one.place is None or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
-        raise ModelError(
-            f"{places.problem.name}: {wanted[0].name} is known by samples, which needs fixed times; give start_time and "
-            "final_time as numbers, or the course as a function of time"
-        )
+    start, final = _fixed_horizon(places, phase, wanted[0], moves=one.place is None)
     borders = layout.mesh.borders[one.element : one.element + 2]
-    share = borders[0] + one.place * (borders[1] - borders[0])
-    time = np.array([float(phase.start_time) + share * (float(phase.final_time) - float(phase.start_time))])
+    time = np.array([start + (borders[0] + (one.place or 0.0) * (borders[1] - borders[0])) * (final - start)])
     return ca.substitute(
         value, ca.vertcat(*(c.symbol for c in wanted)), ca.DM([float(c.value(time)[0]) for c in wanted])
     )
