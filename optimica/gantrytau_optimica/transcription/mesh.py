@@ -90,10 +90,15 @@ def mesh_of(elements: Any, free_lengths: bool = False) -> Mesh:
 
 
 def with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
-    """The mesh with borders where a known input jumps, if the times of the phase are fixed."""
+    """The mesh with borders where a known input jumps, if the times of the phase are fixed. ModelError if borders move."""
     jumps = [course.jumps for course in phase.courses if course.jumps.size]
     if not jumps or not (phase.start_time.is_constant() and phase.final_time.is_constant()):
         return mesh
+    if mesh.moving:
+        name = next(course.name for course in phase.courses if course.jumps.size)
+        raise ModelError(
+            f"{name}: its steps and lengths='free' do not go together, as borders stand at the steps; give the lengths"
+        )
     start, final = float(phase.start_time), float(phase.final_time)
     return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
 

@@ -214,8 +214,7 @@ def test_a_known_input_may_hold_a_parameter_of_the_fit():
     assert optimum.objective == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="optimize._with_jumps: with_borders forgets which borders move")
 def test_free_lengths_beside_a_known_input_with_steps():
     """Borders at the steps and borders that move do not go together, as samples of straight lines are refused."""
-    with pytest.raises(ModelError, match="lengths"):
+    with pytest.raises(ModelError, match=r"model\.u: its steps and lengths='free' do not go together"):
         optimize(problem(Held, inputs={"model.u": STEPS}), elements=4, lengths="free")
