@@ -15,9 +15,9 @@ from gantrytau.compiler.system import System, assemble
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.flattening.check_units import check_units
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
-from gantrytau.flattening.instants import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.writing import write_equations
 

@@ -21,7 +21,7 @@ from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import all_symbols, retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
-from gantrytau.flattening.instants import refuse_events
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, StateSelect, evaluate
+from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate
 from gantrytau.language.model import (
     Connector,
     Declared,
@@ -308,8 +308,3 @@ def _merge(below: Mapping[Any, Any], above: Mapping[Any, Any]) -> dict[Any, Any]
         else:
             merged[key] = value
     return merged
-
-
-def prefer_of(attributes: Mapping[str, Leaf]) -> StateSelect:
-    """The state preference among the attributes of a variable."""
-    return StateSelect(attributes["prefer"].value) if "prefer" in attributes else StateSelect.DEFAULT

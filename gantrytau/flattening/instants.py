@@ -196,23 +196,3 @@ def unit_equations(flat: FlatModel) -> list[Equation]:
         Equation(s.period, flat.time, s.path, s.model, 0, label=f"{s.label}, period") for s in flat.sampled
     ]
     return _right_sides(flat.sampled, flat.frictions, symbols) + periods
-
-
-def refuse_events(flat: FlatModel) -> None:
-    """ModelError naming the first component whose values or equations change at instants."""
-    refuse_sticking(flat)
-    for event in flat.sampled:
-        raise ModelError(
-            f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate and FMUs "
-            "sample it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a "
-            "continuous equation. translate(..., events=True) takes it as known"
-        )
-
-
-def refuse_sticking(flat: FlatModel) -> None:
-    """ModelError naming the first component whose friction sticks."""
-    for event in flat.frictions:
-        raise ModelError(
-            f"{event.label}: found friction that sticks, whose equations change at instants, expected equations that "
-            "stay. Export the model as an FMU (gantrytau_fmu.export_fmu), or take a smooth friction, TanhFriction"
-        )

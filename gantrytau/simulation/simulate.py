@@ -15,7 +15,7 @@ from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import ModelError, SolveError
-from gantrytau.flattening.instants import refuse_sticking
+from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result

@@ -12,7 +12,7 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
 from gantrytau.writing.pages import folded, page, table
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written_at
+from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.text import PlainSyntax, event_lines, plain_number
 
 STYLE = """

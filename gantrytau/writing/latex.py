@@ -8,7 +8,7 @@ import re
 from gantrytau.compiler.translated import Translated
 from gantrytau.writing.names import GREEK, Name, name_of
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written_at
+from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.syntax import ATOM, CHOICE, POWER, PRODUCT, SUM, Arguments, Written, infix
 from gantrytau.writing.text import event_lines, plain_number
 

@@ -19,7 +19,7 @@ from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
-from gantrytau.writing.sharing import Text, located, written, written_at
+from gantrytau.writing.subexpressions import Text, located, written, written_at
 from gantrytau.writing.syntax import CHOICE, Written, write
 from gantrytau.writing.text import event_lines
 

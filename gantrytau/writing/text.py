@@ -4,7 +4,7 @@ import casadi as ca
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.writing.sections import Section, sections
-from gantrytau.writing.sharing import written_at
+from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
 
 WORDS = {

@@ -10,7 +10,7 @@ from gantrytau import Input, Model, ModelError, Parameter, Real, der, if_else, t
 from gantrytau.writing.collect import collected, moving_part
 from gantrytau.writing.graph import Graph
 from gantrytau.writing.modelica_syntax import ModelicaSyntax
-from gantrytau.writing.sharing import written
+from gantrytau.writing.subexpressions import written
 from gantrytau.writing.text import PlainSyntax
 from tests.writing.modelica_reader import Evaluator, plain, read_modelica
 from tests.writing.residuals import assert_same_residuals

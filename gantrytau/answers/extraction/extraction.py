@@ -27,12 +27,12 @@ from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat, translate_model
 from gantrytau.errors import ModelError, StructureError
-from gantrytau.flattening.instants import refuse_events
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name
 from gantrytau.writing.collect import collected, moving_part, without_factor
 from gantrytau.writing.graph import Graph
-from gantrytau.writing.sharing import Text, written
+from gantrytau.writing.subexpressions import Text, written
 from gantrytau.writing.text import PlainSyntax
 
 SAME = 1e-9  # relative difference below which numbers at all sample points count as one constant

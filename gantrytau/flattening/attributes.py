@@ -1,0 +1,95 @@
+"""The attributes of declarations as expressions of parameters: from a placed quantity to its flat record."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import ModelError, in_words
+from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
+from gantrytau.flattening.instantiation import Leaf, Placed
+from gantrytau.language.declarations import Parameter, StateSelect, evaluate
+
+
+def flat_variable(placed: Placed) -> FlatVariable:
+    """The record of a variable. Raises ModelError for an attribute that is no number of its shape."""
+    return FlatVariable(**_common(placed), prefer=_prefer(placed.attributes))
+
+
+def flat_parameter(placed: Placed) -> FlatParameter:
+    """The record of a parameter. Raises ModelError where it has no value."""
+    if "value" not in placed.attributes:
+        raise ModelError(
+            f"{placed.name} ({placed.declaration.words()}) has no value, expected one; "
+            f"give it where the component is declared, `{placed.name.split('.')[-1]}=...`"
+        )
+    declaration = placed.declaration
+    assert isinstance(declaration, Parameter)
+    return FlatParameter(**_common(placed), value=expression(placed, "value"), fold=declaration.fold)
+
+
+def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
+    """An attribute as one SX per scalar of a quantity; one number may stand for all starts or limits."""
+    leaf: Leaf = placed.attributes[attribute]
+    value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
+    try:
+        value = evaluate(value, leaf.scope)
+        found = ca.densify(ca.SX(_array(value)))
+    except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
+        why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
+        raise ModelError(
+            f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
+            f"parameters{why}"
+        ) from error
+    size = len(placed.elements)
+    if found.numel() == 1 and (size == 1 or attribute != "value"):
+        elements = found.elements() * size
+    elif found.numel() == size and (len(placed.shape) < 2 or found.shape == placed.shape):
+        elements = found.elements()
+    else:
+        shape = () if found.numel() == 1 else found.shape if found.shape[1] != 1 else (found.shape[0],)
+        raise ModelError(f"{placed.name}: {attribute} has shape {shape}, expected {placed.shape}")
+    bad = [e for e in elements if e.is_constant() and not _allowed(float(e), attribute)]
+    if bad:
+        raise ModelError(f"{placed.name}: {attribute} is {bad[0]}, expected a finite number")
+    return tuple(elements)
+
+
+def _array(value: Any) -> Any:
+    """A list of numbers, of rows of numbers, or of symbols as one array."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    if any(isinstance(item, (ca.SX, ca.DM)) for item in value):
+        return ca.vertcat(*value)
+    return ca.DM(np.asarray(value, dtype=float))
+
+
+def _allowed(value: float, attribute: str) -> bool:
+    infinite = value in (float("inf"), float("-inf"))
+    return value == value and (attribute in ("min", "max") or not infinite)
+
+
+def _common(placed: Placed) -> dict[str, Any]:
+    attributes = placed.attributes
+    limits = {key: expression(placed, key) for key in ("min", "max", "nominal") if key in attributes}
+    return dict(
+        name=placed.name,
+        kind=placed.declaration.kind,
+        shape=placed.shape,
+        elements=tuple(placed.elements),
+        symbol=placed.symbol,
+        unit=attributes["unit"].value if "unit" in attributes else None,
+        description=attributes["description"].value if "description" in attributes else "",
+        start=expression(placed, "start") if "start" in attributes else None,
+        fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
+        owner=placed.path,
+        free=getattr(placed.declaration, "free", False),
+        undetermined=attributes["undetermined"].value,
+        **limits,
+    )
+
+
+def _prefer(attributes: Mapping[str, Leaf]) -> StateSelect:
+    """The state preference among the attributes of a variable."""
+    return StateSelect(attributes["prefer"].value) if "prefer" in attributes else StateSelect.DEFAULT

@@ -1,0 +1,69 @@
+"""What cannot be in a model that is written out: numbers that are none, coordinates that do not exist, what jumps."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+import casadi as ca
+
+from gantrytau.errors import ModelError
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.instantiation import Instance
+from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import split_derivative
+
+
+def refuse_nan(equations: Iterable[Equation]) -> None:
+    """Functions of the module math turn a symbol into nan without a word."""
+    equations = tuple(equations)
+    if equations and re.search(r"\bnan\b", str(ca.vertcat(*(e.residual for e in equations)))):
+        for equation in equations:
+            if re.search(r"\bnan\b", equation.text):
+                raise ModelError(
+                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and "
+                    "finite numbers; "
+                    "functions of the module math do not work on symbols, use those of gantrytau or casadi"
+                )
+
+
+def refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> None:
+    """ModelError for an equation with a coordinate that does not exist."""
+    for equation in equations if absent else ():
+        for leaf in ca.symvar(equation.residual):
+            if split_derivative(leaf.name())[0] in absent:
+                name = split_derivative(leaf.name())[0]
+                raise ModelError(
+                    f"{equation.name}: found {name}, which does not exist: {absent[name]}; use the orientation R "
+                    "or angular velocity w of a frame instead"
+                )
+
+
+def refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
+    """Start values of coordinates that do not exist would be lost silently."""
+    for placed in instance.quantities:
+        start = placed.attributes.get("start")
+        changed = start is not None and start.value is not placed.declaration.start
+        if placed.elements[0] in absent and changed:
+            raise ModelError(
+                f"{placed.name}: found a start value, but it does not exist: {absent[placed.elements[0]]}; give start "
+                "values to the coordinates of those joints"
+            )
+
+
+def refuse_events(flat: FlatModel) -> None:
+    """ModelError naming the first component whose values or equations change at instants."""
+    refuse_sticking(flat)
+    for event in flat.sampled:
+        raise ModelError(
+            f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate and FMUs "
+            "sample it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a "
+            "continuous equation. translate(..., events=True) takes it as known"
+        )
+
+
+def refuse_sticking(flat: FlatModel) -> None:
+    """ModelError naming the first component whose friction sticks."""
+    for event in flat.frictions:
+        raise ModelError(
+            f"{event.label}: found friction that sticks, whose equations change at instants, expected equations that "
+            "stay. Export the model as an FMU (gantrytau_fmu.export_fmu), or take a smooth friction, TanhFriction"
+        )
