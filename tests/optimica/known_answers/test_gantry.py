@@ -4,23 +4,22 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, SolveError, simulate
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import LIMIT, FreePath, OnLine
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import final, initial, optimize
 from tests.benchmarks.pose_sweep import pairs, reach, sweep
 
-FREE, LINE, LIMIT = motion_problems()
 START, END = np.array([0.0, 2.51, -1.03]), np.array([1.711, 3.46, -0.24])
 
 
 @pytest.fixture(scope="module")
 def straight():
     """Along the line, no weight of the energy."""
-    return optimize(LINE)
+    return optimize(OnLine)
 
 
 def test_free_path_in_minimum_time():
-    optimum = optimize(FREE)
+    optimum = optimize(FreePath)
     # converged runs scatter by 1.5e-4 around 0.913510; a faster branch exists
     assert optimum.final_time < 0.913510 + 1.5e-4
     assert optimum.objective == optimum.final_time
@@ -32,7 +31,7 @@ def test_free_path_in_minimum_time():
     ("weight", "duration", "cost"), [(0.001, 0.92103, 0.99343), (0.01, 0.97598, 1.52098)]
 )
 def test_free_path_with_energy(weight, duration, cost):
-    optimum = optimize(FREE(weight=weight))
+    optimum = optimize(FreePath(weight=weight))
     assert optimum.final_time == pytest.approx(duration, abs=2e-5)
     assert optimum.objective == pytest.approx(cost, abs=1e-3)  # energies are known to three digits
     assert optimum.objective == pytest.approx(
@@ -50,7 +49,7 @@ def test_straight_line(straight):
 @pytest.mark.parametrize(("elements", "duration"), [(25, 0.975339), (100, 0.973830)])
 def test_the_straight_line_converges_to_the_phase_plane(elements, duration):
     # exact: 0.9737820 s by integration in the phase plane
-    optimum = optimize(LINE, elements=elements)
+    optimum = optimize(OnLine, elements=elements)
     assert optimum.final_time == pytest.approx(duration, abs=2e-6)
     assert 0.9737820 < optimum.final_time
 
@@ -61,7 +60,7 @@ def test_the_robot_on_a_line_has_two_states_and_one_control(straight):
 
 
 def test_an_end_that_is_given_twice_on_the_line_must_agree():
-    class Aside(LINE):
+    class Aside(OnLine):
         def constraints(self):
             yield from super().constraints()
             yield final(self.robot.tool.r[1]) == 3.0
@@ -71,7 +70,7 @@ def test_an_end_that_is_given_twice_on_the_line_must_agree():
 
 
 def test_an_end_out_of_reach_names_the_links_and_the_conditions():
-    class Far(FREE):
+    class Far(FreePath):
         def constraints(self):
             yield initial(self.robot.tool.r) == START
             yield final(self.robot.tool.r) == (1.711, 4.9, -0.24)
@@ -89,7 +88,7 @@ def test_an_end_out_of_reach_names_the_links_and_the_conditions():
 
 
 def test_a_start_out_of_reach_is_named_too():
-    class Far(FREE):
+    class Far(FreePath):
         def constraints(self):
             yield initial(self.robot.tool.r) == (0.0, 4.9, -1.03)
             yield final(self.robot.tool.r) == END
@@ -99,7 +98,7 @@ def test_a_start_out_of_reach_is_named_too():
 
 
 def test_a_motion_that_is_too_fast_says_which_limits_are_in_the_way():
-    class Hasty(LINE):
+    class Hasty(OnLine):
         final_time = 0.9
 
         def objective(self):
@@ -116,7 +115,7 @@ def test_a_motion_that_is_too_fast_says_which_limits_are_in_the_way():
 
 def test_an_unfinished_motion_can_be_looked_at(tmp_path):
     with pytest.raises(SolveError, match="iteration limit reached after 3 iterations") as caught:
-        optimize(FREE, max_iterations=3)
+        optimize(FreePath, max_iterations=3)
     assert "max_iterations=" in str(caught.value)
     assert "sqrt" not in str(caught.value)
     optimum = caught.value.optimum
@@ -135,14 +134,14 @@ def test_random_pairs_of_poses_converge_from_their_straight_line():
 
 
 def test_another_solution_as_guess_saves_iterations():
-    cold = optimize(FREE(weight=0.01))
-    warm = optimize(FREE(weight=0.01), elements=60, guess=cold)
+    cold = optimize(FreePath(weight=0.01))
+    warm = optimize(FreePath(weight=0.01), elements=60, guess=cold)
     assert warm.iterations < cold.iterations / 2
     assert warm.final_time == pytest.approx(cold.final_time, abs=5e-4)  # another mesh
 
 
 def test_played_back_the_motion_ends_where_it_should():
-    found = optimize(FREE(weight=0.01), elements=60)
+    found = optimize(FreePath(weight=0.01), elements=60)
     times = np.linspace(0, found.final_time, 2001)
     forces = {f"carts[{k}].f": (times, found.signal(f"robot.carts[{k}].f")(times)) for k in range(3)}
     tool = dict(r=Fixed(found["robot.tool.r"][0]), v=Fixed(0.0))

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import root
 
 from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, der, sin
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import LIMIT, OnLine
 from gantrytau_optimica import Free, Optimization, final, optimize, prepare
 from tests.optimica.control.test_controls import Effort, best_pieces
 from tests.optimica.known_answers.known_problems import motion
@@ -110,13 +110,12 @@ def test_singular_arcs():
 
 
 def test_the_robot_on_a_straight_line():
-    line, limit = motion_problems()[1:]
-    optimum = held(optimize(line, elements=30, refine=ACCURACY))
+    optimum = held(optimize(OnLine, elements=30, refine=ACCURACY))
     assert optimum.final_time == pytest.approx(0.973782, abs=ACCURACY)
     t = np.linspace(0.0, optimum.final_time, 3001)
     torque = optimum.signal("torque")(t)
-    assert np.max(np.abs(torque)) <= limit * (1 + 2 * ACCURACY)
-    assert np.max(np.abs(optimum.playback["torque"])) <= limit * (1 + 2 * ACCURACY)
+    assert np.max(np.abs(torque)) <= LIMIT * (1 + 2 * ACCURACY)
+    assert np.max(np.abs(optimum.playback["torque"])) <= LIMIT * (1 + 2 * ACCURACY)
     # played back, it arrives within 10 micrometres
     assert np.linalg.norm(optimum.playback["robot.tool.r"][-1] - [1.711, 3.46, -0.24]) < 1e-5
 

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, Real, SolveError
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_optimica import Free, Optimization, final, optimize
 from gantrytau_optimica.studies import continuation
 from gantrytau_optimica.studies.pareto import pareto
 from tests.optimica.problems import Mass
 
-FREE, _, _ = motion_problems()
 ENERGY = {"final_time": "final_time", "energy": "integral(square)"}
 
 
@@ -48,7 +47,7 @@ def gentle():
 
 @pytest.fixture(scope="module")
 def gantry():
-    return pareto(FREE, "weight", [0.1, 0.03, 0.01, 0.003, 0.001], along=ENERGY)
+    return pareto(FreePath, "weight", [0.1, 0.03, 0.01, 0.003, 0.001], along=ENERGY)
 
 
 def test_the_trade_off_of_a_mass_is_a_formula(gentle):
@@ -95,7 +94,7 @@ def test_time_and_energy_of_the_robot(gantry):
 
 
 def test_each_point_starts_from_the_one_before(gantry):
-    cold = [optimize(FREE(weight=w)).iterations for w in (0.03, 0.01)]
+    cold = [optimize(FreePath(weight=w)).iterations for w in (0.03, 0.01)]
     assert sum(point.iterations for point in gantry.points[1:3]) < sum(cold) / 2
 
 
