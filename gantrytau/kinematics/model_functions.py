@@ -15,7 +15,7 @@ from gantrytau.errors import ModelError
 from gantrytau.interruption import on_interrupt
 from gantrytau.kinematics.rods.lengths_by_newton import limited, solved
 from gantrytau.kinematics.rods.rod_robots import Home
-from gantrytau.kinematics.rotations import of_quaternion, quaternions, rotations, skewed
+from gantrytau.kinematics.rotations import of_quaternion, of_quaternions, quaternions, skewed
 
 BLOCK = 8  # poses of one call: they take longer than the call, and Ctrl-C is heard in a second where none is in reach
 MOST = 30  # iterations from `near`
@@ -70,7 +70,7 @@ class ModelFunctions:
         if len(self.joints) == 6:
             with np.errstate(invalid="ignore"):
                 scalar = np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
-            return rotations(np.column_stack([scalar, x[:, 3:]]))
+            return of_quaternions(np.column_stack([scalar, x[:, 3:]]))
         if self._turns:
             return _over_poses(self._following, [x])[0].reshape(-1, 3, 3).transpose(0, 2, 1)
         R = np.array(np.broadcast_to(np.eye(3), (len(x), 3, 3)))

@@ -1,8 +1,12 @@
-"""Rotations of many poses at once; the first axis is the pose."""
+"""Rotations of many poses at once, the first axis is the pose: matrices, unit quaternions, rotation vectors.
+
+The direction of a rotation vector is the axis, its length the angle in rad.
+"""
 
 import numpy as np
 
 SMALL = 1e-8  # rad, below which sin(x) / x is 1 to the last digit
+NEAR_HALF_A_TURN = 0.05  # rad
 
 
 def skewed(v: np.ndarray) -> np.ndarray:
@@ -39,10 +43,10 @@ def about(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def of_quaternion(q: np.ndarray) -> np.ndarray:
     """Rotation of a unit quaternion, scalar first, (3, 3)."""
-    return rotations(np.asarray(q)[None])[0]
+    return of_quaternions(np.asarray(q)[None])[0]
 
 
-def rotations(q: np.ndarray) -> np.ndarray:
+def of_quaternions(q: np.ndarray) -> np.ndarray:
     """Rotations of unit quaternions (N, 4), scalar first: (N, 3, 3)."""
     u = skewed(q[:, 1:])
     return np.eye(3) + 2 * q[:, 0, None, None] * u + 2 * (u @ u)
@@ -76,4 +80,74 @@ def best_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angle between vectors (..., 3) and (..., 3), rad, exact where it is small as well."""
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+    return np.arctan2(np.linalg.norm(cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+
+
+def of_vector(w: np.ndarray) -> np.ndarray:
+    """exp([w]x), (3, 3) (Rodrigues)."""
+    return of_vectors(np.asarray(w)[None])[0]
+
+
+def of_vectors(w: np.ndarray) -> np.ndarray:
+    """exp([w]x) of many, (N, 3) -> (N, 3, 3)."""
+    return turned(np.broadcast_to(np.eye(3), (len(w), 3, 3)), w)
+
+
+def left_jacobian(w: np.ndarray) -> np.ndarray:
+    """J of exp([w + dw]x) = exp([J dw]x) exp([w]x) to first order, (3, 3)."""
+    angle, K = float(np.linalg.norm(w)), skewed(w)
+    if angle < 1e-4:  # the quotient below loses digits
+        return np.eye(3) + K / 2 + K @ K / 6
+    return np.eye(3) + (1 - np.cos(angle)) / angle**2 * K + (angle - np.sin(angle)) / angle**3 * K @ K
+
+
+def rotation_vector(R: np.ndarray) -> np.ndarray:
+    """The rotation vector of rotation matrices, (..., 3, 3) -> (..., 3), angles from 0 to pi."""
+    axis = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(axis, axis=-1) / 2
+    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    found = axis / 2 * (angle / np.where(sine < 1e-12, 1.0, sine))[..., None]
+    half_turn = (sine < 1e-6) & (cosine < 0)
+    if np.any(half_turn):  # the axis is the column of R + I that is longest
+        columns = (R + np.eye(3))[half_turn]
+        best = np.argmax(np.linalg.norm(columns, axis=-2), axis=-1)
+        axes = np.take_along_axis(columns, best[:, None, None], axis=-1)[..., 0]
+        found[half_turn] = np.pi * axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    return found
+
+
+def told_vector(R: np.ndarray) -> np.ndarray:
+    """The rotation vector by which a rotation (3, 3) is reported: near half a turn that whose largest element is positive.
+
+    There noise would change its sign; so its angle may be a little above pi.
+    """
+    w = rotation_vector(R)
+    angle = float(np.linalg.norm(w))
+    near = angle > np.pi - NEAR_HALF_A_TURN
+    return w * (1 - 2 * np.pi / angle) if near and w[np.argmax(np.abs(w))] < 0 else w
+
+
+def turning(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The smallest rotation that turns the direction of a into that of b, (3, 3)."""
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -1 + 1e-12:  # opposite: half a turn about any axis across
+        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        return of_vector(np.pi * across / np.linalg.norm(across))
+    K = skewed(axis)
+    return np.eye(3) + K + K @ K / (1 + cosine)
+
+
+def mean_rotation(R: np.ndarray) -> np.ndarray:
+    """The rotation nearest to the mean of many, in squares, (N, 3, 3) -> (3, 3)."""
+    return best_rotation(R.mean(axis=0).T[None], np.eye(3)[None])[0]
+
+
+def motion(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rotation (3, 3) and shift (3,) that bring points a (N, 3) nearest to b, in squares."""
+    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
+    turn = best_rotation((b - centre_b)[None], (a - centre_a)[None])[0]
+    return turn, centre_b - turn @ centre_a

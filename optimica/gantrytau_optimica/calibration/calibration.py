@@ -10,9 +10,9 @@ import numpy as np
 
 from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.errors import did_you_mean
+from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
 from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
 from gantrytau_optimica.calibration.judging.plausibility import Misses

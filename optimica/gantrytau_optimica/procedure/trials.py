@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.data.rotation_vectors import motion
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet, Member

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.kinematics.rotations import rotations
+from gantrytau.kinematics.rotations import of_quaternions
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.calibration.data.findings import Finding
 
@@ -133,7 +133,7 @@ def _orientations(R: Any, count: int) -> np.ndarray:
     found = _numbers("R", R)
     if found.shape == (count, 4):
         with np.errstate(invalid="ignore", divide="ignore"):
-            return rotations(found / np.linalg.norm(found, axis=1, keepdims=True))
+            return of_quaternions(found / np.linalg.norm(found, axis=1, keepdims=True))
     if found.shape == (count, 3, 3):
         return found
     raise ModelError(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
-from gantrytau_optimica.calibration.data.rotation_vectors import rotation_vector
+from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.design.identifiability import Poses, finite_poses
 from gantrytau_optimica.calibration.fitting.arm_fit import checked_poses
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.rotation_vectors import left_jacobian, told_vector
+from gantrytau.kinematics.rotations import left_jacobian, told_vector
 from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
 from gantrytau_optimica.calibration.rods.closure import ALONG, PLATE
 

@@ -10,9 +10,9 @@ from itertools import permutations
 
 import numpy as np
 
+from gantrytau.kinematics.rotations import mean_rotation, motion
 from gantrytau_optimica.calibration.data.findings import CalibrationError, rows_in_words
 from gantrytau_optimica.calibration.data.mistakes import Mistake, mistakes
-from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, motion
 from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.error_models import Link, moved
 from gantrytau_optimica.calibration.rods.linear_start import linear_start

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from gantrytau import GantryTauError, Model
+from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.data.rotation_vectors import rotation_vector
 from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, miss, thinned, trimmed_motion
 from gantrytau_optimica.calibration.rods.arms import Arm, exponential, product
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.rotation_vectors import left_jacobian, rotation
+from gantrytau.kinematics.rotations import left_jacobian, of_vector
 
 BLOCK = 2000  # poses; their columns take 160 kB, or 500 kB where the plate turns
 ALL = slice(None)
@@ -87,7 +87,7 @@ class Chain:
 
     def frame(self, p: np.ndarray) -> np.ndarray:
         """Q, from axes of the measured guideway to those of the tool measurement, (3, 3)."""
-        return rotation(p[ALONG]) @ (np.eye(3) if self.turned is None else self.turned)
+        return of_vector(p[ALONG]) @ (np.eye(3) if self.turned is None else self.turned)
 
 
 @dataclass(frozen=True)

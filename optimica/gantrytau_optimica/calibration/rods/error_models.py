@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.kinematics.rotations import mean_rotation, of_vector, turning
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, rotation, turning
 from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.groups import Group
 from gantrytau_optimica.calibration.rods.guideway_points import between, straight
@@ -192,7 +192,7 @@ def on_rail(link: Link, rail: np.ndarray, turned: np.ndarray | None = None) -> l
         trials, free[4:7] = [turned], False
     else:
         first, axis = turning(along, link.start[4:7]), link.start[4:7] / np.linalg.norm(link.start[4:7])
-        trials = [rotation(angle * axis) @ first for angle in 2 * np.pi * np.arange(ROLLS) / ROLLS]
+        trials = [of_vector(angle * axis) @ first for angle in 2 * np.pi * np.arange(ROLLS) / ROLLS]
     found = []
     for Q in trials:
         chain = replace(link.chain, points=points, turned=Q)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rods.closed_form import cross_of_columns, dot_of_columns
-from gantrytau_optimica.calibration.data.rotation_vectors import rotations
+from gantrytau.kinematics.rotations import of_vectors
 from gantrytau_optimica.calibration.rods.guideway_points import between, slope
 
 ITERATIONS = 30
@@ -155,7 +155,7 @@ class CalibratedKinematics:
                 step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
             )  # half a metre or radian at once
             r -= step[:, :3]
-            R = rotations(-step[:, 3:]) @ R
+            R = of_vectors(-step[:, 3:]) @ R
             if not np.any(size > REACHED):
                 break
         lost = ~(size < 1e-8)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.data.rotation_vectors import told_vector
+from gantrytau.kinematics.rotations import told_vector
 from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
 from gantrytau_optimica.calibration.rods.closure import ALONG, OFFSET, PLATE
 from gantrytau_optimica.calibration.rods.forward import Guideway, RodLink

@@ -28,8 +28,8 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses, vectors
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
+from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import CalibrationError
-from gantrytau_optimica.calibration.data.rotation_vectors import mean_rotation, rotation_vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

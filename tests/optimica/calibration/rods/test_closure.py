@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau_optimica.calibration.data.rotation_vectors import (
-    rotation,
-    rotation_vector,
-    rotations,
-    told_vector,
-    turning,
-)
+from gantrytau.kinematics.rotations import of_vector, of_vectors
 from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.rods.closure import Chain, condense
 from gantrytau_optimica.calibration.rods.guideway_points import between, slope, straight
@@ -17,14 +11,14 @@ from gantrytau_optimica.calibration.rods.linear_start import linear_start
 
 RNG = np.random.default_rng(0)
 N = 5000  # three blocks of rows
-TURNS = rotations(RNG.normal(0, 0.5, (N, 3)))
+TURNS = of_vectors(RNG.normal(0, 0.5, (N, 3)))
 
 
 def chain(kind):
     q, r = RNG.uniform(0, 1, N), RNG.uniform(-1, 1, (N, 3)) + np.array([2.0, 0.0, 1.0])
     R = TURNS if "plate" in kind else None
     points = RNG.uniform(-1, 1, (N, 3)) if "points" in kind else None
-    return Chain(kind, q, r, R, points, rotation(np.array([0.3, -0.2, 0.9])) if "points" in kind else None)
+    return Chain(kind, q, r, R, points, of_vector(np.array([0.3, -0.2, 0.9])) if "points" in kind else None)
 
 
 KINDS = ["line", "line plate", "points", "points plate"]
@@ -109,26 +103,3 @@ def test_between_measured_points_the_way_is_straight():
     place, along = straight(rail)
     assert along == pytest.approx([2.0, 1.0, 0.0])
     assert place == pytest.approx([0.0, -1 / 12, 0.0])
-
-
-def test_rotation_vectors_go_back_and_forth():
-    w = np.array([[0.3, -0.2, 0.9], [1e-9, 0, 0], [0, np.pi, 0], [0, 0, 0], [2.0, 1.0, -2.0]])
-    R = rotations(w)
-    assert rotation_vector(R) == pytest.approx(w, abs=1e-8)
-    assert R[0] == pytest.approx(rotation(w[0]))
-    for w in (
-        [0.0, -np.pi + 1e-3, 2e-3],
-        [0.0, np.pi + 1e-3, 2e-3],
-        [1.0, -2.0, 0.5],
-        [0.0, 0.0, 0.0],
-        [-3.0, 0.1, 0.9],
-    ):
-        told = told_vector(rotation(np.array(w)))
-        assert rotation(told) == pytest.approx(rotation(np.array(w)), abs=1e-9)
-        assert (
-            np.linalg.norm(told) < np.pi - 0.05 or told[np.argmax(np.abs(told))] > 0
-        )  # either side of half a turn
-    for a, b in RNG.normal(size=(5, 2, 3)):
-        assert turning(a, b) @ a / np.linalg.norm(a) == pytest.approx(b / np.linalg.norm(b))
-    a = np.array([1.0, 2.0, 3.0])
-    assert turning(a, -a) @ a == pytest.approx(-a)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
+from gantrytau.kinematics.rotations import of_vector, told_vector
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
-from gantrytau_optimica.calibration.data.rotation_vectors import rotation, told_vector
 from gantrytau_optimica.calibration.fitting.covariance import as_told
 from tests.optimica.calibration import synthetic_d1
 
@@ -149,10 +149,12 @@ def test_frames_near_half_a_turn_have_one_sign():
     """Noise carries a frame beyond half a turn and back; its rotation vector does not jump."""
     q, r, R, rails = synthetic_d1.measure(0)
     first = calibrate(ROBOT, Measurements(q, r, R, rails=rails), model=2)
-    to_half = rotation(np.array([0.0, -np.pi, 0.0])).T @ rotation(first.parameters["arms[0].frame_rotation"])
+    to_half = of_vector(np.array([0.0, -np.pi, 0.0])).T @ of_vector(
+        first.parameters["arms[0].frame_rotation"]
+    )
     told = []
     for angle in (-1e-3, 0.0, 1e-3):
-        turn = rotation(np.array([0.0, angle, 0.0])) @ to_half
+        turn = of_vector(np.array([0.0, angle, 0.0])) @ to_half
         turned = [np.column_stack([rail[:, 0], rail[:, 1:] @ turn.T]) for rail in rails]
         found = calibrate(ROBOT, Measurements(q, r, R, rails=turned), model=2)
         told.append(found.parameters["arms[0].frame_rotation"])
