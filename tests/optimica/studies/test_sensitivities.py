@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, SolveError
-from gantrytau.commands.app import motion_problems
+from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize, prepare
 from gantrytau_optimica.studies.sensitivities import sensitivities
 from tests.optimica.problems import LinearQuadratic, Mass
 
-FREE, _, _ = motion_problems()
 PLATE, VISCOUS = "robot.plate_mass", "robot.carts[1].law.f_v"
 
 
@@ -50,7 +49,7 @@ class Ended(LinearQuadratic):
 @pytest.fixture(scope="module")
 def gantry():
     """The motion from A to B with a weight, and the problem that it is a solution of."""
-    prepared = prepare(FREE, parameters=["weight", PLATE, VISCOUS], elements=30, tolerance=1e-12)
+    prepared = prepare(FreePath, parameters=["weight", PLATE, VISCOUS], elements=30, tolerance=1e-12)
     return prepared, prepared.solve({"weight": 0.01})
 
 
@@ -149,7 +148,7 @@ def test_the_motion_of_the_robot_changes_as_when_solved_again(gantry, derivative
 
 
 def test_the_fastest_motion_of_the_robot():
-    prepared = prepare(FREE, parameters=[PLATE, VISCOUS], tolerance=1e-11)
+    prepared = prepare(FreePath, parameters=[PLATE, VISCOUS], tolerance=1e-11)
     optimum = prepared.solve()
     found = sensitivities(optimum)
     for name, value, step in ((PLATE, 9.13, 0.02), (VISCOUS, 355.25, 0.1)):
@@ -160,7 +159,7 @@ def test_the_fastest_motion_of_the_robot():
 
 
 def test_parameters_not_named_before_give_the_same_numbers(derivatives):
-    fresh = optimize(FREE(weight=0.01), elements=30, tolerance=1e-12)
+    fresh = optimize(FreePath(weight=0.01), elements=30, tolerance=1e-12)
     found = sensitivities(fresh, [PLATE, VISCOUS, "weight"])
     for name in found.parameters:
         assert found.objective[name] == pytest.approx(derivatives.objective[name], rel=1e-5)
