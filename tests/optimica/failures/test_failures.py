@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from gantrytau import SolveError, between
+from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import Free, final, initial, optimize
-from tests.optimica.known_answers.test_gantry import FREE, LINE, START
+from tests.optimica.known_answers.test_gantry import START
 from tests.optimica.problems import FastestMass
 
 CLOSE = 1e-4  # of the size of what gives way: the mesh resolves a switch of the force to its elements
@@ -158,7 +159,7 @@ def test_all_conditions_can_be_met_together():
 
 
 def test_a_robot_that_is_hurried_names_end_torque_and_time():
-    class Hurried(LINE):
+    class Hurried(OnLine):
         final_time = 0.9  # the motion takes 0.974 s
 
         def objective(self):
@@ -170,7 +171,7 @@ def test_a_robot_that_is_hurried_names_end_torque_and_time():
 
 
 def test_a_pose_out_of_reach_says_what_is_in_reach():
-    class Far(FREE):
+    class Far(FreePath):
         def constraints(self):
             yield initial(self.robot.tool.r) == START
             yield final(self.robot.tool.r) == (1.711, 4.9, -0.24)
@@ -178,13 +179,13 @@ def test_a_pose_out_of_reach_says_what_is_in_reach():
     text = str(failure(Far))
     y, z = (float(re.findall(rf"final\(robot\.tool\.r\[{k}\]\) = ([-0-9.]+\d)", text)[0]) for k in (1, 2))
 
-    class Beyond(FREE):
+    class Beyond(FreePath):
         def constraints(self):
             yield final(self.robot.tool.r) == (1.711, y + 0.01, z)
 
     assert "out of reach" in str(failure(Beyond))
 
-    class Near(FREE):
+    class Near(FreePath):
         def constraints(self):
             yield final(self.robot.tool.r) == (1.711, y - 0.01, z)
 
