@@ -15,7 +15,7 @@ from typing import Any
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.building.platforms import native
-from gantrytau_fmu.reading.findings import FmuFinding, errors_first
+from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.inconsistencies import inconsistencies
 from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
 from gantrytau_fmu.reading.safety import unpack

@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 
 from gantrytau_fmu.building.platforms import ALIASES, native
 from gantrytau_fmu.description import FmuVariable
-from gantrytau_fmu.reading.findings import FmuFinding
 from gantrytau_fmu.reading.fmu_file import FmuFile
+from gantrytau_fmu.reading.fmu_findings import FmuFinding
 from gantrytau_fmu.reading.libraries import misplaced
 from gantrytau_fmu.reading.read_fmu import FmuTexts
 

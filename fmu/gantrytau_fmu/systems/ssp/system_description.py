@@ -9,8 +9,8 @@ from typing import Any
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
-from gantrytau_fmu.reading.findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.fmu_file import SHOWN
+from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
