@@ -65,11 +65,11 @@ class Coordinates:
         return bool(self.sampled or self.held)
 
     def integrator(
-        self, count: int, tolerance: float, *, size: float = 1.0, compiled: bool = False
+        self, count: int, tolerance: float, *, size: float = 1.0, steps: int = 100_000, compiled: bool = False
     ) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
 
-        size: of algebraics, which need not be more exact than `tolerance` of it.
+        size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -91,7 +91,7 @@ class Coordinates:
         options: dict[str, Any] = {
             "abstol": tolerance,
             "reltol": tolerance,
-            "max_num_steps": 100_000,
+            "max_num_steps": steps,
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
         }

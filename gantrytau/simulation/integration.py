@@ -19,6 +19,8 @@ from gantrytau.simulation.singular_poses import Approach, approach, doubtful
 
 CHUNK = 10  # output intervals between two projections onto the constraints
 LEAST_STEPS = 500  # of the mesh on which singular poses are looked for, however few points are asked for
+MOST_STEPS = 100_000  # of the integrator between two ends
+WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
     "ERR_FAIL": "the steps became too small",
@@ -56,7 +58,7 @@ class Run:
         self.held[0] = [coordinates.dae.start[n] for n in coordinates.held]
         self.done = 0
         self.seen = -1  # the last interval of the mesh that was looked at closely
-        self.integrators: dict[int, ca.Function] = {}
+        self.integrators: dict[tuple[int, int], ca.Function] = {}
         self.size = 1.0  # of algebraics, below which their errors do not count
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -136,6 +138,7 @@ class Run:
         self.held[here + 1 : here + count + 1] = self.held[here]
         found = self._integrate(
             count,
+            MOST_STEPS,
             x0=self.x[here] if self.coordinates.states else 0.0,
             z0=self.z[here],
             p=[] if stepwise else [self.mesh[here], self.mesh[here + 1] - self.mesh[here]],
@@ -244,6 +247,7 @@ class Run:
         half = len(self.samples)
         found = self._integrate(
             1,
+            WALKED_STEPS,
             x0=x if self.coordinates.states else 0.0,
             z0=z,
             p=[] if self.coordinates.stepwise else [t, step],
@@ -267,9 +271,10 @@ class Run:
         self.integrators.clear()
         return self.size > before
 
-    def _integrate(self, count: int, **arguments: Any) -> dict[str, ca.DM]:
+    def _integrate(self, count: int, steps: int, **arguments: Any) -> dict[str, ca.DM]:
         """One call of an integrator, which else writes its complaints to the screen."""
-        if count not in self.integrators:
-            self.integrators[count] = self.coordinates.integrator(count, self.tolerance, size=self.size)
+        if (count, steps) not in self.integrators:
+            integrator = self.coordinates.integrator(count, self.tolerance, size=self.size, steps=steps)
+            self.integrators[count, steps] = integrator
         with contextlib.redirect_stderr(io.StringIO()):
-            return self.integrators[count](**arguments)
+            return self.integrators[count, steps](**arguments)

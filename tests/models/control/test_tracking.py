@@ -1,10 +1,12 @@
 """The controlled robot on a circle: what feedforward and control are worth."""
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Real, simulate
+from gantrytau import Real, simulate, translate
 from gantrytau_models import (
     CascadedController,
     CircularReference,
@@ -28,18 +30,22 @@ def circle(t):
 REFERENCE = {f"r_ref[{k}]": (lambda t, k=k: circle(t)[k]) for k in range(3)}
 
 
-def largest_error(stop=2.0, **modifications):
+@cache
+def controlled(control):
+    return translate(ControlledRobot(prototypes.GT_A, start=CENTRE, control=control), events=True)
+
+
+def largest_error(control, parameters):
     """Largest distance of the tool from its filtered reference, m."""
-    model = ControlledRobot(prototypes.GT_A, start=CENTRE, **modifications)
-    return np.linalg.norm(simulate(model, stop=stop, inputs=REFERENCE)["error"], axis=1).max()
+    motion = simulate(controlled(control), stop=0.8, inputs=REFERENCE, parameters=parameters)
+    return np.linalg.norm(motion["error"], axis=1).max()
 
 
 @pytest.mark.parametrize("control", [CascadedController, PidController])
 @pytest.mark.parametrize(("mass", "ratio", "bound"), [(9.13, 30.0, 0.4e-3), (HEAVIER, 8.0, 2.5e-3)])
 def test_feedforward_makes_tracking_several_times_better(control, mass, ratio, bound):
-    robot = dict(plate_mass=mass)
-    fed = largest_error(control=control, robot=robot)
-    alone = largest_error(control=control, robot=robot, controller=dict(feedforward_share=0.0))
+    fed = largest_error(control, {"robot.plate_mass": mass})
+    alone = largest_error(control, {"robot.plate_mass": mass, "controller.feedforward_share": 0.0})
     # the exact model leaves what a force that is held for 4 ms cannot follow, a plate that is
     # a third too heavy what its weight and inertia ask for in excess: some 30 N and 10 N beside 200 N of friction
     assert fed < bound
@@ -47,8 +53,8 @@ def test_feedforward_makes_tracking_several_times_better(control, mass, ratio, b
 
 
 def test_what_is_left_with_the_exact_model_shrinks_with_the_period():
-    controls = [CascadedController(prototypes.GT_A, start=CENTRE, period=period) for period in (0.004, 0.001)]
-    errors = [largest_error(stop=1.0, control=control) for control in controls]
+    periods = [{"controller.control.period": period} for period in (0.004, 0.001)]
+    errors = [largest_error(CascadedController, period) for period in periods]
     # a held force lags by half a period: first order, less where friction turns sharply
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
 

@@ -17,7 +17,7 @@ ROBOT = SixLinkGantryTau(prototypes.D1)
 
 @pytest.fixture(scope="module")
 def d1():
-    return [Measurements(*synthetic_d1.measure(seed)) for seed in range(10)]
+    return [Measurements(*synthetic_d1.measure(seed)) for seed in range(5)]
 
 
 def test_models_fall_in_the_order_of_table_5_3(d1):
