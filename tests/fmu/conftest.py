@@ -1,10 +1,11 @@
-"""Exported FMUs, each made once in a session."""
+"""Exported FMUs, each made once in a session, with libraries that may have been compiled before."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from gantrytau import translate
+from tests.fmu.binaries_kept import libraries, remove_old
 from tests.fmu.exported import MODELS, Exported, export
 
 
@@ -23,3 +24,12 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported
         return found[key]
 
     return get
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_libraries() -> Iterator[None]:
+    """The same sources are compiled once; tests of the compilation itself call it directly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gantrytau_fmu.export.compile_libraries", libraries)
+        yield
+    remove_old()

@@ -16,6 +16,7 @@ import pytest
 from gantrytau import GantryTauError, ModelError
 from gantrytau_fmu.building.compile_libraries import NoCompiler, _lasting_cache, compile_libraries, compiler
 from gantrytau_fmu.building.platforms import PLATFORMS, Platform, chosen, native
+from tests.fmu.binaries_kept import libraries
 from tests.fmu.building.binaries import exports, glibc_versions, imported_libraries, install_name
 
 SOURCES = {
@@ -227,7 +228,7 @@ def test_zig_keeps_its_libraries_where_it_may_write(monkeypatch, tmp_path):
 @pytest.fixture(scope="module")
 def everywhere() -> dict[str, bytes]:
     pytest.importorskip("ziglang", reason="the extra 'cross' is not installed")
-    found = compile_libraries(SOURCES, chosen("all"), identifier="small", optimisation="-O1")
+    found = libraries(SOURCES, chosen("all"), identifier="small", optimisation="-O1")
     return {platform.name: library for platform, library in found.items()}
 
 

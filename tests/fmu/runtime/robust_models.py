@@ -17,6 +17,7 @@ from gantrytau import Input, Model, Output, Parameter, Real, connect, der, sampl
 from gantrytau.mechanics.translational import Force, Mass, StickSlipFriction
 from gantrytau_fmu import export_fmu
 from gantrytau_models import FourBar, GantryTau, Pendulum, SixLinkGantryTau, prototypes
+from tests.fmu.binaries_kept import binary
 
 DRIVERS = Path(__file__).parent / "c"
 
@@ -136,10 +137,17 @@ def driver(model: str, name: str, *options: str) -> Path:
     """A program of tests/fmu/c compiled together with the sources of an FMU, as one unit."""
     program = _folder() / "-".join((model, name, *options)).replace("=", "-").replace(",", "-")
     sources = unpacked(model).sources
-    flags = ["-std=c99", "-D_POSIX_C_SOURCE=200809L", "-g", "-O0", *options, "-I", str(sources)]
-    command = [compiler(), *flags, str(DRIVERS / f"{name}.c"), "-o", str(program), "-lm", "-pthread"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    command = [compiler(), "-std=c99", "-D_POSIX_C_SOURCE=200809L", "-g", "-O0", *options]
+
+    def make() -> bytes:
+        files = ["-I", str(sources), str(DRIVERS / f"{name}.c"), "-o", str(program), "-lm", "-pthread"]
+        done = run([*command, *files])
+        assert done.returncode == 0, done.stderr
+        return program.read_bytes()
+
+    texts = {file.name: file.read_text() for folder in (sources, DRIVERS) for file in folder.glob("*.[ch]")}
+    program.write_bytes(binary(command, texts, make))
+    program.chmod(0o755)
     return program
 
 

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gantrytau import simulate
+from gantrytau import simulate, translate
 from gantrytau_models import DeltaRobot, StewartPlatform
 from tests.fmu.exported import export
 from tests.fmu.runtime.raw_calls import ERROR, OK, Instance, Kind, Library, reals
@@ -271,7 +271,11 @@ def fallen() -> float:
 @pytest.fixture(scope="module")
 def mechanisms(tmp_path_factory):
     @cache
+    def translated(model):
+        return translate(model(), events=True)
+
+    @cache
     def made(model, solver):
-        return export(model(), tmp_path_factory.mktemp("mechanisms") / "m.fmu", solver=solver)
+        return export(translated(model), tmp_path_factory.mktemp("mechanisms") / "m.fmu", solver=solver)
 
     return made

@@ -17,6 +17,8 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
+from tests.fmu.binaries_kept import binary
+
 CODE = Path(__file__).with_name("small_fmu.c")
 
 
@@ -53,14 +55,19 @@ class Builder:
     def _library(self, name, variables, derive, advance):
         starts = ", ".join(str(line[2] or 0.0) for line in variables)
         defined = {"N": len(variables), "STARTS": starts, "DERIVE": derive, "ADVANCE": advance}
-        source, library = self.folder / f"{name}.c", self.folder / f"{name}{fmpy.sharedLibraryExtension}"
         lines = [f"#define {word} {' '.join(str(code).split())}" for word, code in defined.items()]
-        source.write_text(
-            "\n".join([*lines, f'#include "{CODE.as_posix()}"', *_stubs(CODE.read_text())]) + "\n"
-        )
-        command = [self.compiler, "-shared", "-fPIC", "-w", "-O0", str(source), "-o", str(library), "-lm"]
-        subprocess.run(command, check=True, capture_output=True)
-        return library.read_bytes()
+        text = "\n".join([*lines, f'#include "{CODE.as_posix()}"', *_stubs(CODE.read_text())]) + "\n"
+        command = [self.compiler, "-shared", "-fPIC", "-w", "-O0"]
+
+        def make():
+            source, library = self.folder / f"{name}.c", self.folder / f"{name}{fmpy.sharedLibraryExtension}"
+            source.write_text(text)
+            subprocess.run(
+                [*command, str(source), "-o", str(library), "-lm"], check=True, capture_output=True
+            )
+            return library.read_bytes()
+
+        return binary(command, {"model": text, "common": CODE.read_text()}, make)
 
 
 def _stubs(text):
