@@ -1,22 +1,29 @@
 """FMUs of gantrytau models, written and read, and systems of FMUs simulated together."""
 
+from gantrytau_fmu.building.archive import check_target
 from gantrytau_fmu.description import Experiment
-from gantrytau_fmu.export import export_fmu
+from gantrytau_fmu.export import SOLVERS, export_fmu
 from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.read_fmu import read_fmu
+from gantrytau_fmu.reading.safety import no_file
 from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
+from gantrytau_fmu.systems.master import ORDERS
 from gantrytau_fmu.systems.run_fmu import run_fmu
 from gantrytau_fmu.systems.ssp.system_description import check_system, read_system
 from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 
 __all__ = [
+    "ORDERS",
+    "SOLVERS",
     "Experiment",
     "UnconnectedInputs",
     "check_fmu",
     "check_system",
+    "check_target",
     "cosimulate",
     "export_fmu",
+    "no_file",
     "read_fmu",
     "read_system",
     "run_fmu",

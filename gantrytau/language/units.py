@@ -1,9 +1,11 @@
 """Units as Modelica writes them ("kg.m2", "m/s2", "N.m.s/rad"), reduced to SI dimensions.
 
 Modelica Language Specification 3.6, chapter 19. The radian is of dimension one, as in the SI. Only
-coherent units are known: a millimetre inside a model would be a factor of a thousand nobody applies.
+coherent units are known to models: a millimetre inside a model would be a factor of a thousand nobody
+applies. Files, which people write, may bring another unit with a number: `FACTORS` bring it to SI.
 """
 
+import math
 import re
 from fractions import Fraction
 from functools import cache
@@ -44,6 +46,12 @@ SYMBOLS: dict[str, Dimension] = {
     "Wb": _dimension(m=2, kg=1, s=-2, A=-1),
     "T": _dimension(kg=1, s=-2, A=-1),
     "S": _dimension(m=-2, kg=-1, s=3, A=2),
+}
+FACTORS = {  # unit of a quantity -> texts that a file may write behind its number -> factor
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180},
+    "s": {"s": 1.0, "ms": 1e-3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
 }
 FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1)(?P<power>[+-]?\d+)?$")
 

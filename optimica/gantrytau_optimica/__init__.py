@@ -6,7 +6,8 @@ from gantrytau_optimica.answers.archive.saved_optimum import MissingGuess, Saved
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.calibration.data.file_lines import in_lines
+from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
@@ -16,10 +17,18 @@ from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
+from gantrytau_optimica.calibration.report.parameter_rows import (
+    ParameterRow,
+    calibrated_geometry,
+    parameter_rows,
+)
+from gantrytau_optimica.calibration.report.report import About, frame_motion, report_numbers, write_report
 from gantrytau_optimica.calibration.rods.arms import read_arms
 from gantrytau_optimica.calibration.surveys.error_maps import error_map
 from gantrytau_optimica.calibration.surveys.guideways import linearity
 from gantrytau_optimica.calibration.surveys.orientation_errors import orientation_causes, orientation_errors
+from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
+from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, cross_validate, held_out
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -38,30 +47,47 @@ from gantrytau_optimica.problem.optimization import (
 )
 from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, load_plan
+from gantrytau_optimica.procedure.cells.cell_example import cell_example
+from gantrytau_optimica.procedure.cells.cell_file import Cell, read_cell
+from gantrytau_optimica.procedure.cells.planned_cell import (
+    PlannedCell,
+    is_planned,
+    load_planned_cell,
+    plan_cell,
+)
+from gantrytau_optimica.procedure.measured_plan import MeasuredPlan, measured_plan
 from gantrytau_optimica.procedure.plan_calibration import plan_calibration
 from gantrytau_optimica.studies.pareto import pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 from gantrytau_optimica.studies.trade_off import TradeOff
 
 __all__ = [
+    "About",
     "Bars",
     "Calibration",
     "CalibrationError",
     "CalibrationPlan",
+    "CalibrationVerdict",
     "Camera",
     "Cameras",
+    "Cell",
     "Corner",
+    "CrossValidation",
     "Deviation",
     "Estimate",
     "Experiment",
+    "Finding",
     "Free",
     "LaserTracker",
     "LengthGauge",
+    "MeasuredPlan",
     "Measurements",
     "MissingGuess",
     "Optimization",
     "Optimum",
+    "ParameterRow",
     "Path",
+    "PlannedCell",
     "Prepared",
     "Samples",
     "SavedOptimum",
@@ -73,27 +99,41 @@ __all__ = [
     "Wires",
     "at",
     "calibrate",
+    "calibrated_geometry",
+    "cell_example",
     "compare_records",
+    "cross_validate",
     "enough_poses",
     "error_map",
     "estimate",
     "final",
     "fit_arm",
+    "frame_motion",
+    "held_out",
     "identifiability",
+    "in_lines",
     "initial",
     "integral_of_squares",
+    "is_planned",
+    "judge",
     "linearity",
     "link",
     "load_optimum",
     "load_plan",
+    "load_planned_cell",
+    "measured_plan",
     "optimize",
     "orientation_causes",
     "orientation_errors",
+    "parameter_rows",
     "pareto",
     "plan_calibration",
+    "plan_cell",
     "predict",
     "prepare",
     "read_arms",
+    "read_cell",
+    "report_numbers",
     "run_record",
     "save_optimum",
     "select_poses",
@@ -102,5 +142,7 @@ __all__ = [
     "single_camera",
     "stereo_cameras",
     "sum_of_squares",
+    "told_by_tool",
     "write_record",
+    "write_report",
 ]

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from gantrytau.commands.fmu.fmu_export import PLATFORMS
 from gantrytau.errors import ModelError
 from gantrytau_fmu import Experiment
-from gantrytau_fmu.building.platforms import PLATFORMS as KNOWN
-from gantrytau_fmu.building.platforms import native
+from gantrytau_fmu.building.platforms import PLATFORMS, native
 from tests.fmu.tiny_fmus import FMI2, lag2, pack, running3
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
@@ -140,9 +138,8 @@ def test_a_short_experiment_has_a_short_step(run, asked, cart, tmp_path):
 
 
 def test_the_help_lists_the_platforms(run):
-    assert set(PLATFORMS) == set(KNOWN)
     words = run("fmu", "export", "--help").stdout
-    for name in KNOWN:
+    for name in PLATFORMS:
         assert name in "".join(words.split()).replace("│", "")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from gantrytau_fmu.systems.connected_system import (
 )
 from gantrytau_fmu.systems.initialize import initialize
 from gantrytau_fmu.systems.isolation import Isolated
-from gantrytau_fmu.systems.master import Grid, Master, Order, RunningComponent, make_grid, paces_of
+from gantrytau_fmu.systems.master import ORDERS, Grid, Master, Order, RunningComponent, make_grid, paces_of
 from gantrytau_fmu.systems.recorder import Recorder
 from gantrytau_fmu.systems.slave import Slave
 from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
@@ -329,10 +329,10 @@ def check_times(begin: Any, stop: Any, step: Any) -> None:
 
 
 def _check(order: Any, tolerance: Any, agreement: Any, iterations: Any) -> None:
-    if order not in get_args(Order):
+    if order not in ORDERS:
         raise ModelError(
-            f"cosimulate: found order={order!r}, expected one of {', '.join(get_args(Order))}"
-            f"{did_you_mean(str(order), get_args(Order))}",
+            f"cosimulate: found order={order!r}, expected one of {', '.join(ORDERS)}"
+            f"{did_you_mean(str(order), ORDERS)}",
             argument="order",
         )
     for name, value in (("tolerance", tolerance), ("agreement", agreement)):

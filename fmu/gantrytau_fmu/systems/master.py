@@ -11,7 +11,7 @@ answer until it ends), the others when the faster ones have come to its end.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from gantrytau_fmu.systems.connected_system import ConnectedSystem, Drive
 from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
+ORDERS: tuple[str, ...] = get_args(Order)
 SMALL = 1e-6  # magnitude below which agreement is absolute: noise around zero never agrees relatively
 
 

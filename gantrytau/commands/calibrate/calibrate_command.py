@@ -9,16 +9,12 @@ import typer
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
-from gantrytau.commands.calibrate import calibration_files as results
-from gantrytau.commands.calibrate import outcome as finishing
-from gantrytau.commands.calibrate import plan_command as planning
+from gantrytau.commands.calibrate import calibration_files
 from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
-from gantrytau.commands.calibrate.cell_example import EXAMPLES
-from gantrytau.commands.calibrate.cell_example import example as cell_of
-from gantrytau.commands.calibrate.measured_plan import Planned
-from gantrytau.commands.calibrate.measurement_file import Measured
-from gantrytau.commands.calibrate.outcome import Choice
-from gantrytau.commands.printing.reporting import CommandError, reporting
+from gantrytau.commands.calibrate.measurement_file import MeasurementFile
+from gantrytau.commands.calibrate.outcome import NominalRobot, finish
+from gantrytau.commands.calibrate.plan_command import EXAMPLES, model_of_cell, plan
+from gantrytau.commands.printing.reporting import CommandError, refusing, reporting
 
 Source = Annotated[
     Path | None,
@@ -124,7 +120,9 @@ def calibrate(
     """
     with reporting(json, source_of(robot) if robot else None, SPELLING):
         if example:
-            typer.echo(cell_of(None if file is None else str(file), robot), nl=False)
+            from gantrytau_optimica import cell_example
+
+            typer.echo(cell_example(None if file is None else str(file), robot), nl=False)
             return
         if file is None:
             raise CommandError(
@@ -134,16 +132,16 @@ def calibrate(
         if file.suffix.lower() == ".toml":
             others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior)
             _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
-            planning.plan(file, output, json)
+            plan(file, output, json)
             return
         if not file.is_file():
             raise CommandError(f"{file}: there is no such file{_kinds(file)}")
         how = policy(model, method, start, orientation, holdout or "second", prior, constraint or (), robust)
-        folder = output or results.folder_beside(file)
-        results.rehearse(folder)
-        choice = _robot(file, robot, prototype, set_ or ())
-        measured = Measured.read(file, rail_files(rails))
-        finishing.finish(choice, measured, how, folder, validate=holdout is None, json=json)
+        folder = output or calibration_files.folder_beside(file)
+        calibration_files.rehearse(folder)
+        nominal = _robot(file, robot, prototype, set_ or ())
+        measured = MeasurementFile.read(file, rail_files(rails))
+        finish(nominal, measured, how, folder, validate=holdout is None, json=json)
 
 
 def _kinds(file: Path) -> str:
@@ -152,24 +150,27 @@ def _kinds(file: Path) -> str:
     return f"; for a cell to begin with give --example {file}" if known else "; check its path"
 
 
-def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> Choice:
+def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> NominalRobot:
     """The robot that is named, or that of the plan beside the measurements."""
+    from gantrytau_optimica import is_planned, load_planned_cell
+
     if robot is not None:
         chosen = build(robot, prototype, settings)
         name = f"{chosen.name}({chosen.prototype})" if chosen.prototype else robot
-        return Choice(chosen.model, name, None)
-    planned = Planned.beside(file)
-    if planned is None:
+        return NominalRobot(chosen.model, name, None)
+    if not is_planned(file.absolute().parent):
         raise CommandError(
             f"{file}: found no plan beside it that says of which robot it is; name the robot with its nominal values, as "
             f"gantrytau calibrate {file} --robot 'GantryTau(L1)'"
         )
+    with refusing():
+        planned = load_planned_cell(file.absolute().parent, model_of_cell)
     if settings or prototype:
         raise CommandError(
             f"{file}: the plan beside it says what the robot is ({planned.cell.name}); leave --set and --prototype out, "
             "or give --robot"
         )
-    return Choice(planned.cell.robot, planned.cell.name, planned)
+    return NominalRobot(planned.cell.robot, planned.cell.name, planned)
 
 
 def _refuse_others(file: Path, options: dict[str, object]) -> None:

@@ -2,17 +2,19 @@
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from gantrytau import ModelError, parameter_text
+from gantrytau import parameter_text
 from gantrytau.commands.printing.reporting import CommandError
+
+if TYPE_CHECKING:
+    from gantrytau_optimica import About, Calibration
 
 PARAMETERS = "calibrated.toml"
 REPORT = "report.html"
-GEOMETRY = ("length", "offset", "direction", "plate_offset", "orientation", "start", "r")
 
 
 def folder_beside(file: Path) -> Path:
@@ -49,15 +51,15 @@ def whole(folder: Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> list[str]:
+def write(found: "Calibration", folder: Path, robot: str, source: Path, about: "About") -> list[str]:
     """Report and parameters; the files written. robot: as the command line names it; source: the measurements; about: what
     the report says besides.
     """
-    from gantrytau_optimica.calibration.report.report import write_report
+    from gantrytau_optimica import calibrated_geometry, write_report
 
     with whole(folder) as partial:
         write_report(found, partial / REPORT, about)
-        robot_values = modifications(found)
+        robot_values = calibrated_geometry(found)
         if robot_values is not None:
             heading = _heading(found, robot, source, folder / PARAMETERS, about.verdict)
             (partial / PARAMETERS).write_text(parameter_text(robot_values, robot, heading), encoding="utf-8")
@@ -67,7 +69,7 @@ def write(found: Any, folder: Path, robot: str, source: Path, about: Any) -> lis
     return [str(folder / name) for name in names]
 
 
-def _heading(found: Any, robot: str, source: Path, file: Path, verdict: str) -> str:
+def _heading(found: "Calibration", robot: str, source: Path, file: Path, verdict: str) -> str:
     said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses"
     return (
         f"Calibrated with {source.name}: lengths and offsets in m.\n"
@@ -75,30 +77,3 @@ def _heading(found: Any, robot: str, source: Path, file: Path, verdict: str) -> 
         f"On the command line: gantrytau simulate '{robot}' --set {file.name}\n"
         f'In Python: robot.modified(tomllib.loads(Path("{file.name}").read_text()))'
     )
-
-
-def modifications(found: Any) -> dict[str, Any] | None:
-    """The calibrated geometry as modifications of the robot; None of models that no robot can hold."""
-    try:
-        robot = found.robot
-    except ModelError:
-        return None
-    return _geometry({k: v for k, v in robot.modifications.items() if k in ("arms", "turntables", "tool")})
-
-
-def _geometry(part: Any) -> Any:
-    """What of nested modifications is geometry."""
-    if isinstance(part, Mapping):
-        kept = {
-            key: value if key in GEOMETRY and not isinstance(value, Mapping) else _geometry(value)
-            for key, value in part.items()
-            if key in GEOMETRY or key in ("arms", "links", "turntables", "tool")
-        }
-        return {key: value for key, value in kept.items() if not _empty(value)}
-    if isinstance(part, (list, tuple)) and any(isinstance(one, Mapping) for one in part):
-        return [_geometry(one) for one in part]
-    return part
-
-
-def _empty(value: Any) -> bool:
-    return isinstance(value, Mapping) and not value

@@ -12,7 +12,8 @@ from gantrytau.commands.printing.spelling import Spelling
 SPELLING = Spelling(
     ("calibrate", "Measurements"),
     {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior")}
-    | {"constraints": "--constraint", "rails": "--rails", "loss": "--robust"},
+    | {"constraints": "--constraint", "rails": "--rails", "robot": "--robot", "loss": "--robust"}
+    | {"kind": "--example"},
     flags=("loss",),
     exactly={
         "model=None": "no --model",

@@ -1,57 +1,86 @@
 """A file of measurements, and the robot calibrated with it."""
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from gantrytau import Model
 from gantrytau.commands.calibrate.calibration_options import SPELLING
-from gantrytau.commands.calibrate.file_lines import in_lines, read
-from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail
+from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail, refusing
+
+if TYPE_CHECKING:
+    from gantrytau_optimica import CalibrationError, CrossValidation, Finding, Measurements
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
 
 
-@dataclass(frozen=True)
-class Measured:
-    """A file of measurements: its lines (N,), and what stands in them."""
+@dataclass(frozen=True, eq=False)
+class MeasurementFile:
+    """A file of measurements, and what of it is to be fitted."""
 
-    file: Path
-    data: Any
-    lines: np.ndarray
+    path: Path
+    data: "Measurements"
 
     @staticmethod
-    def read(file: Path, rails: Sequence[Path] = ()) -> "Measured":
+    def read(path: Path, rails: Sequence[Path] = ()) -> "MeasurementFile":
         """CommandError for files that cannot be read."""
-        data = read(file, rails)
+        from gantrytau_optimica import Measurements
+
+        try:
+            with refusing():
+                data = Measurements.read(path, rails=list(rails) or None)
+        except UnicodeDecodeError as error:
+            raise CommandError(
+                f"{path}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
+            ) from error
+        except csv.Error as error:
+            raise CommandError(f"{path}: cannot be read as CSV ({error})") from error
         if len(data) and not data.finite.any():
             raise CommandError(
-                f"{file}: found no line with numbers in all columns, expected the poses that were measured; fill in x, y "
+                f"{path}: found no line with numbers in all columns, expected the poses that were measured; fill in x, y "
                 "and z"
             )
-        return Measured(file, data, data.lines)
+        return MeasurementFile(path, data)
 
-    def words(self, message: str, said: Sequence[Any]) -> str:
+    @property
+    def lines(self) -> np.ndarray:
+        """The line of each row, (N,)."""
+        return np.arange(len(self.data)) if self.data.lines is None else self.data.lines
+
+    def words(self, message: str, said: "Sequence[Finding | CalibrationError]") -> str:
         """A message with lines in place of rows, and options in place of arguments."""
+        from gantrytau_optimica import in_lines
+
         rows = [one.rows for one in said if one.kind != OF_GUIDEWAYS]
         return SPELLING.words(in_lines(message, rows, self.lines) if rows else message)
 
 
-def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: bool) -> Any:
-    """The calibration, whose findings name lines; leaves with a message for data that determine nothing."""
-    from gantrytau_optimica import CalibrationError, calibrate
+def calibrated(
+    robot: Model, measured: MeasurementFile, policy: dict[str, Any], *, cross: bool, json: bool
+) -> "CrossValidation":
+    """The calibration, whose findings name lines; leaves with a message for data that determine nothing.
+
+    cross: fit all poses, and judge by fits without each fifth of them in turn.
+    """
+    from gantrytau_optimica import CalibrationError, calibrate, cross_validate, held_out
 
     try:
         with busy(f"calibrating {type(robot).__name__}"):
-            found = calibrate(robot, measured.data, **policy)
+            if cross:
+                others = {name: value for name, value in policy.items() if name != "holdout"}
+                checked = cross_validate(robot, measured.data, **others)
+            else:
+                checked = held_out(calibrate(robot, measured.data, **policy))
     except CalibrationError as error:
         _refuse(error, measured, json)
+    found = checked.calibration
     if not found.success:
         fail(
-            f"{measured.file}: the search for parameters did not settle within {found.iterations} steps; look at the "
+            f"{measured.path}: the search for parameters did not settle within {found.iterations} steps; look at the "
             "measurements, measure more poses, or try --robust or --start linear\nNothing was written",
             FAULT,
             json,
@@ -59,16 +88,18 @@ def calibrated(robot: Model, measured: Measured, policy: dict[str, Any], json: b
         )
     told = tuple(replace(f, message=measured.words(f.message, [f])) for f in found.findings)
     if policy["loss"] == "linear":
-        _refuse_outliers(found.error, told, measured, json)
-    return found.with_findings(told)
+        _refuse_outliers(float(found.error), told, measured, json)
+    return replace(checked, calibration=found.with_findings(told))
 
 
-def _refuse_outliers(error: float, findings: Sequence[Any], measured: Measured, json: bool) -> None:
+def _refuse_outliers(
+    error: float, findings: "Sequence[Finding]", measured: MeasurementFile, json: bool
+) -> None:
     """Leave with a message if gross errors pull at the parameters."""
     for finding in findings:
         if finding.kind == "outliers":
             fail(
-                f"{measured.file}: {finding.message}; with them poses are missed by {error * 1e6:.4g} um in the mean\n"
+                f"{measured.path}: {finding.message}; with them poses are missed by {error * 1e6:.4g} um in the mean\n"
                 "Nothing was written",
                 FAULT,
                 json,
@@ -78,13 +109,13 @@ def _refuse_outliers(error: float, findings: Sequence[Any], measured: Measured, 
             )
 
 
-def _refuse(error: Any, measured: Measured, json: bool) -> NoReturn:
+def _refuse(error: "CalibrationError", measured: MeasurementFile, json: bool) -> NoReturn:
     message = measured.words(str(error), [error, *error.findings]).replace("Measurements: ", "", 1)
     others = [f for f in error.findings if f.kind != error.kind]
     more = "".join(f"\n  {f.kind}: {measured.words(f.message, [f])}" for f in others)
     rows = [] if error.kind == OF_GUIDEWAYS else measured.lines[error.rows].tolist()
     fail(
-        f"{measured.file}: {message}{more}\nNothing was written",
+        f"{measured.path}: {message}{more}\nNothing was written",
         FAULT,
         json,
         kind=type(error).__name__,

@@ -1,117 +1,114 @@
 """The end of a calibration: parameters found, compared with what was wanted, written and told."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from gantrytau import Model
-from gantrytau.commands.calibrate import calibration_files as results
-from gantrytau.commands.calibrate import calibration_summary as wording
-from gantrytau.commands.calibrate import calibration_verdict as verdict
-from gantrytau.commands.calibrate import cross_validation as validation
-from gantrytau.commands.calibrate.cross_validation import Validation
-from gantrytau.commands.calibrate.measured_plan import Planned
-from gantrytau.commands.calibrate.measurement_file import Measured, calibrated
-from gantrytau.commands.printing.reporting import FAULT, as_json, note
+from gantrytau import Model, ModelError
+from gantrytau.commands.calibrate import calibration_files, calibration_summary
+from gantrytau.commands.calibrate.calibration_options import SPELLING
+from gantrytau.commands.calibrate.measurement_file import MeasurementFile, calibrated
+from gantrytau.commands.printing.reporting import FAULT, as_json, note, writable
+
+if TYPE_CHECKING:
+    from gantrytau_optimica import MeasuredPlan, PlannedCell
+
+FEW = 60  # poses, fewer than which are all fitted, and left out in turn
+LAID_OVER = (
+    "frame: positions are in another frame than the plan; they were laid over the poses that it expects"
+)
 
 
-@dataclass(frozen=True)
-class Choice:
+@dataclass(frozen=True, eq=False)
+class NominalRobot:
     """The robot with its nominal values, its name on the command line, and the plan by which it is measured, or None."""
 
-    robot: Model
+    model: Model
     name: str
-    planned: Planned | None
+    planned: "PlannedCell | None"
 
 
 def finish(
-    choice: Choice, measured: Measured, policy: dict[str, Any], folder: Path, *, validate: bool, json: bool
+    robot: NominalRobot,
+    measured: MeasurementFile,
+    policy: dict[str, Any],
+    folder: Path,
+    *,
+    validate: bool,
+    json: bool,
 ) -> None:
     """Calibrate, write and print; leaves with exit code 1 where the error is larger than wanted.
 
     validate: fit all of few poses, as a plan asks for, and judge by fits without each fifth of them in turn.
     """
-    planned, motion, notes = choice.planned, None, []
-    if planned is not None:
-        measured = planned.seen(measured)
-        original = measured
-        measured, motion = planned.placed(measured)
-        if motion is not None:
-            notes.append(wording.LAID_OVER)
-        policy, words = planned.with_prior(policy)
-        notes += words
-        rest = _rest(planned, measured, json)
-    else:
-        original, rest = measured, None
-    cross = validate and (planned is not None or len(measured.data) < validation.FEW)
+    from gantrytau_optimica import told_by_tool
+
+    plan, notes = _laid_over(robot.planned, measured), []
+    if plan is not None:
+        measured = replace(measured, data=plan.measurements)
+        policy, notes = _as_planned(plan, policy)
+        if plan.missing and not json:
+            note(_missing(plan.missing, str(plan.rest_program)))  # also when the others do not suffice
+    cross = validate and (plan is not None or len(measured.data) < FEW)
     try:
-        found, checked = _found(choice, measured, policy, cross, json)
+        checked = calibrated(robot.model, measured, policy, cross=cross, json=json)
     except typer.Exit:
-        if rest is not None and original.data.finite.any():
-            rest.write_first()
+        if plan is not None and measured.data.finite.any():
+            _write_rest(plan, first=True)
         raise
-    expected = None if planned is None else planned.tool_error(measured, found, policy["orientation"])
-    found = verdict.with_expectation(found, planned, expected)
-    judged = {} if planned is None else verdict.verdict(found, checked, expected, planned)
-    if rest is not None:
-        rest.write()
-    about = wording.about(found, measured, choice, judged, notes, checked, motion)
-    written = results.write(found, folder, choice.name, measured.file, about)
-    if json:
-        numbers = wording.summary(found, measured, about, written)
-        typer.echo(as_json({**numbers, **(rest.record if rest else {}), **judged, "notes": notes}))
+    if plan is None:
+        found, verdict = told_by_tool(checked.calibration), None
     else:
-        wording.show(found, measured, about, written, judged)
-    if judged and not judged["good"]:
+        found, verdict = plan.judged(checked, policy["orientation"])
+        _write_rest(plan)
+    about = calibration_summary.about(
+        found, measured, robot.name, plan, verdict, notes, checked if cross else None
+    )
+    written = calibration_files.write(found, folder, robot.name, measured.path, about)
+    if json:
+        record = calibration_summary.summary(found, measured, about, written)
+        if plan is not None and verdict is not None:
+            missing = {"missing": plan.missing, "program": str(plan.rest_program)} if plan.missing else {}
+            record |= missing | calibration_summary.judgement(verdict)
+        typer.echo(as_json({**record, "notes": notes}))
+    else:
+        calibration_summary.show(found, measured, about, written)
+    if verdict is not None and not verdict.good:
         raise typer.Exit(FAULT)
 
 
-@dataclass
-class Rest:
-    """The poses of a plan that are missing; their program is written when what was measured turns out to be good data."""
+def _laid_over(planned: "PlannedCell | None", measured: MeasurementFile) -> "MeasuredPlan | None":
+    """The measurements as those of the plan; its complaints with the file."""
+    from gantrytau_optimica import measured_plan
 
-    planned: Planned
-    measured: Measured
-    missing: list[int]
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """For programs."""
-        return {"missing": self.missing, "program": str(self.planned.rest_program)}
-
-    def write(self) -> None:
-        """Write plan and program of what is missing."""
-        self.planned.write_rest(self.measured)
-
-    def write_first(self) -> None:
-        """The same if there is none yet: what was measured could not be used."""
-        if self.planned.rest_program.exists():
-            note(f"{self.planned.rest_program} is still that of an earlier run")
-        else:
-            self.write()
-
-
-def _rest(planned: Planned, measured: Measured, json: bool) -> Rest | None:
-    missing = planned.missing(measured)
-    if not missing:
+    if planned is None:
         return None
-    rest = Rest(planned, measured, missing)
-    if not json:
-        note(_missing(missing, str(planned.rest_program)))  # also when the others do not suffice
-    return rest
+    try:
+        return measured_plan(planned, measured.data)
+    except ModelError as error:
+        raise ModelError(f"{measured.path}: {SPELLING.words(str(error))}. Nothing was written") from error
 
 
-def _found(
-    choice: Choice, measured: Measured, policy: dict[str, Any], cross: bool, json: bool
-) -> tuple[Any, Validation | None]:
-    """The calibration, and how well it foretells poses that were not fitted, if there are enough of them."""
-    if not cross:
-        found = calibrated(choice.robot, measured, policy, json)
-        return found, validation.held_out(found, len(measured.data))
-    found = calibrated(choice.robot, measured, dict(policy, holdout=None), json)
-    return found, validation.left_out_in_turn(found, choice.robot, measured, policy)
+def _as_planned(plan: "MeasuredPlan", policy: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Keywords of `calibrate` with the prior of the plan's own simulations, unless another was given; words on it."""
+    notes = [] if plan.motion is None else [LAID_OVER]
+    if policy["prior"] is not None or not plan.prior or policy["model"] is not None:
+        return policy, notes
+    told = ", ".join(f"{name}={value:g}" for name, value in plan.prior.items())
+    return dict(policy, prior=plan.prior), [*notes, f"prior: {told}, as the plan expects"]
+
+
+def _write_rest(plan: "MeasuredPlan", *, first: bool = False) -> None:
+    """Write the program of what is missing; first: only if there is none yet, as what was measured could not be used."""
+    if not plan.missing:
+        return
+    if first and plan.rest_program.exists():
+        note(f"{plan.rest_program} is still that of an earlier run")
+        return
+    with writable(plan.rest_program.parent / plan.rest_program.name):
+        plan.write_rest()
 
 
 def _missing(numbers: list[int], program: str) -> str:

@@ -1,35 +1,24 @@
 """`gantrytau calibrate cell.toml`: the guided procedure, as a folder with poses, a robot program and a verdict."""
 
-import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import typer
 
-from gantrytau import ModelError
-from gantrytau.commands.calibrate import cell_file as cells
+from gantrytau import Model, ModelError
+from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.calibrate.calibration_files import rehearse
-from gantrytau.commands.calibrate.cell_file import Cell
-from gantrytau.commands.printing.reporting import (
-    FAULT,
-    INTERRUPTED,
-    CommandError,
-    as_json,
-    fail,
-    note,
-    write_text,
-)
+from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, fail, note, refusing
 from gantrytau.commands.printing.spelling import Spelling
 
-CELL = "plan.toml"  # in the folder of a plan: the cell that it was made for
-PROGRAM = "Calibration"
-MEASUREMENTS, TEMPLATE = "measurements.csv", "measurements-template.csv"
-SAME = 1e-6  # m and rad, by which poses of the same plan may differ
+if TYPE_CHECKING:
+    from gantrytau_optimica import CalibrationPlan, PlannedCell
+
+EXAMPLES = ("l1", "six", "f1")  # kinds of cells to begin with
 STAGES = {
     "workspace": "workspace of the robot",
     "candidates": "safe and visible places",
@@ -38,8 +27,6 @@ STAGES = {
     "trials": "simulated calibrations",
     "verdict": "verdict",
 }
-
-
 SPELLING = Spelling(
     ("plan_calibration", "Limits"),
     {
@@ -50,11 +37,13 @@ SPELLING = Spelling(
         "device": "device",
     }
     | {"strokes": "limits.strokes", "facing": "device.facing"}
-    | {name: f"plan.{name}" for name in cells.PLAN},
+    | {name: f"plan.{name}" for name in ("robots", "seed", "spacing", "margin", "home")}
+    | {"folder": "--output"},
     exactly={
         "obstacles[": "limits.obstacles[",
         "plate[": "limits.plate[",
         ", or box=, a slice for example": "",
+        "another folder, or move": "another folder with --output, or move",
     },
 )
 
@@ -77,18 +66,24 @@ def folder_beside(file: Path) -> Path:
     return file.with_name(f"{file.stem}-plan")
 
 
+def model_of_cell(name: str) -> Model:
+    """The robot that the file of a cell names, as all commands name models."""
+    return build(name).model
+
+
 def plan(file: Path, output: Path | None, json: bool) -> None:
     """Plan what to measure, write it, and print the verdict; leaves with exit code 1 if that is not good."""
-    cell = cells.read(file)
+    from gantrytau_optimica import plan_cell, read_cell
+
+    with refusing():
+        cell = read_cell(file, model_of_cell)
     folder = output or folder_beside(file)
     rehearse(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
     reached = Reached()
     try:
         with _live(reached, hidden=json) as progress:
-            found = _planned(cell, folder, progress)
-            _protect(folder, found)
-            found.write(folder, **cell.program)
-            write_text(_copy(cell), folder / CELL)
+            planned = plan_cell(cell, folder, progress=progress)
     except KeyboardInterrupt:
         where = f" in the stage '{reached}'" if reached.stage else ""
         fail(f"Interrupted{where}; the same command goes on from there", INTERRUPTED, json)
@@ -96,7 +91,7 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
         with suppress(OSError):  # a folder that was made for nothing
             folder.rmdir()
         raise ModelError(f"{file}: {SPELLING.of(error)}") from error
-    files = [str(path) for path in _files(folder, cell)]
+    found, files = planned.plan, [str(path) for path in planned.files]
     good, reasons = found.verdict.good, "\n".join(found.verdict.reasons)
     if json:
         wrong = {} if good else {"error": reasons, "kind": "verdict"}
@@ -105,54 +100,26 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
         typer.echo(str(found))
         for name in files:
             typer.echo(f"Written: {name}")
-        typer.echo(_next(found, folder, file))
+        typer.echo(_next(planned, file))
     if not good:
         raise typer.Exit(FAULT)
 
 
-def _protect(folder: Path, found: Any) -> None:
-    """CommandError if the folder holds measurements of other poses, which this plan would make worthless."""
-    from gantrytau_optimica import load_plan
-
-    measured = folder / MEASUREMENTS
-    if not measured.is_file() or not (folder / "plan.json").is_file():
-        return
-    earlier = load_plan(folder)
-    if earlier.q.shape != found.q.shape or np.abs(earlier.q - found.q).max() > SAME:
-        raise CommandError(
-            f"{measured}: found measurements of an earlier plan with other poses; nothing was written. Name another folder "
-            "with --output, or move the measurements away"
-        )
-
-
-def _next(found: Any, folder: Path, file: Path) -> str:
+def _next(planned: "PlannedCell", file: Path) -> str:
     """What to do with a plan."""
-    from gantrytau_optimica.procedure.documents.plan_page import USUAL, command, drawn
-
-    measured = folder / MEASUREMENTS
-    few = int(found.settings["robots"]) < USUAL
-    safe = f"Safe: {drawn(found)}\n" if few else ""
-    if found.verdict.good:
+    few = planned.plan.few_robots
+    safe = f"Safe: {planned.plan.safety}\n" if few else ""
+    if planned.plan.verdict.good:
         return (
-            f"{safe}Measure the poses, save {folder / TEMPLATE} as {measured}, filled in (or a file with the header "
-            f"{header(found)}), then: {command(found, folder)}"
+            f"{safe}Measure the poses, save {planned.template} as {planned.measurements}, filled in (or a file with the "
+            f"header {planned.plan.header}), then: {planned.plan.command(planned.folder)}"
         )
     return safe + (
         f"Change {file}, and give the same command again: it goes on from what does not depend on the change"
     )
 
 
-def _planned(cell: Cell, folder: Path, progress: Callable[[str, int, int], None]) -> Any:
-    from gantrytau_optimica import plan_calibration
-
-    policy: dict[str, Any] = dict(cell.plan, wanted=cell.wanted, tape=cell.tape)
-    if cell.poses is not None:
-        policy["poses"] = cell.poses
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    return plan_calibration(cell.robot, cell.limits, cell.device, folder=folder, progress=progress, **policy)
-
-
-def summary(found: Any) -> dict[str, Any]:
+def summary(found: "CalibrationPlan") -> dict[str, Any]:
     """A plan as a record for programs."""
     return {
         "robot": found.robot_name,
@@ -165,28 +132,6 @@ def summary(found: Any) -> dict[str, Any]:
         "poses": int(found.measured.sum()),
         "passed": int((~found.measured).sum()),
     }
-
-
-def header(found: Any) -> str:
-    """The header of the measurements of a plan."""
-    joints = [f"q{k + 1}" for k in range(found.q.shape[1])]
-    turns = [] if found.kind == "three links" else ["qw", "qx", "qy", "qz"]
-    return ",".join([*joints, "x", "y", "z", *turns])
-
-
-def _files(folder: Path, cell: Cell) -> list[Path]:
-    program = f"{cell.program.get('name', PROGRAM)}.mod"
-    names = ("plan.html", "workspace.png", "poses.csv", TEMPLATE, program, "plan.json", CELL)
-    return [folder / name for name in names if (folder / name).is_file()]
-
-
-def _copy(cell: Cell) -> str:
-    """The file of a cell for the folder of its plan: a model in a file is named from anywhere."""
-    text = cell.file.read_text(encoding="utf-8-sig")
-    model = re.compile(r"^(\s*model\s*=\s*)([\"']).*?\.py.*?\2", re.MULTILINE)
-    return f"# The cell of this plan, from {cell.file.name}.\n" + model.sub(
-        lambda found: f"{found[1]}'{cell.name}'", text
-    )
 
 
 @contextmanager

@@ -29,8 +29,7 @@ def check(
     Of a system (.ssp) each FMU is checked, and how they are connected. Exit code 1 if there are errors; warnings and
     notes alone give 0.
     """
-    from gantrytau_fmu.reading.check_fmu import check_fmu
-    from gantrytau_fmu.systems.ssp.system_description import check_system
+    from gantrytau_fmu import check_fmu, check_system
 
     with reporting(json):
         present(file)

@@ -4,34 +4,31 @@ import math
 import time
 import warnings
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau import ModelError, did_you_mean
+from gantrytau import did_you_mean
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.fmu.fmu_info import counted
-from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting
+from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting
 from gantrytau.commands.printing.spelling import Spelling
+
+if TYPE_CHECKING:
+    from gantrytau_fmu import Experiment
 
 INTERFACES = {
     "both": ("model-exchange", "co-simulation"),
     "me": ("model-exchange",),
     "cs": ("co-simulation",),
 }
-PLATFORMS = tuple(
-    f"{processor}-{system}"
-    for system in ("linux", "windows", "darwin")
-    for processor in ("x86_64", "aarch64")
-)
 SPELLING = Spelling(
     ("export_fmu", "translate"),
     {name: f"--{name}" for name in ("platforms", "given", "find", "states", "tolerance", "solver", "fmi")},
 )
 VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
-SOLVERS = ("dopri5", "rodas4")
 
 
 def export(
@@ -44,8 +41,8 @@ def export(
         list[str] | None,
         typer.Option(
             metavar="NAMES",
-            help=f"'native' for this machine, 'all', or {', '.join(PLATFORMS)}, separated by commas; others than "
-            "this machine need the extra 'cross'.",
+            help="'native' for this machine, 'all', or x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, "
+            "x86_64-darwin, aarch64-darwin, separated by commas; others than this machine need the extra 'cross'.",
             show_default="native",
         ),
     ] = None,
@@ -111,6 +108,8 @@ def export(
     Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
     inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
     """
+    from gantrytau_fmu import SOLVERS
+
     with reporting(json, source_of(model), SPELLING):
         policy: dict[str, Any] = {
             "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
@@ -137,7 +136,7 @@ def export(
         _show(chosen, file, time.perf_counter() - begin, told, json)
 
 
-def _experiment(stop: float | None, step: float | None, tolerance: float) -> Any:
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> "Experiment | None":
     """The default experiment (`Experiment`), None if nothing is said of it; CommandError for times that are none."""
     if stop is None and step is None:
         return None
@@ -145,11 +144,11 @@ def _experiment(stop: float | None, step: float | None, tolerance: float) -> Any
 
     if stop is not None and not 0 < stop < math.inf:
         raise CommandError(f"--stop {stop:g}: expected a time above 0, in s")
-    stop = Experiment.stop if stop is None else stop
+    usual = Experiment()
+    stop = stop or usual.stop or 1.0
     if step is not None and not 0 < step <= stop:
         raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
-    step = min(Experiment.step, stop) if step is None else step
-    return Experiment(stop=stop, step=step, tolerance=tolerance)
+    return Experiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)
 
 
 def _unknown(option: str, found: str, expected: Any) -> Any:
@@ -164,12 +163,10 @@ def _proposed(found: str, expected: Any) -> str:
 
 def _check(file: Path) -> None:
     """Find out before the work whether the file can be written; CommandError if not."""
-    from gantrytau_fmu.building.archive import check_target
+    from gantrytau_fmu import check_target
 
-    try:
+    with refusing("--to "):
         check_target(file)
-    except ModelError as error:
-        raise CommandError(f"--to {error}") from error
 
 
 def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
@@ -186,7 +183,7 @@ def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
 
 def _show(chosen: Chosen, file: Path, seconds: float, told: list[str], json: bool) -> None:
     """The file, what is in it, and how long it took."""
-    from gantrytau_fmu.reading.read_fmu import read_fmu
+    from gantrytau_fmu import read_fmu
 
     fmu = read_fmu(file)
     if json:

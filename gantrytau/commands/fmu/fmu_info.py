@@ -42,10 +42,10 @@ def info(
 def _read(file: Path) -> Any:
     """The description of an FMU, or of a system."""
     if is_system(file):
-        from gantrytau_fmu.systems.ssp.system_description import read_system
+        from gantrytau_fmu import read_system
 
         return read_system(file)
-    from gantrytau_fmu.reading.read_fmu import read_fmu
+    from gantrytau_fmu import read_fmu
 
     return read_fmu(file)
 
@@ -57,7 +57,7 @@ def is_system(file: Path) -> bool:
 
 def present(file: Path) -> None:
     """CommandError if there is no such file."""
-    from gantrytau_fmu.reading.safety import no_file
+    from gantrytau_fmu import no_file
 
     if not file.is_file():
         raise CommandError(no_file(file))

@@ -28,13 +28,13 @@ from gantrytau.commands.printing.spelling import Spelling
 if TYPE_CHECKING:
     from gantrytau import Result
 
-ORDERS = ("gauss-seidel", "jacobi", "iterate")
 SPELLING = Spelling(
     ("cosimulate", "run_fmu"),
     {name: f"--{name}" for name in ("stop", "step", "order", "tolerance", "isolate")}
     | {"start": "--set", "inputs": "--input"},
     flags=("isolate",),
 )
+DEFAULT_ORDER = "gauss-seidel"
 SHOWN = 24  # variables in the table; files and JSON have all
 
 
@@ -102,7 +102,7 @@ def run(
         told: list[str] = []
         try:
             with _noted(told, json):
-                result = _result(file, policy, order=order or ORDERS[0], me=me, isolate=isolate)
+                result = _result(file, policy, order=order or DEFAULT_ORDER, me=me, isolate=isolate)
         except SolveError as error:
             _stop(error, output, json)
         files = saving.save(result, output)
@@ -123,6 +123,8 @@ def run(
 
 def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
     """CommandError for options that do not go together."""
+    from gantrytau_fmu import ORDERS
+
     if order is not None and order not in ORDERS:
         near = did_you_mean(order, ORDERS)
         raise CommandError(
@@ -143,7 +145,7 @@ def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
 @contextmanager
 def _noted(told: list[str], json: bool) -> Iterator[None]:
     """Inputs that nothing drives become a line that is printed at once, or with the JSON."""
-    from gantrytau_fmu.systems.connected_system import UnconnectedInputs
+    from gantrytau_fmu import UnconnectedInputs
 
     def hear(message: Warning | str, kind: type[Warning], *place: Any, **more: Any) -> None:
         if not issubclass(kind, UnconnectedInputs):
@@ -166,10 +168,10 @@ def _setting(text: str) -> tuple[str, Any]:
 
 def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isolate: bool) -> "Result":
     if not is_system(file):
-        from gantrytau_fmu.systems.run_fmu import run_fmu
+        from gantrytau_fmu import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
-    from gantrytau_fmu.systems.cosimulate import cosimulate
+    from gantrytau_fmu import cosimulate
 
     chosen: Any = order
     return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)

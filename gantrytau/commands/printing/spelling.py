@@ -43,4 +43,8 @@ class Spelling:
 
     def _option(self, found: re.Match[str]) -> str:
         option, value = self.options[found[1]], found[2]
-        return option if value is None or found[1] in self.flags else f"{option} {value.strip(chr(39))}"
+        if value is None or found[1] in self.flags:
+            return option
+        plain = value.strip("'")
+        word = re.fullmatch(r"[\w.+-]+", plain)  # a shell needs quotes for the rest
+        return f"{option} {plain if word else value}"

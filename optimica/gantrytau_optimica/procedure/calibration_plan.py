@@ -55,7 +55,9 @@ class CalibrationPlan(PosePlan):
     def placed(self, measurements: Measurements) -> Measurements:
         """Measurements in any frame, such as the axes of the device, laid over the poses that are expected, by their q."""
         found = placed(self._as_planned(measurements), self.q[self.measured], self.r[self.measured])
-        return Measurements(measurements.q, found.r, found.R, found.rails, numbers=measurements.numbers)
+        moved = Measurements(measurements.q, found.r, found.R, found.rails, numbers=measurements.numbers)
+        moved.lines = measurements.lines
+        return moved
 
     def missing(self, measurements: Measurements) -> np.ndarray:
         """Rows of the program that are to be measured and that measurements do not hold yet, by their q, or by number."""

@@ -15,6 +15,7 @@ from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_
 from gantrytau_optimica.procedure.documents.files import check_folder
 from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
 from gantrytau_optimica.procedure.plan_goal import PlanGoal
+from gantrytau_optimica.procedure.plan_verdict import PlanVerdict, decide
 from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
 from gantrytau_optimica.procedure.pose_plan import PlanBasis
 from gantrytau_optimica.procedure.stages import Progress, Stages, digest
@@ -28,7 +29,6 @@ from gantrytau_optimica.procedure.trials import (
     simulated,
     with_obstacles,
 )
-from gantrytau_optimica.procedure.verdict import Verdict, decide
 from gantrytau_optimica.procedure.ways.known_ways import KnownWays
 from gantrytau_optimica.procedure.ways.ordering import Order, ordered
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
@@ -216,11 +216,11 @@ class _Procedure:
 
     def _verdict(
         self, places: SettledWorkspace, candidates: Candidates, choice: PoseChoice, trials: Trials, key: str
-    ) -> Verdict:
+    ) -> PlanVerdict:
         asked = self.asked
         key = digest(key, [asked.poses, asked.wanted, asked.tape, asked.seed])
         at = (self.fleet, self.device, places, candidates, choice, trials)
-        return self.stages.of("verdict", Verdict, key, lambda: decide(*at, asked))
+        return self.stages.of("verdict", PlanVerdict, key, lambda: decide(*at, asked))
 
 
 def _stricter(limits: Limits, margin: float) -> Limits:

@@ -2,18 +2,23 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.calibration.trust.calibration_verdict import um
 from gantrytau_optimica.procedure.candidates import Candidates
-from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.fleet import WIDER, Fleet
+from gantrytau_optimica.procedure.plan_verdict import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import PoseChoice
 from gantrytau_optimica.procedure.trials import Trials
-from gantrytau_optimica.procedure.verdict import Verdict, um
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
+
+USUAL = 20  # robots that are drawn
+DOUBT = 0.05  # of 95 % confidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,7 @@ class PosePlan:
     measured: np.ndarray
     prediction: PoseChoice
     trials: Trials
-    verdict: Verdict
+    verdict: PlanVerdict
     lost: np.ndarray
     unseen: np.ndarray
     cell: PlanBasis | None = field(default=None, repr=False)
@@ -82,3 +87,32 @@ class PosePlan:
             f"{self.prediction.condition:.3g}, observability {self.prediction.observability:.3g} (Nahvi and Hollerbach)",
         ]
         return "\n".join(lines)
+
+    @property
+    def header(self) -> str:
+        """The header of a file with its measurements: q1,q2,...,x,y,z, and quaternions where the plate turns."""
+        turns = [] if self.kind == "three links" else ["qw", "qx", "qy", "qz"]
+        return ",".join([*(f"q{k + 1}" for k in range(self.q.shape[1])), "x", "y", "z", *turns])
+
+    @property
+    def few_robots(self) -> bool:
+        """Whether fewer robots than usual were simulated."""
+        return int(self.settings["robots"]) < USUAL
+
+    @property
+    def safety(self) -> str:
+        """What so many simulated robots say of the safety of all others."""
+        robots = int(self.settings["robots"])
+        share = 1 - DOUBT ** (1 / robots)
+        words = (
+            f"none of {robots} robots drawn with the tape error, and none of as many with {WIDER:g} times these errors, "
+            f"breaks a limit on the way; {robots} alone would say with 95 % confidence that no more than {share:.0%} of all "
+            "do; a robot farther from its nominal values may"
+        )
+        return f"{words}; {USUAL} or more robots say more" if self.few_robots else words
+
+    def command(self, folder: str | Path = ".") -> str:
+        """What is given on the command line once its poses are measured and written into a folder."""
+        prior = self.settings.get("prior") or {}
+        words = " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
+        return f"gantrytau calibrate {Path(folder) / 'measurements.csv'}{words}"

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.commands.calibrate.cell_example import EXAMPLE
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import LaserTracker
+from gantrytau_optimica import LaserTracker, cell_example
 
 SMALL = {"poses": "poses = 20", "robots": "robots = 2\nspacing = 0.25"}
 TAPE = 0.005  # m, as the example says
@@ -18,7 +17,7 @@ TAPE = 0.005  # m, as the example says
 
 def with_lines(**lines):
     """The example with some of its lines replaced, by the key at their beginning."""
-    text = EXAMPLE
+    text = cell_example()
     for key, line in {**SMALL, **lines}.items():
         text, count = re.subn(
             rf"^(# )?{key} = .*$", line.replace("\\", r"\\"), text, count=1, flags=re.MULTILINE

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gantrytau.commands.calibrate.cell_example import EXAMPLE
+from gantrytau_optimica import cell_example
 from tests.commands.calibrate.cells import with_lines
 
 FAULT, MISUSE = 1, 2
@@ -11,7 +11,7 @@ FAULT, MISUSE = 1, 2
 def test_the_example_is_printed(run, fails):
     found = run("calibrate", "--example")
     assert found.exit_code == 0
-    assert found.stdout == EXAMPLE == run("calibrate", "--example", "l1").stdout
+    assert found.stdout == cell_example() == run("calibrate", "--example", "l1").stdout
     six = run("calibrate", "--example", "--robot", "SixLinkGantryTau(L1)").stdout
     assert 'model = "SixLinkGantryTau(L1)"' in six
     assert six.startswith("# Limits, device and home below fit SixLinkGantryTau(D1): make them")
@@ -99,8 +99,8 @@ def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
 )
 def test_tables_that_cannot_be_read(fails, tmp_path, old, new, words):
     file = tmp_path / "cell.toml"
-    assert old in EXAMPLE
-    file.write_text(EXAMPLE.replace(old, new))
+    assert old in cell_example()
+    file.write_text(cell_example().replace(old, new))
     assert words in fails(MISUSE, "calibrate", file)
 
 

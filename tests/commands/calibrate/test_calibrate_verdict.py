@@ -8,10 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from gantrytau.commands.app import app
-from gantrytau.commands.calibrate.calibration_verdict import with_what_moves_the_tool
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica import Measurements, calibrate
+from gantrytau_optimica import Measurements, calibrate, told_by_tool
 from gantrytau_optimica.calibration.design.identifiability import Poses
 from gantrytau_optimica.calibration.judging.tool_error import tool_error
 from tests.commands.calibrate import cells
@@ -173,12 +172,12 @@ def test_only_what_moves_the_tool_is_told():
     noise = 1e-5 * np.random.default_rng(1).standard_normal(r.shape)
     found = calibrate(robot, Measurements(q, r + noise, R))
     assert len(found.undetermined) > 10
-    told = with_what_moves_the_tool(found, expected, 100e-6, 0.002)
+    told = told_by_tool(found, expected, least=100e-6, tape=0.002)
     message = next(f.message for f in told.findings if f.kind == "undetermined")
     assert "do not move the tool: this is harmless" in message
     assert "arms" not in message
     few = tool_error(robot, Poses(q[:6], r[:6], R[:6]), every, noise=1e-5, tape=0.002)
-    moving = with_what_moves_the_tool(found, few, 20e-6, 0.002)
+    moving = told_by_tool(found, few, least=20e-6, tape=0.002)
     message = next(f.message for f in moving.findings if f.kind == "undetermined")
     assert (
         "data do not hold all that moves the tool; where nominal values are 2 mm off, together arms"

@@ -14,10 +14,10 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.documents.figures import draw_plan
 from gantrytau_optimica.procedure.documents.plan_page import html_page
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.plan_verdict import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import CRITERION, PoseChoice
 from gantrytau_optimica.procedure.pose_plan import PosePlan
 from gantrytau_optimica.procedure.trials import Trials
-from gantrytau_optimica.procedure.verdict import Verdict
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 KIND = "gantrytau calibration plan"
@@ -73,13 +73,12 @@ def _write_poses(plan: PosePlan, path: Path) -> None:
 
 def _write_template(plan: PosePlan, path: Path) -> None:
     """The poses to measure, with empty cells for what is measured."""
-    filled = [f"q{k + 1}" for k in range(plan.q.shape[1])]
-    empty = ["x", "y", "z"] + ([] if plan.kind == "three links" else ["qw", "qx", "qy", "qz"])
+    empty = [""] * (len(plan.header.split(",")) - plan.q.shape[1])
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["number", *filled, *empty])
+        writer.writerow(["number", *plan.header.split(",")])
         for k in np.flatnonzero(plan.measured):
-            writer.writerow([plan.numbers[k], *(f"{x:.9g}" for x in plan.q[k]), *[""] * len(empty)])
+            writer.writerow([plan.numbers[k], *(f"{x:.9g}" for x in plan.q[k]), *empty])
 
 
 def plan_numbers(plan: PosePlan) -> dict[str, Any]:
@@ -175,7 +174,7 @@ def _fields(numbers: dict[str, Any]) -> dict[str, Any]:
         measured=np.array(program["measured"], dtype=bool),
         prediction=_record(PoseChoice, numbers["prediction"]),
         trials=_record(Trials, numbers["trials"]),
-        verdict=_record(Verdict, numbers["verdict"]),
+        verdict=_record(PlanVerdict, numbers["verdict"]),
         lost=np.array(numbers["lost"], dtype=float).reshape(-1, 3),
         unseen=np.array(numbers["unseen"], dtype=float).reshape(-1, 3),
         numbers=np.array(program["numbers"], dtype=int),

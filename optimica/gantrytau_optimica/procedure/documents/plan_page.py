@@ -7,34 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau.writing.pages import page, table, verdict
+from gantrytau_optimica.calibration.trust.calibration_verdict import um
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
-from gantrytau_optimica.procedure.fleet import WIDER
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
-from gantrytau_optimica.procedure.verdict import um
 
-USUAL = 20  # robots that are drawn
-DOUBT = 0.05  # of 95 % confidence
 STYLE = ".passed { opacity: .6; } img { max-width: 100%; background: white; }"
-
-
-def command(plan: PosePlan, folder: str | Path = ".") -> str:
-    """What is given on the command line once the poses of a plan in a folder are measured."""
-    prior = plan.settings.get("prior") or {}
-    words = " --prior " + ",".join(f"{name}={value:g}" for name, value in prior.items()) if prior else ""
-    return f"gantrytau calibrate {Path(folder) / 'measurements.csv'}{words}"
-
-
-def drawn(plan: PosePlan) -> str:
-    """What so many simulated robots say of the safety of all others."""
-    robots = int(plan.settings["robots"])
-    share = 1 - DOUBT ** (1 / robots)
-    words = (
-        f"none of {robots} robots drawn with the tape error, and none of as many with {WIDER:g} times these errors, breaks "
-        f"a limit on the way; {robots} alone would say with 95 % confidence that no more than {share:.0%} of all do; a "
-        "robot farther from its nominal values may"
-    )
-    return words if robots >= USUAL else f"{words}; {USUAL} or more robots say more"
 
 
 def html_page(
@@ -70,7 +48,7 @@ def _verdict(plan: PosePlan) -> str:
 
 
 def _steps(plan: PosePlan, program: str, folder: str | Path, trigger: str) -> str:
-    count, header = int(plan.measured.sum()), ",".join(f"q{k + 1}" for k in range(plan.q.shape[1]))
+    count = int(plan.measured.sum())
     turned = ",qw,qx,qy,qz" if plan.kind != "three links" else ""
     place = ", ".join(f"{x:.3g}" for x in np.asarray(plan.settings["device_r"], dtype=float))
     home = ", ".join(_joint(plan, k, x) for k, x in enumerate(plan.q[0]))
@@ -85,11 +63,11 @@ def _steps(plan: PosePlan, program: str, folder: str | Path, trigger: str) -> st
         "measurements may stay in its own axes.",
         f"Jog the robot to home by hand: {home}. The way there is yours; all others were checked.",
         f"Load {program} and run it slowly, with a hand on the stop. {waits} Do not change the order or the kind of move: "
-        f"only these ways were checked. Safe means: {drawn(plan)}.",
+        f"only these ways were checked. Safe means: {plan.safety}.",
         f"Save measurements-template.csv as measurements.csv and fill in x, y, z{turned} as measured, in m"
         f"{_target(plan)}; q stands there as commanded (m and rad). Leave empty what was not seen. A file of your own needs "
-        f"the header {header},x,y,z{turned}.",
-        "Run: " + command(plan, folder),
+        f"the header {plan.header}.",
+        "Run: " + plan.command(folder),
     ]
     return "<ol>" + "".join(f"<li>{escape(step)}</li>" for step in steps) + "</ol>"
 
@@ -129,7 +107,7 @@ def _facts(plan: PosePlan) -> str:
         ["observability index", f"{found.observability:.4g}"],
         ["criterion", CRITERION],
         ["worst simulated robot", f"{um(plan.verdict.error)} after calibration"],
-        ["checked", f"the nominal robot, and {drawn(plan)}"],
+        ["checked", f"the nominal robot, and {plan.safety}"],
         ["not reached and replaced", _lost(plan)],
     ]
     return table((), rows)

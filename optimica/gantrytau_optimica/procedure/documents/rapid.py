@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau_optimica.calibration.trust.calibration_verdict import um
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
-from gantrytau_optimica.procedure.verdict import um
 
 WIDTH = 80
 AXES = 6  # of robax and of extax

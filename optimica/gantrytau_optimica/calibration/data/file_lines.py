@@ -1,31 +1,11 @@
 """Rows of measurements, which count from 0, as lines of the file in which the user looks for them."""
 
-import csv
 import re
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gantrytau.commands.printing.reporting import CommandError
-
-
-def read(file: Path, rails: Sequence[Path]) -> Any:
-    """Measurements; CommandError for files that cannot be read."""
-    from gantrytau import ModelError
-    from gantrytau_optimica import Measurements
-
-    try:
-        return Measurements.read(file, rails=list(rails) or None)
-    except UnicodeDecodeError as error:
-        raise CommandError(
-            f"{file}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
-        ) from error
-    except csv.Error as error:
-        raise CommandError(f"{file}: cannot be read as CSV ({error})") from error
-    except ModelError as error:
-        raise CommandError(str(error)) from error
+from gantrytau_optimica.calibration.data.findings import rows_in_words
 
 
 def in_lines(message: str, said: Sequence[np.ndarray], lines: np.ndarray) -> str:
@@ -33,8 +13,6 @@ def in_lines(message: str, said: Sequence[np.ndarray], lines: np.ndarray) -> str
 
     A few rows that it does not name are added at its end.
     """
-    from gantrytau_optimica.calibration.data.findings import rows_in_words
-
     words = {}
     for rows in said:
         if len(rows) and max(rows) < len(lines):
@@ -58,6 +36,4 @@ def in_lines(message: str, said: Sequence[np.ndarray], lines: np.ndarray) -> str
 
 
 def _lines_in_words(lines: np.ndarray) -> str:
-    from gantrytau_optimica.calibration.data.findings import rows_in_words
-
     return rows_in_words(lines).replace("row", "line", 1)

@@ -1,4 +1,6 @@
-"""The file of a cell as an example, and what differs in it between kinds of robots."""
+"""The file of a cell as an example to be filled in, for each kind of robot."""
+
+from gantrytau import ModelError, did_you_mean
 
 CELL = """\
 # A robot cell to be calibrated. Make this file your own, then: gantrytau calibrate cell.toml
@@ -99,3 +101,33 @@ F1 = SIX | dict(
     device=T_MAC + "r = [-0.2, -2.0, -0.2]",
     home="# home = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0]",
 )
+KINDS = {"l1": L1, "six": SIX, "f1": F1}
+OF_MODELS = {"GantryTau": "l1", "SixLinkGantryTau": "six", "F1GantryTau": "f1"}
+OTHERS = "# Limits, device and home below fit {}: make them those of your robot.\n"
+
+
+def cell_example(kind: str | None = None, robot: str | None = None) -> str:
+    """The text of a cell to begin with: of a kind of robot, or of a model of that kind.
+
+    kind: "l1" (three links, the default), "six" (links) or "f1" (turntables); robot: its model as the file names it, such as
+    GantryTau(D1). Raises ModelError for another kind, and for a model of none of these without a kind beside it.
+    """
+    if kind is not None and kind.lower() not in KINDS:
+        raise ModelError(
+            f"cell_example: kind {kind}: there is no such example{did_you_mean(kind.lower(), KINDS)}",
+            argument="kind",
+        )
+    if robot is None:
+        return CELL.format(**KINDS[(kind or "l1").lower()])
+    name = robot.partition("(")[0]
+    if kind is None and name not in OF_MODELS:
+        raise ModelError(
+            f"cell_example: robot {robot}: expected {', '.join(OF_MODELS)}, or a kind beside it, as kind='six', for limits, "
+            "device and home to begin with",
+            argument="robot",
+        )
+    known = KINDS[kind.lower() if kind else OF_MODELS[name]]
+    named = f'model = "{robot}"'
+    # limits, device and home of the example are those of its own robot
+    warning = "" if named in known["robot"] else OTHERS.format(known["robot"].split('"')[1])
+    return warning + CELL.format(**(known | {"robot": named.ljust(27)}))

@@ -7,6 +7,7 @@ import numpy as np
 from gantrytau import GantryTauError
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.calibration.trust.calibration_verdict import Verdict, um
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
 from gantrytau_optimica.procedure.plan_goal import PlanGoal
@@ -19,19 +20,13 @@ HIDDEN = 0.7  # of the safe places, below which the place of the device is worth
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
-    """good: whether every simulated robot keeps the wanted error (m) of the tool in the mean over the workspace.
+class PlanVerdict(Verdict):
+    """Of a plan: good if every simulated robot keeps the wanted error of the tool in the mean over the workspace.
 
-    error: of the worst of them, m; reasons: sentences with the numbers, and what to do.
+    error: of the worst of them, m.
     """
 
-    good: bool
     error: float
-    wanted: float
-    reasons: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return f"{'good' if self.good else 'not good enough'}: {' '.join(self.reasons)}"
 
 
 def decide(
@@ -42,7 +37,7 @@ def decide(
     choice: PoseChoice,
     trials: Trials,
     asked: PlanGoal,
-) -> Verdict:
+) -> PlanVerdict:
     """The verdict on a plan."""
     wanted = asked.wanted
     good = bool(trials.worst <= wanted)
@@ -55,12 +50,7 @@ def decide(
     elif not good:
         said.append(_noise(fleet, device, candidates, choice, trials, asked))
     said += _remarks(device, places, candidates, count, asked.poses, choice, trials)
-    return Verdict(good, trials.worst, wanted, tuple(said))
-
-
-def um(length: float) -> str:
-    """A length in micrometres or millimetres, whichever reads better."""
-    return f"{length * 1e6:.3g} um" if length < 1e-3 else f"{length * 1e3:.3g} mm"
+    return PlanVerdict(good, wanted, tuple(said), trials.worst)
 
 
 def _told(trials: Trials, count: int, wanted: float) -> str:

@@ -1,4 +1,4 @@
-"""Values of a TOML file with the unit that they must have: numbers are SI, texts bring their unit, as "5 mm" or "40 deg"."""
+"""Values of a TOML file with the unit that they must have: numbers are SI, texts bring theirs, as "5 mm" or "40 deg"."""
 
 import math
 import re
@@ -6,16 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gantrytau import did_you_mean
-from gantrytau.commands.printing.reporting import CommandError
+from gantrytau import ModelError, did_you_mean
+from gantrytau.language.units import FACTORS
 
-UNITS: Mapping[str, Mapping[str, float]] = {
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180},
-    "s": {"s": 1.0, "ms": 1e-3},
-    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
-    "1": {},
-}
 WORDS = {
     "m": "a length in m",
     "rad": "an angle in rad",
@@ -32,9 +25,9 @@ _TEXT = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S+)\s*")
 class Value:
     """What a key holds: a number, vector or table of numbers in a unit, a whole number or a text.
 
-    unit: of UNITS, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere; shapes: those
-    allowed, None for any number of rows; least: the smallest number allowed, or above: what it must exceed; words: of which
-    a text must be one.
+    unit: of FACTORS or 1, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere;
+    shapes: those allowed, None for any number of rows; least: the smallest number allowed, or above: what it must exceed;
+    words: of which a text must be one.
     """
 
     unit: str
@@ -44,20 +37,20 @@ class Value:
     words: tuple[str, ...] = ()
 
     def read(self, place: str, found: Any) -> Any:
-        """The value in SI, lists as lists; CommandError for anything else."""
+        """The value in SI, lists as lists; ModelError for anything else."""
         if self.unit == "text":
             return self._text(place, found)
         if self.unit == "bodies":
             return found
         if not any(_has(found, shape) for shape in self.shapes):
-            raise CommandError(f"{place}: found {_short(found)}, expected {self.expected()}")
+            raise ModelError(f"{place}: found {_short(found)}, expected {self.expected()}")
         return self._numbers(place, found)
 
     def _text(self, place: str, found: Any) -> str:
         if not isinstance(found, str) or not found.strip():
-            raise CommandError(f"{place}: found {_short(found)}, expected a text in quotes")
+            raise ModelError(f"{place}: found {_short(found)}, expected a text in quotes")
         if self.words and found.lower() not in self.words:
-            raise CommandError(f'{place}: found "{found}"{did_you_mean(found.lower(), self.words)}')
+            raise ModelError(f'{place}: found "{found}"{did_you_mean(found.lower(), self.words)}')
         return found.lower() if self.words else found
 
     def _numbers(self, place: str, found: Any) -> Any:
@@ -67,20 +60,20 @@ class Value:
         if not (math.isfinite(number) and number >= self.least and number > self.above):
             bound = f" above {self.above:g}" if self.above > -math.inf else f" of at least {self.least:g}"
             limited = self.above > -math.inf or self.least > -math.inf
-            raise CommandError(f"{place}: found {found!r}, expected {self._unit()}{bound if limited else ''}")
+            raise ModelError(f"{place}: found {found!r}, expected {self._unit()}{bound if limited else ''}")
         return int(number) if self.unit == "whole" else number
 
     def _number(self, place: str, found: Any) -> float:
         if isinstance(found, str):
             return self._with_unit(place, found)
         if isinstance(found, bool) or not isinstance(found, (int, float)):
-            raise CommandError(f"{place}: found {_short(found)}, expected {self._unit()}")
+            raise ModelError(f"{place}: found {_short(found)}, expected {self._unit()}")
         if self.unit == "whole" and found != int(found):
-            raise CommandError(f"{place}: found {found!r}, expected a whole number")
+            raise ModelError(f"{place}: found {found!r}, expected a whole number")
         largest = max((LARGEST.get(unit, math.inf) for unit in self.unit.split(",")), default=math.inf)
         if abs(found) > largest:
             unit = EXAMPLES[self.unit.split(",")[0]]
-            raise CommandError(
+            raise ModelError(
                 f'{place}: found {found!r}, expected {self._unit()}, up to {largest:.3g}; write "{found:g} {unit}" if it is '
                 f"in {unit}"
             )
@@ -88,16 +81,16 @@ class Value:
 
     def _with_unit(self, place: str, found: str) -> float:
         units = {
-            name: factor for unit in self.unit.split(",") for name, factor in UNITS.get(unit, {}).items()
+            name: factor for unit in self.unit.split(",") for name, factor in FACTORS.get(unit, {}).items()
         }
         match = _TEXT.fullmatch(found)
         if match is None or match[2] not in units:
             known = f"; units are {', '.join(units)}" if units else ", without a unit"
-            raise CommandError(f'{place}: found "{found}", expected {self._unit()}{known}')
+            raise ModelError(f'{place}: found "{found}", expected {self._unit()}{known}')
         try:
             return float(match[1]) * units[match[2]]
         except ValueError:
-            raise CommandError(f'{place}: found "{found}", expected a number and its unit') from None
+            raise ModelError(f'{place}: found "{found}", expected a number and its unit') from None
 
     def _unit(self) -> str:
         return (
@@ -143,15 +136,15 @@ def _short(found: Any) -> str:
 def read_table(
     place: str, table: Any, keys: Mapping[str, Value], needed: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """All values of a table; CommandError for keys that it does not take, lacks, or that hold something else."""
+    """All values of a table; ModelError for keys that it does not take, lacks, or that hold something else."""
     if not isinstance(table, Mapping):
-        raise CommandError(f"{place}: found {_short(table)}, expected a table, [{place.rpartition(': ')[2]}]")
+        raise ModelError(f"{place}: found {_short(table)}, expected a table, [{place.rpartition(': ')[2]}]")
     for name in table:
         if name not in keys:
-            raise CommandError(f"{at(place, name)}: there is no such key{did_you_mean(name, list(keys))}")
+            raise ModelError(f"{at(place, name)}: there is no such key{did_you_mean(name, list(keys))}")
     for name in needed:
         if name not in table:
-            raise CommandError(f"{at(place, name)}: found nothing, expected {keys[name].expected()}")
+            raise ModelError(f"{at(place, name)}: found nothing, expected {keys[name].expected()}")
     return {name: keys[name].read(at(place, name), found) for name, found in table.items()}
 
 

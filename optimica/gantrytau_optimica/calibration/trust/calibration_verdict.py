@@ -1,0 +1,129 @@
+"""Whether a calibration is good enough: decided by poses that were not fitted, and by how sure the tool is everywhere."""
+
+from dataclasses import dataclass
+
+from gantrytau import GantryTauError
+from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.fitting.arm_fit import TAPE
+from gantrytau_optimica.calibration.judging.tool_error import Loose, ToolError, tool_error
+from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
+
+SHOWN = 3  # combinations that are named
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """good: whether the tool keeps the wanted error (m); reasons: sentences with the numbers, and what to do."""
+
+    good: bool
+    wanted: float
+    reasons: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{'good' if self.good else 'not good enough'}: {' '.join(self.reasons)}"
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationVerdict(Verdict):
+    """Of a measured calibration.
+
+    validation_error: mean error of poses that were not fitted, m, NaN where there are none; expected_error: of the tool, in
+    the mean over the places where it is to work, m.
+    """
+
+    validation_error: float
+    expected_error: float
+
+
+def judge(
+    found: Calibration | CrossValidation,
+    wanted: float,
+    *,
+    expected: ToolError | None = None,
+    tape: float = TAPE,
+) -> CalibrationVerdict:
+    """Whether a calibration is good enough: poses that were not fitted and the tool must err by no more than is wanted.
+
+        verdict = judge(cross_validate(robot, measurements), wanted=200e-6)
+        print(verdict)
+
+    found: a calibration with poses held out, or one that was cross-validated; wanted: mean error of the tool, m; expected:
+    the error of the tool where it is to work, by default at the poses that were fitted; tape: standard deviation of
+    nominal values, m. Raises ModelError for models that no robot can hold, where `expected` is not given.
+    """
+    checked = held_out(found) if isinstance(found, Calibration) else found
+    where = "the fitted poses" if expected is None else "all planned poses"
+    expected = expected or expected_error(checked.calibration, tape=tape)
+    good = bool(checked.calibration.success and checked.error <= wanted and expected.error <= wanted)
+    words = (
+        f"{_validated(checked)}, {um(expected.error)} of the tool are expected over {where} by what was measured, "
+        f"{um(wanted)} were wanted"
+    )
+    if not good:
+        words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
+    return CalibrationVerdict(good, wanted, (words,), checked.error, expected.error)
+
+
+def expected_error(found: Calibration, *, tape: float = TAPE) -> ToolError:
+    """The error of the tool to be expected at the poses that were fitted; tape: deviation of nominal values, m."""
+    data = found.measurements.select(found.rows)
+    poses = Poses(data.q, data.r, data.R if found.plate_turns else None)
+    return tool_error(found.robot, poses, poses, noise=float(found.noise), tape=tape)
+
+
+def _validated(checked: CrossValidation) -> str:
+    if not checked.good.size:
+        return "no poses that were not fitted validate this"
+    count = len(checked.calibration.left_out)
+    without = f", {_outliers(count)} left out" if count else ""
+    return f"{um(checked.error)} in the mean of poses that were not fitted{without}"
+
+
+def _outliers(count: int) -> str:
+    words = ("no", "one", "two", "three", "four", "five", "six")
+    return f"{words[count] if count < len(words) else count} outlier{'' if count == 1 else 's'}"
+
+
+def um(length: float) -> str:
+    """A length in micrometres or millimetres, whichever reads better."""
+    return f"{length * 1e6:.3g} um" if length < 1e-3 else f"{length * 1e3:.3g} mm"
+
+
+def told_by_tool(
+    found: Calibration, expected: ToolError | None = None, *, least: float | None = None, tape: float = TAPE
+) -> Calibration:
+    """The calibration, whose finding "undetermined" says what of it moves the tool: the rest is harmless.
+
+    expected: by default at the poses that were fitted; least: m, by which the tool must move to be worth a word, by default
+    the noise; tape: deviation of nominal values, m.
+    """
+    if expected is None:
+        try:
+            expected = expected_error(found, tape=tape) if found.undetermined else None
+        except GantryTauError:  # no robot can hold what was found
+            expected = None
+    if expected is None:
+        return found
+    moving = [one for one in expected.loose if one.moves > (found.noise if least is None else least)]
+    if not found.undetermined and not moving:
+        return found
+    others = [f for f in found.findings if f.kind != "undetermined"]
+    if not expected.loose:
+        return found.with_findings(others)
+    words = _loose(moving, len(expected.loose) - len(moving), tape)
+    return found.with_findings([*others, Finding("undetermined", found.rows, words)])
+
+
+def _loose(moving: list[Loose], quiet: int, tape: float) -> str:
+    harmless = f"{quiet} combinations of numbers are known by nominal values alone, but do not move the tool"
+    if not moving:
+        return f"{harmless}: this is harmless"
+    shown = "; ".join(f"{', '.join(one.names)} by {um(one.moves)}" for one in moving[:SHOWN])
+    more = f"; and {len(moving) - SHOWN} more" if len(moving) > SHOWN else ""
+    found = (
+        f"data do not hold all that moves the tool; where nominal values are {um(tape)} off, together {shown}{more}; "
+        "measure more poses, spread over the workspace"
+    )
+    return f"{found}. {harmless}" if quiet else found

@@ -1,0 +1,283 @@
+"""`cell.toml`: a robot as the tape measure knows it, its surroundings, and the device that is to measure it."""
+
+import importlib
+import re
+import runpy
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gantrytau import GantryTauError, Model, ModelError, did_you_mean, kinematics, read_toml, with_setting
+from gantrytau.kinematics import Limits
+from gantrytau_optimica.calibration.devices.cameras import single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices.devices import Device, LaserTracker, TMac
+from gantrytau_optimica.procedure.cells.toml_values import Value, at, read_table
+from gantrytau_optimica.procedure.documents.rapid import check_program
+
+POINT = Value("m", ((3,),))
+ROTATION = Value("1", ((3, 3),))
+TEXT = Value("text")
+LENGTH, ANGLE = Value("m", above=0.0), Value("rad", above=0.0)
+ERROR, TURN = Value("m", least=0.0), Value("rad", least=0.0)
+
+ROBOT = {"model": TEXT, "tape": LENGTH}
+GOAL = {"error": LENGTH, "poses": Value("whole", least=1)}
+PLAN = {
+    "robots": Value("whole", least=1),
+    "seed": Value("whole", least=0),
+    "spacing": LENGTH,
+    "margin": LENGTH,
+    "home": Value("m,rad", ((None,),)),
+}
+LIMITS = {
+    "strokes": Value("m,rad", ((2,), (None, 2))),
+    "ball_joint": ANGLE,
+    "cart_axes": Value("1", ((3,), (None, 3))),
+    "plate_axes": Value("1", ((3,), (None, 3))),
+    "home": POINT,
+    "link_radius": ERROR,
+    "stroke_margin": ERROR,
+    "turn_margin": TURN,
+    "angle_margin": TURN,
+    "clearance": ERROR,
+    "obstacles": Value("bodies"),
+    "plate": Value("bodies"),
+}
+BAR = {"start": POINT, "end": POINT, "radius": LENGTH}
+OBSTACLES = {
+    "box": (kinematics.Box, {"low": POINT, "high": POINT, "R": ROTATION}, ("low", "high")),
+    "cylinder": (kinematics.Cylinder, BAR, ("start", "end", "radius")),
+    "capsule": (kinematics.Capsule, BAR, ("start", "end", "radius")),
+}
+_TARGET = {"r": POINT, "target": POINT, "facing": Value("1", ((3,),))}
+_TRACKER = _TARGET | {
+    "R": ROTATION,
+    "range_noise": ERROR,
+    "range_noise_per_metre": Value("1", least=0.0),
+    "transverse_noise": ERROR,
+    "transverse_noise_per_metre": Value("1", least=0.0),
+    "scale": Value("1"),
+    "nearest": ERROR,
+    "farthest": LENGTH,
+    "elevation": Value("rad", ((2,),)),
+    "acceptance": ANGLE,
+}
+_CAMERA = _TARGET | {
+    "at": POINT,
+    "lens_error": Value("1"),
+    "pattern": Value("m", ((None, 3),)),
+    "noise": Value("1", least=0.0),
+    "acceptance": ANGLE,
+    "smallest": Value("1", least=0.0),
+}
+DEVICES = {
+    "laser tracker": (LaserTracker, _TRACKER, ("r",)),
+    "t-mac": (TMac, _TRACKER | {"rotation_noise": TURN}, ("r",)),
+    "single camera": (single_camera, _CAMERA, ("r", "at")),
+    "stereo cameras": (stereo_cameras, _CAMERA | {"base": LENGTH}, ("r", "at")),
+}
+PROGRAM = {
+    "name": TEXT,
+    "speed": Value("m/s", above=0.0),
+    "settle": Value("s", least=0.0),
+    "measure": Value("s", least=0.0),
+    "carts": Value("text", words=("robax", "extax")),
+    "trigger": TEXT,
+    "tool": TEXT,
+}
+TABLES = ("robot", "values", "goal", "limits", "device", "plan", "program")
+
+
+Robot = Model | Callable[[str], Model]
+LIBRARY = "gantrytau_models"  # of models that a file names without their module
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a cell file says; lengths in m, angles in rad.
+
+    file: its path; name: of the robot, as the file names it, a model in a file by its full path; robot, limits, device:
+    ready for use; values: those of the tape measure by name; tape: their standard deviation; wanted: the error of the tool
+    to be reached; poses: how many to measure, None for the usual number; plan: further keywords of `plan_calibration`;
+    program: those of `CalibrationPlan.program`.
+    """
+
+    file: Path
+    name: str
+    robot: Model
+    values: Mapping[str, Any]
+    limits: Limits
+    device: Device
+    tape: float
+    wanted: float
+    poses: int | None = None
+    plan: Mapping[str, Any] = field(default_factory=dict)
+    program: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def policy(self) -> dict[str, Any]:
+        """Keywords of `plan_calibration` for this cell, besides robot, limits and device."""
+        poses = {} if self.poses is None else {"poses": self.poses}
+        return {**self.plan, "wanted": self.wanted, "tape": self.tape, **poses}
+
+    def copied(self) -> str:
+        """The text of its file for another folder: a model in a file is named by its full path."""
+        text = self.file.read_text(encoding="utf-8-sig")
+        model = re.compile(r"^(\s*model\s*=\s*)([\"']).*?\.py.*?\2", re.MULTILINE)
+        named = model.sub(lambda found: f"{found[1]}'{self.name}'", text)
+        return f"# The cell of this plan, from {self.file.name}.\n{named}"
+
+
+def read_cell(path: str | Path, robot: Robot | None = None) -> Cell:
+    """The cell of a TOML file, such as `cell_example` gives one; numbers are SI, texts bring a unit, as "5 mm".
+
+    robot: the model with its nominal values, or a function that finds it by the name in the file; None imports it by name,
+    from `gantrytau_models` or as "package.module:Robot", "robot.py:Robot". Raises ModelError, which names the place in the
+    file, for all that it cannot be.
+    """
+    file = Path(path)
+    table = read_toml(file)
+    whole = f"{file}: "
+    for name in table:
+        if name not in TABLES:
+            raise ModelError(f"{whole}[{name}]: there is no such table{did_you_mean(name, TABLES)}")
+    for name in ("robot", "goal", "device"):
+        if name not in table:
+            raise ModelError(
+                f"{whole}found no table [{name}], expected one; `gantrytau calibrate --example` prints a whole file"
+            )
+    own = read_table(f"{whole}robot", table["robot"], ROBOT, ("model", "tape"))
+    name, values = named(own["model"], file), _values(f"{whole}values", table.get("values", {}))
+    goal = read_table(f"{whole}goal", table["goal"], GOAL, ("error",))
+    model = robot if isinstance(robot, Model) else _found(f"{whole}robot.model", name, robot or robot_by_name)
+    return Cell(
+        file=file,
+        name=name,
+        robot=_with_values(f"{whole}values", model, values),
+        values=values,
+        limits=_limits(f"{whole}limits", table.get("limits", {})),
+        device=_device(f"{whole}device", table["device"]),
+        tape=own["tape"],
+        wanted=goal["error"],
+        poses=goal.get("poses"),
+        plan=read_table(f"{whole}plan", table.get("plan", {}), PLAN),
+        program=_program(f"{whole}program", table.get("program", {})),
+    )
+
+
+def named(model: str, file: Path) -> str:
+    """The name of a model in any folder: files of models lie beside the file of the cell."""
+    python, dot, rest = model.partition(".py")
+    if not dot or Path(python).is_absolute():
+        return model
+    return f"{(file.absolute().parent / python).resolve()}.py{rest}"
+
+
+def robot_by_name(name: str) -> Model:
+    """The model that a file names: `GantryTau(L1)`, `package.module:Robot`, `robot.py:Robot`; ModelError for none."""
+    found = re.fullmatch(r"(?:(?P<place>.+):)?(?P<name>\w+)(?:\((?P<prototype>\w+)\))?", name.strip())
+    try:
+        if found is None:
+            raise ValueError("a name is written as module:Class(prototype)")
+        place, prototype = found["place"] or LIBRARY, found["prototype"]
+        held = runpy.run_path(place) if place.endswith(".py") else vars(importlib.import_module(place))
+        made = held[found["name"]]
+        if isinstance(made, type):
+            made = made(getattr(held["prototypes"], prototype)) if prototype else made()
+    except (ImportError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        raise ModelError(
+            f"found '{name}', which cannot be made ({error}), expected a model; give it itself, robot="
+        ) from error
+    if not isinstance(made, Model):
+        raise ModelError(
+            f"found '{name}', which is no model, expected one, as GantryTau(L1); give it itself, robot="
+        )
+    return made
+
+
+def _found(place: str, name: str, robot: Callable[[str], Model]) -> Model:
+    try:
+        return robot(name)
+    except GantryTauError as error:
+        raise ModelError(f"{place}: {error}") from error
+
+
+def _with_values(place: str, model: Model, values: Mapping[str, Any]) -> Model:
+    for name, value in values.items():
+        try:
+            model = with_setting(model, name, value)
+        except ModelError as error:
+            raise ModelError(f"{place}: {error}") from error
+    return model
+
+
+def _values(place: str, table: Any) -> dict[str, Any]:
+    """Numbers and vectors by the names of parameters; lengths may bring their unit."""
+    if not isinstance(table, Mapping):
+        raise ModelError(f"{place}: found {table!r}, expected a table, [values]")
+    any_value = Value("m,rad", ((), (3,), (4,), (3, 3)))
+    found = {}
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            raise ModelError(
+                f'{at(place, name)}: found a table, expected a number; write the name in quotes, as "arms[0].length" = 2.05'
+            )
+        found[name] = any_value.read(at(place, name), value)
+    return found
+
+
+def _limits(place: str, table: Any) -> Limits:
+    values = read_table(place, table, LIMITS)
+    for name, kinds in (("obstacles", OBSTACLES), ("plate", {"capsule": OBSTACLES["capsule"]})):
+        values[name] = _bodies(f"{place}.{name}", values.get(name, []), kinds)
+    return _made(place, Limits, values)
+
+
+def _bodies(place: str, entries: Any, kinds: Mapping[str, Any]) -> list[Any]:
+    if not isinstance(entries, list):
+        raise ModelError(
+            f"{place}: found {entries!r}, expected a table for each, [[{place.rpartition(': ')[2]}]]"
+        )
+    found = []
+    for k, entry in enumerate(entries):
+        make, values = _of_a_kind(f"{place}[{k}]", entry, kinds)
+        found.append(_made(f"{place}[{k}]", make, values))
+    return found
+
+
+def _program(place: str, table: Any) -> dict[str, Any]:
+    """Options of the robot program, all of which RAPID takes."""
+    values = read_table(place, table, PROGRAM)
+    try:
+        check_program(**values)
+    except ModelError as error:
+        raise ModelError(f"{place.removesuffix('program')}{error}") from error
+    return values
+
+
+def _device(place: str, table: Any) -> Device:
+    make, values = _of_a_kind(place, table, DEVICES)
+    return _made(place, make, values)
+
+
+def _of_a_kind(place: str, table: Any, kinds: Mapping[str, Any]) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """What makes the kind that is named, and what the table says of it; the kind may be left out where there is only one."""
+    if not isinstance(table, Mapping):
+        raise ModelError(f"{place}: found {table!r}, expected a table")
+    kind = Value("text", words=tuple(kinds))
+    first = next(iter(kinds))
+    if "kind" not in table and len(kinds) > 1:
+        raise ModelError(f"{at(place, 'kind')}: found nothing, expected {kind.expected()}")
+    chosen = kind.read(at(place, "kind"), table.get("kind", first))
+    make, keys, needed = kinds[chosen]
+    values = read_table(place, table, {"kind": kind, **keys}, needed)
+    return make, {key: value for key, value in values.items() if key != "kind"}
+
+
+def _made(place: str, make: Callable[..., Any], values: dict[str, Any]) -> Any:
+    """What a class makes of values; its complaint with the place in the file."""
+    try:
+        return make(**values)
+    except ModelError as error:
+        raise ModelError(f"{place}: {error}") from error
