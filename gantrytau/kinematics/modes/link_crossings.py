@@ -18,20 +18,20 @@ PARALLEL = (
 PAIRS = np.array(list(combinations(range(6), 2)))
 
 
-class LinkGeometry(NamedTuple):
+class LinkGaps(NamedTuple):
     """Per mode: pairs of links that cross (k, 15), in the order of PAIRS, and the least distance of two links."""
 
     crossed: np.ndarray
     clearance: np.ndarray
 
 
-def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGeometry:
+def link_geometry(base: np.ndarray, ends: np.ndarray) -> LinkGaps:
     """Links from the base joints (6, 3) to the joints on the platform (k, 6, 3), all in the world, in m.
 
     Pairs that share a joint do not count.
     """
     a, b, u, v, shared, crossed = _pairs(base, ends)
-    return LinkGeometry(crossed, np.where(shared, np.inf, between_segments(a, a + u, b, b + v)).min(1))
+    return LinkGaps(crossed, np.where(shared, np.inf, between_segments(a, a + u, b, b + v)).min(1))
 
 
 def crossings(base: np.ndarray, ends: np.ndarray) -> np.ndarray:

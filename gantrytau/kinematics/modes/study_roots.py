@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gantrytau.kinematics.modes.study_coordinates import orthonormal, quadrics
-from gantrytau.kinematics.modes.study_start import MODES, Start, distinct, start_system, with_study
+from gantrytau.kinematics.modes.study_start import MODES, KnownHexapod, distinct, start_system, with_study
 from gantrytau.kinematics.modes.study_tracking import Homotopy, Paths, polished, regularity, track
 
 TOLERANCES = (1e-3, 1e-5, 1e-6, 1e-6)  # of the prediction, track after track
@@ -68,7 +68,7 @@ def _distinct(z: np.ndarray) -> np.ndarray:
     return z[distinct(z)]
 
 
-def _mixed(target: np.ndarray, start: Start, attempt: int) -> np.ndarray:
+def _mixed(target: np.ndarray, start: KnownHexapod, attempt: int) -> np.ndarray:
     """The target with its links combined: first as near to the start as they get, then at random."""
     links = target[:6].reshape(6, 64)
     if attempt == 0:

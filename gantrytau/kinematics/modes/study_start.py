@@ -22,7 +22,7 @@ SAME = 1e-6  # distance of points of length 1; rounding moves regular roots by l
 _FILE = Path(__file__).with_name("study_start.npz")
 
 
-class Start(NamedTuple):
+class KnownHexapod(NamedTuple):
     """Quadrics (7, 8, 8), the last one Study's, and their roots (40, 8) of length 1."""
 
     forms: np.ndarray
@@ -30,10 +30,10 @@ class Start(NamedTuple):
 
 
 @functools.cache
-def start_system() -> Start:
+def start_system() -> KnownHexapod:
     """The stored start system."""
     with np.load(_FILE) as stored:
-        return Start(stored["forms"], stored["roots"])
+        return KnownHexapod(stored["forms"], stored["roots"])
 
 
 def with_study(forms: np.ndarray) -> np.ndarray:
@@ -47,7 +47,7 @@ def distinct(z: np.ndarray, same: float = SAME) -> np.ndarray:
     return np.logical_not(np.tril(near, -1).any(axis=1))
 
 
-def solve_by_monodromy(seed: int = SEED) -> Start:
+def solve_by_monodromy(seed: int = SEED) -> KnownHexapod:
     """Find a start system anew, from one pose in which a complex hexapod is assembled by construction.
 
     Raises SolveError when loops do not lead to 40 modes.
@@ -65,7 +65,7 @@ def solve_by_monodromy(seed: int = SEED) -> Start:
         both = np.concatenate([roots, found])
         roots = both[distinct(both)]
         if len(roots) >= MODES:
-            return Start(home, roots)
+            return KnownHexapod(home, roots)
     raise SolveError(
         f"solve_by_monodromy: found {len(roots)} modes in {MOST_LOOPS} loops, expected {MODES}; take another seed"
     )
