@@ -12,7 +12,7 @@ from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import all_symbols, translate_flat
+from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -107,11 +107,11 @@ def _blocks(
     dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
 ) -> list[Block] | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
-    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    unknowns = [n for n in dae.symbols if n not in known]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
     wanted = [n for n in wanted if n not in dae.table.symbols and n != dae.flat.time.name()]
     missing = [n for n in wanted if n not in set(unknowns)]
-    pattern = block_pattern(dae.indexed.residuals, unknowns, wanted)
+    pattern = block_pattern(dae.indexed.incidence, unknowns, wanted)
     if pattern.surplus:
         names = "; ".join(dae.equation_name(k) for k in pattern.surplus[:3])
         raise StructureError(
@@ -142,7 +142,7 @@ def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Tran
 
 def _undetermined(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
     """What to give as well: the lowest derivatives that suffice, or the inputs of the model."""
-    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+    unknowns = [n for n in dae.symbols if n not in known]
     driving = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
     text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."
     ways: list[str] = []
@@ -163,9 +163,9 @@ def _sufficient_inputs(dae: Translated, known: dict[str, ca.SX], targets: list[c
 
 def _suffices(dae: Translated, known: Collection[str], targets: list[ca.SX], more: list[str]) -> bool:
     """Whether the targets follow from the known symbols and some more."""
-    unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known and n not in more]
+    unknowns = [n for n in dae.symbols if n not in known and n not in more]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() in unknowns]
-    return not block_pattern(dae.indexed.residuals, unknowns, wanted).undetermined
+    return not block_pattern(dae.indexed.incidence, unknowns, wanted).undetermined
 
 
 def _whole(dae: Translated, scalars: Sequence[str]) -> list[str]:

@@ -19,7 +19,7 @@ from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import all_symbols, retranslate, translate_flat, translate_model
+from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
@@ -127,7 +127,7 @@ def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translat
 
 def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
     """The same system with the derivatives that are asked for among its unknowns."""
-    known = {*all_symbols(dae.indexed, dae.reduced.known), *dae.table.symbols, dae.flat.time.name()}
+    known = {*dae.symbols, *dae.table.symbols, dae.flat.time.name()}
     rows = [n for name in outputs for n in dae.expand(name)]
     if all(leaf.name() in known for n in rows for leaf in ca.symvar(dae.expression(n))):
         return dae
@@ -153,7 +153,7 @@ def _completed(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
     _checked(dae, at)
     found = evaluate(dae, at)
     values = dict(dae.start) | {dae.flat.time.name(): float(at.get(dae.flat.time.name(), 0.0))}
-    return values | {n: float(found[n]) for n in all_symbols(dae.indexed, dae.reduced.known) if n in found}
+    return values | {n: float(found[n]) for n in dae.symbols if n in found}
 
 
 def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
@@ -161,7 +161,7 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
 
     The equations as they were before differentiation are enough: at rest their derivatives hold too.
     """
-    symbols = all_symbols(dae.indexed, dae.reduced.known)
+    symbols = dae.symbols
     values = dict(dae.start)
     values.update((n, 0.0) for n in symbols if split_derivative(n)[1])
     held = _hold(dae, _checked(dae, at), values)
@@ -216,7 +216,7 @@ class _Slopes:
         self.dae, self.values = dae, values
         states = set(dae.choice.states)
         chains = dae.reduced.chains
-        symbols = all_symbols(dae.indexed, dae.reduced.known)
+        symbols = dae.symbols
         self.inner = [n for n in dae.indexed.unknown_symbols() if n not in states]
         self.driving = [
             n for n in symbols if split_derivative(n)[0] in dae.reduced.known and n not in dae.known

@@ -5,7 +5,7 @@ Pantelides' algorithm (SIAM J. Sci. Stat. Comput. 9, 1988) and also gives the st
 consistent values are found: positions, then velocities, then accelerations and forces.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.matching import best_matching
+from gantrytau.compiler.dulmage_mendelsohn import largest_sum
 from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.consistency import Level
 from gantrytau.flattening.flat_model import FlatModel
@@ -34,6 +34,18 @@ class Indexed:
     names: tuple[str, ...]
     counts: tuple[int, ...]
     orders: Mapping[str, int]
+
+    @cached_property
+    def incidence(self) -> Mapping[Key, tuple[str, ...]]:
+        """Names of the symbols in each equation."""
+        return {k: tuple(leaf.name() for leaf in ca.symvar(r)) for k, r in self.residuals.items()}
+
+    def symbols(self, known: Collection[str]) -> list[str]:
+        """Unknowns with their derivatives, and the known variables with the derivatives that occur."""
+        names = dict.fromkeys((*self.unknown_symbols(), *known))
+        leaves = dict.fromkeys(n for row in self.incidence.values() for n in row)
+        names.update(dict.fromkeys(n for n in leaves if split_derivative(n)[0] in known))
+        return list(names)
 
     @property
     def structural_index(self) -> int:
@@ -97,7 +109,7 @@ def _signature(reduced: Reduced) -> list[dict[int, int]]:
 
 def _offsets(reduced: Reduced, signature: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):
     n = len(signature)
-    matched = best_matching(signature)
+    matched = largest_sum(signature)
     if matched is None:
         raise unbalanced(reduced, signature, flat)
     counts = np.zeros(n, dtype=int)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.matching import largest_matching
+from gantrytau.compiler.dulmage_mendelsohn import decompose
 from gantrytau.errors import InitializationError, ModelError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
@@ -14,20 +14,17 @@ from gantrytau.language.symbols import split_derivative
 
 def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel) -> StructureError:
     """Which unknowns stay undetermined, and which equations are too many."""
-    of_row = largest_matching(signature, len(reduced.unknowns))
-    of_column = {int(j): i for i, j in enumerate(of_row) if j >= 0}
-    free = [j for j in range(len(reduced.unknowns)) if j not in of_column]
-    extra = [i for i in range(len(signature)) if of_row[i] < 0]
+    found = decompose(signature, len(reduced.unknowns))
     n, m = (
         sum(len(v.elements) for v in flat.variables) - len(reduced.known),
         len(flat.equations) - len(reduced.redundant),
     )
     text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
-    if free:
-        reached = {reduced.unknowns[j]: j in free for j in _reach_columns(free, signature, of_column)}
-        text += _undetermined(reached, len(free), reduced, flat)
-    if extra:
-        text += _overdetermined(sorted(_reach_rows(extra, signature, of_row)), len(extra), reduced, signature)
+    if found.free:
+        reached = {reduced.unknowns[j]: j in found.free for j in found.undetermined}
+        text += _undetermined(reached, len(found.free), reduced, flat)
+    if found.surplus:
+        text += _overdetermined(found.overdetermined, len(found.surplus), reduced, signature)
     return StructureError(text)
 
 
@@ -49,7 +46,9 @@ def _undetermined(reached: Mapping[str, bool], count: int, reduced: Reduced, fla
     )
 
 
-def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: list[dict[int, int]]) -> str:
+def _overdetermined(
+    rows: Sequence[int], count: int, reduced: Reduced, signature: list[dict[int, int]]
+) -> str:
     lines = []
     for i in rows[:4]:
         found = "" if signature[i] else ", whose variables all follow from other equations"
@@ -60,30 +59,6 @@ def _overdetermined(rows: list[int], count: int, reduced: Reduced, signature: li
         f"{'; '.join(lines)}{more}. "
         "Remove one of them, or let one more variable be unknown."
     )
-
-
-def _reach_columns(
-    start: list[int], signature: list[dict[int, int]], of_column: Mapping[int, int]
-) -> set[int]:
-    row_of = {i: j for j, i in of_column.items()}
-    reached, queue = set(start), list(start)
-    for j in queue:
-        for i, row in enumerate(signature):
-            if j in row and i in row_of and row_of[i] not in reached:
-                reached.add(row_of[i])
-                queue.append(row_of[i])
-    return reached
-
-
-def _reach_rows(start: list[int], signature: list[dict[int, int]], of_row) -> set[int]:
-    row_of = {int(j): i for i, j in enumerate(of_row) if j >= 0}
-    reached, queue = set(start), list(start)
-    for i in queue:
-        for j in signature[i]:
-            if j in row_of and row_of[j] not in reached:
-                reached.add(row_of[j])
-                queue.append(row_of[j])
-    return reached
 
 
 def undetermined(

@@ -126,6 +126,11 @@ class Translated:
             for block in self.blocks
         )
 
+    @cached_property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of all reduced symbols but parameters and time: unknowns and what is known, with their derivatives."""
+        return tuple(self.indexed.symbols(self.reduced.known))
+
     @property
     def mobility(self) -> int:
         """Number of ways in which the positions can change."""

@@ -89,7 +89,7 @@ def _translated(
     wanted = _wanted_derivatives(flat, request.find)
     indexed = reduce_index(reduced, flat, wanted)
     _refuse_differentiated(flat, reduced, indexed, wanted)
-    asked = start_values(flat, reduced, all_symbols(indexed, reduced.known))
+    asked = start_values(flat, reduced, indexed.symbols(reduced.known))
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in asked.values}
     asked = replace(asked, values={**asked.values, **better})
     try:
@@ -99,7 +99,7 @@ def _translated(
     states = [_state_name(reduced, n) for name in request.states for n in flat.expand(name)]
     choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), states, flat.name)
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
-    pattern = block_pattern(indexed.residuals, unknowns)
+    pattern = block_pattern(indexed.incidence, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
     guide = Guide(sample, table.values, choice.states)
     blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
@@ -125,17 +125,6 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
 def retranslate(dae: Translated, flat: FlatModel) -> Translated:
     """The same translation of a flat model with other parameter values."""
     return translate_flat(flat, dae.request)
-
-
-def all_symbols(indexed: Indexed, known: frozenset[str]) -> list[str]:
-    """Unknowns with their derivatives, and the known variables with the derivatives that occur."""
-    names = dict.fromkeys(indexed.unknown_symbols())
-    names.update(dict.fromkeys(known))
-    for residual in indexed.residuals.values():
-        for leaf in ca.symvar(residual):
-            if split_derivative(leaf.name())[0] in known:
-                names[leaf.name()] = None
-    return list(names)
 
 
 def _state_name(reduced: Reduced, name: str) -> str:
@@ -174,9 +163,8 @@ def _refuse_differentiated(
         return
     where = [(a.root, a.order, n) for n, a in reduced.aliases.items()]
     where += [(*split_derivative(n), f"wanted {n}") for n in wanted]
-    for (i, _), residual in indexed.residuals.items():
-        leaves = [split_derivative(leaf.name()) for leaf in ca.symvar(residual)]
-        where += [(base, order, reduced.equations[i].name) for base, order in leaves]
+    for (i, _), row in indexed.incidence.items():
+        where += [(*split_derivative(n), reduced.equations[i].name) for n in row]
     for name, order, place in where:
         if name in events and order:
             what = "sampled" if any(s.name == name for s in flat.sampled) else "friction that sticks"

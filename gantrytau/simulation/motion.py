@@ -103,7 +103,8 @@ def _highest_blocks(
     for block in dae.blocks:
         if not highest.keys() & set(block.unknowns):
             block.enter(guide)
-    return solve_blocks(block_pattern(last, highest).blocks, last, highest, guide)
+    incidence = {key: dae.indexed.incidence[key] for key in last}
+    return solve_blocks(block_pattern(incidence, highest).blocks, last, highest, guide)
 
 
 def _constraints(dae: Translated, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:
@@ -142,8 +143,8 @@ def _known_symbols(
 ) -> dict[str, ca.SX]:
     """Inputs and those of their derivatives that occur, as expressions of time and samples."""
     sampled_at = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
-    used = [sampled_at, *dae.indexed.residuals.values()]
-    occurring = {leaf.name() for expression in used for leaf in ca.symvar(expression)}
+    occurring = {leaf.name() for leaf in ca.symvar(sampled_at)}
+    occurring |= {n for row in dae.indexed.incidence.values() for n in row}
     for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
         alias = dae.root(asked)
         if alias is not None and alias.root in dae.known:

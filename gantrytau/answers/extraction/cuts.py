@@ -11,13 +11,12 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
-from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.compiler.alphabets import Substitution, column, values_at
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, solve_blocks
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
-from gantrytau.compiler.translation import all_symbols
 from gantrytau.errors import StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -138,13 +137,14 @@ class Strata:
         """The blocks from `kinds` to `find`, or to the equations left over; `why`: opens the error if there is no way."""
         known, twins = self._known(kinds)
         residuals = self.dae.indexed.residuals
-        unknowns = [n for n in all_symbols(self.dae.indexed, self.dae.reduced.known) if n not in known]
+        unknowns = [n for n in self.dae.symbols if n not in known]
         left = self._left(unknowns)
         wanted = [self.dae.expression(n) for n in self.names(find)] if find else []
         wanted += [residuals[k] for k in left] if not find else []
         symbols = {s.name() for e in wanted for s in ca.symvar(e)} & set(unknowns)
         rest = {k: residuals[k] for k in sorted(residuals) if k not in left}
-        pattern = block_pattern(rest, unknowns, sorted(symbols))
+        incidence = self.dae.indexed.incidence
+        pattern = block_pattern({k: incidence[k] for k in rest}, unknowns, sorted(symbols))
         if pattern.undetermined:
             raise StructureError(
                 f"{self.dae.name}: {why or 'the equations left over have unknowns'}. Undetermined: "
@@ -161,27 +161,23 @@ class Strata:
         """Rates that the motion of the tool determines without any force, and that occur in the balance of forces."""
         dae = self.dae
         known, _ = self._known(FOLLOWS)
-        unknowns = [n for n in all_symbols(dae.indexed, dae.reduced.known) if n not in known]
+        unknowns = [n for n in dae.symbols if n not in known]
         left = self._left(unknowns)
-        motion = {
-            k: r for k, r in dae.indexed.residuals.items() if dae.indexed.counts[k[0]] and k not in left
-        }
+        incidence, counts = dae.indexed.incidence, dae.indexed.counts
+        motion = {k: row for k, row in incidence.items() if counts[k[0]] and k not in left}
         found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
-        forces = [r for k, r in dae.indexed.residuals.items() if not dae.indexed.counts[k[0]]]
-        needed = {s.name() for s in ca.symvar(column(forces))} - set(self._known(EVERYTHING)[0])
+        forces = {n for k, row in incidence.items() if not counts[k[0]] for n in row}
+        needed = forces - set(self._known(EVERYTHING)[0])
         return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
 
     def _left(self, unknowns: Sequence[str]) -> tuple[Key, ...]:
         """Equations that are not needed to find the unknowns: constraints first, then those far from the forces."""
         residuals, dae = self.dae.indexed.residuals, self.dae
         keys = sorted(residuals)
-        leaves = list(dict.fromkeys(s.name() for r in residuals.values() for s in ca.symvar(r)))
-        symbols = ca.vertcat(*{s.name(): s for r in residuals.values() for s in ca.symvar(r)}.values())
-        slopes = ca.jacobian(column([residuals[k] for k in keys]), symbols)
-        numbers = ca.Function("slopes", [symbols], [ca.densify(slopes)])(
-            ca.DM([dae.start[n] for n in leaves])
-        )
-        matrix = np.array(numbers).reshape(len(keys), len(leaves))
+        whole = column([residuals[k] for k in keys])
+        symbols = ca.symvar(whole)
+        leaves = [s.name() for s in symbols]
+        matrix = values_at(ca.jacobian(whole, column(symbols)), dae.start)
         last = max(self.distance.values()) + 1
         first, counts = -1 - max(dae.indexed.counts), dae.indexed.counts
         # positions, speeds and accelerations are found from what was differentiated; forces must not help out
@@ -208,7 +204,7 @@ class Strata:
                 else:
                     known[symbol] = value
         inputs = [n for n in dae.known if n not in known]
-        for symbol in all_symbols(dae.indexed, dae.reduced.known):
+        for symbol in dae.symbols:
             base, order = split_derivative(symbol)
             if base in inputs and base not in {dae.reduced.aliases[n].root for n in self.roles["T"]}:
                 known[symbol] = ca.SX(dae.start[symbol] if order == 0 else 0.0)
@@ -219,10 +215,7 @@ class Strata:
         known, _ = self._known(EVERYTHING)
         forces = {s for s in self._known(["f"])[0] if split_derivative(s)[0] not in self.dae.known}
         found: dict[Key, int] = {}
-        rows = {
-            k: {s.name() for s in ca.symvar(r)} - (known.keys() - forces)
-            for k, r in self.dae.indexed.residuals.items()
-        }
+        rows = {k: set(row) - (known.keys() - forces) for k, row in self.dae.indexed.incidence.items()}
         reached, level = set(forces), 0
         while front := [k for k, row in rows.items() if k not in found and row & reached]:
             found.update(dict.fromkeys(front, level))

@@ -1,4 +1,4 @@
-"""Matching, blocks, tearing and elimination on random systems with known solutions."""
+"""Pairings, blocks, tearing and elimination on random systems with known solutions."""
 
 import itertools
 
@@ -11,14 +11,20 @@ from hypothesis import strategies as st
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import solve_blocks
-from gantrytau.compiler.matching import best_matching, largest_matching, strong_components
+from gantrytau.compiler.dulmage_mendelsohn import decompose, largest_sum
+
+
+def incidence_of(residuals):
+    """Names of the symbols in each equation."""
+    return {key: [leaf.name() for leaf in ca.symvar(residual)] for key, residual in residuals.items()}
+
 
 FIXED = settings(derandomize=True, deadline=None, max_examples=60)
 
 
 @FIXED
 @given(st.integers(1, 5), st.integers(0, 2**32 - 1), st.floats(0.2, 1.0))
-def test_best_matching_has_the_largest_sum_of_all(n, seed, density):
+def test_largest_sum_is_that_of_the_best_pairing(n, seed, density):
     random = np.random.default_rng(seed)
     rows = [{j: int(random.integers(0, 3)) for j in range(n) if random.random() < density} for _ in range(n)]
     sums = [
@@ -26,10 +32,10 @@ def test_best_matching_has_the_largest_sum_of_all(n, seed, density):
         for order in itertools.permutations(range(n))
         if all(j in row for row, j in zip(rows, order, strict=True))
     ]
-    matched = best_matching(rows)
+    matched = largest_sum(rows)
     if matched is None:
         assert not sums
-        assert -1 in largest_matching(rows, n)
+        assert decompose(rows, n).surplus
     else:
         assert sorted(matched) == list(range(n))
         assert sum(row[j] for row, j in zip(rows, matched, strict=True)) == max(sums)
@@ -37,19 +43,39 @@ def test_best_matching_has_the_largest_sum_of_all(n, seed, density):
 
 @FIXED
 @given(st.integers(1, 8), st.integers(0, 2**32 - 1))
-def test_strong_components_are_mutually_reachable_and_in_order(n, seed):
+def test_blocks_are_mutually_reachable_and_in_order(n, seed):
     random = np.random.default_rng(seed)
     graph = [[j for j in range(n) if j != i and random.random() < 0.25] for i in range(n)]
     reach = (
         np.linalg.matrix_power(np.eye(n) + np.array([[j in row for j in range(n)] for row in graph]), n) > 0
     )
-    found = strong_components(graph)
-    assert sorted(itertools.chain(*found)) == list(range(n))
-    place = {i: k for k, component in enumerate(found) for i in component}
+    names = [f"x{i}" for i in range(n)]
+    incidence = {(i, 0): [names[j] for j in (i, *row)] for i, row in enumerate(graph)}
+    pattern = block_pattern(incidence, names)
+    assert sorted(i for equations, _ in pattern.blocks for i, _ in equations) == list(range(n))
+    assert all([names[i] for i, _ in equations] == list(unknowns) for equations, unknowns in pattern.blocks)
+    place = {i: k for k, (equations, _) in enumerate(pattern.blocks) for i, _ in equations}
     for i, j in itertools.product(range(n), repeat=2):
         assert (place[i] == place[j]) == (reach[i, j] and reach[j, i])
         if reach[i, j]:
             assert place[j] <= place[i]
+    wanted = block_pattern(incidence, names, [names[0]])
+    assert {i for equations, _ in wanted.blocks for i, _ in equations} == set(np.flatnonzero(reach[0]))
+
+
+@FIXED
+@given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 2**32 - 1), st.floats(0.1, 0.6))
+def test_decomposition_counts_what_a_random_matrix_leaves_free(n, m, seed, density):
+    random = np.random.default_rng(seed)
+    pattern = random.random((n, m)) < density
+    rank = np.linalg.matrix_rank(
+        pattern * random.uniform(1, 2, (n, m))
+    )  # generic numbers: the structural rank
+    found = decompose([np.flatnonzero(row).tolist() for row in pattern], m)
+    assert (len(found.surplus), len(found.free)) == (n - rank, m - rank)
+    for column in range(m):  # a column is undetermined if the others alone have the same rank
+        rest = np.delete(pattern, column, axis=1) * random.uniform(1, 2, (n, m - 1))
+        assert (column in found.undetermined) == (np.linalg.matrix_rank(rest) == rank)
 
 
 @FIXED
@@ -68,7 +94,7 @@ def test_sparse_linear_systems_are_solved_to_their_condition(n, seed, density):
         for i in range(n)
     }
     symbols = {s.name(): s for s in x}
-    pattern = block_pattern(residuals, symbols)
+    pattern = block_pattern(incidence_of(residuals), symbols)
     assert not pattern.undetermined
     assert not pattern.surplus
     start = {**dict.fromkeys(symbols, 0.0), "u": 1.0}
@@ -86,11 +112,11 @@ def test_sparse_linear_systems_are_solved_to_their_condition(n, seed, density):
 def test_undetermined_and_surplus_parts_are_told_apart():
     a, b, c, d = (ca.SX.sym(n) for n in "abcd")
     residuals = {(0, 0): a - 1, (1, 0): a + 2, (2, 0): b + c, (3, 0): d * d - 4}
-    pattern = block_pattern(residuals, "abcd")
+    pattern = block_pattern(incidence_of(residuals), "abcd")
     assert set(pattern.undetermined) == {"b", "c"}
     assert len(pattern.surplus) == 1
     assert pattern.surplus[0] in {(0, 0), (1, 0)}
-    wanted = block_pattern(residuals, "abcd", ["d"])
+    wanted = block_pattern(incidence_of(residuals), "abcd", ["d"])
     assert [unknowns for _, unknowns in wanted.blocks] == [("d",)]
 
 
