@@ -6,12 +6,10 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
-from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.pattern import block_pattern
-from gantrytau.compiler.blocks.pivots import Guide
-from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.request import Request, names
-from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translated import Translated, solved
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -105,7 +103,7 @@ def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) ->
 
 def _blocks(
     dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
-) -> list[Block] | None:
+) -> SolvedBlocks | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
     unknowns = [n for n in dae.symbols if n not in known]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
@@ -120,9 +118,7 @@ def _blocks(
         )
     if missing or pattern.undetermined:
         return None
-    symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
-    guide = Guide(dae.start, dae.table.values, dae.choice.states)
-    return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)
+    return solved(dae, pattern)
 
 
 def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Translated:
@@ -181,7 +177,7 @@ def _whole(dae: Translated, scalars: Sequence[str]) -> list[str]:
     return list(left)
 
 
-def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> ca.Function:
+def _compose(dae, blocks: SolvedBlocks, known, targets, given, find, columns) -> ca.Function:
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
     definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
     definitions += [
@@ -195,11 +191,9 @@ def _compose(dae, blocks: list[Block], known, targets, given, find, columns) -> 
         )
         for n, e in known.items()
     ]
-    implicit = [block for block in blocks if block.solution is None]
-    for block in blocks:
-        definitions += block.definitions
+    implicit = blocks.implicit
     expressions = [*(ca.vertcat(*b.residuals) for b in implicit), *targets]
-    expressions = Substitution(tuple(definitions)).inserted(expressions)
+    expressions = blocks.after(definitions).inserted(expressions)
     arguments = [ca.vertcat(*column) for column in columns]
     names_in = _legal(given, "i")
     names_out = _legal(find, "o", names_in)

@@ -8,7 +8,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
-from gantrytau.compiler.blocks.solution import Block
+from gantrytau.compiler.blocks.pattern import Pattern
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, Key
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.request import Request
@@ -210,3 +212,10 @@ class Translated:
         index, times = key
         name = self.reduced.equations[index].name
         return name if times == 0 else f"{name}, differentiated {'once' if times == 1 else f'{times} times'}"
+
+
+def solved(dae: Translated, pattern: Pattern) -> SolvedBlocks:
+    """Blocks of its equations, solved in the order of a pattern."""
+    symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
+    guide = Guide(dae.start, dae.parameter_values, dae.choice.states)
+    return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)

@@ -102,7 +102,7 @@ def _translated(
     pattern = block_pattern(indexed.incidence, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
     guide = Guide(sample, table.values, choice.states)
-    blocks = tuple(solve_blocks(pattern.blocks, indexed.residuals, by_name, guide))
+    blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
     refuse_undetermined(blocks, indexed, reduced, sample, flat)
     return Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant

@@ -8,19 +8,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
-from gantrytau.simulation.conditioning import Conditioning
+from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
 OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
-
-Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, time, sampled inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,7 @@ class Coordinates:
 
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
-    inputs, their slopes, values of the held variables); definitions: all symbols in terms of (t, x, z, w);
+    inputs, their slopes, values of the held variables); substitution: all symbols in terms of (t, x, z, w);
     renewed: what the held variables become at an instant.
     """
 
@@ -48,7 +47,7 @@ class Coordinates:
     invariants: tuple[ca.SX, ...]
     rows: tuple[tuple[str, ...], ...]
     known: Mapping[str, ca.SX]
-    definitions: tuple[tuple[ca.SX, ca.SX], ...]
+    substitution: Substitution
     pivots: ca.SX
     dropped: ca.Function
     renewed: ca.Function

@@ -11,11 +11,10 @@ import numpy as np
 from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
-from gantrytau.simulation.conditioning import Look
-from gantrytau.simulation.full_coordinates import Coordinates, Point
+from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.instants_on_mesh import instants
 from gantrytau.simulation.signals import Samples, Signal
-from gantrytau.simulation.singular_poses import Approach, approach, doubtful
+from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
 
 CHUNK = 10  # output intervals between two projections onto the constraints
 LEAST_STEPS = 500  # of the mesh on which singular poses are looked for, however few points are asked for

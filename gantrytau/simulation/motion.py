@@ -4,18 +4,18 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
-from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_blocks
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
-from gantrytau.simulation.conditioning import Conditioning
 from gantrytau.simulation.dependents import definitions_of, dependents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import Samples, Signal
+from gantrytau.simulation.singular_poses import Conditioning
 
 
 def all_coordinates(
@@ -31,40 +31,34 @@ def all_coordinates(
     states = _states(dae, {name for _, name in given})
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
     last = {(i, c): dae.indexed.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
-    blocks = _highest_blocks(dae, states, last, highest)
+    solved = _highest_blocks(dae, states, last, highest)
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
     known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
     definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions += [(chains.named(n), e) for n, e in known.items()]
     definitions += definitions_of(dae, given)
-    definitions += [pair for block in blocks for pair in block.definitions]
-    implicit = [b for b in blocks if b.solution is None]
-    tears = [y for b in implicit for y in b.tears]
-    matrices = [
-        ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears))
-        for b in blocks
-        if len(b.unknowns) > 1 and b.tears
-    ]
+    substitution = solved.after(definitions)
+    matrices = _matrices(solved)
     levels, rows = _invariants(dae, {i for i, _ in given})
     wanted = [
         column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
-        column([r for b in implicit for r in b.residuals]),
+        column(solved.residuals),
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
         dae.to_reduced(column([e.residual for e in dae.redundant])),
         dae.to_reduced(column([s.expression for s in dae.flat.sampled])),
         *matrices,
         *levels,
     ]
-    ode, algebraic, pivots, dropped, renewed, *rest = Substitution(tuple(definitions)).inserted(wanted)
+    ode, algebraic, pivots, dropped, renewed, *rest = substitution.inserted(wanted)
     matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
-    divisors = [pivots[row_of[key], column_of[name]] for b in blocks for key, name in b.pairs]
-    x, z = column([chains.named(n) for n in states]), column(tears)
+    divisors = [pivots[row_of[key], column_of[name]] for b in solved.blocks for key, name in b.pairs]
+    x, z = column([chains.named(n) for n in states]), column(solved.tears)
     constraints = _constraints(dae, invariants, states)
     return Coordinates(
         dae=dae,
         states=states,
-        algebraics=tuple(y.name() for y in tears),
+        algebraics=tuple(y.name() for y in solved.tears),
         sampled=sampled,
         held=held,
         x=x,
@@ -76,7 +70,7 @@ def all_coordinates(
         invariants=tuple(invariants),
         rows=tuple(rows),
         known=known,
-        definitions=tuple(definitions),
+        substitution=substitution,
         pivots=pivots,
         dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
         renewed=ca.Function("renewed", [x, z, time, t0, w], [ca.densify(renewed)], {"cse": True}),
@@ -97,7 +91,7 @@ def _states(dae: Translated, follow: Collection[str]) -> tuple[str, ...]:
 
 def _highest_blocks(
     dae: Translated, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
-) -> list[Block]:
+) -> SolvedBlocks:
     """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
     guide = Guide(dae.start, dae.table.values, states)
     for block in dae.blocks:
@@ -105,6 +99,12 @@ def _highest_blocks(
             block.enter(guide)
     incidence = {key: dae.indexed.incidence[key] for key in last}
     return solve_blocks(block_pattern(incidence, highest).blocks, last, highest, guide)
+
+
+def _matrices(solved: SolvedBlocks) -> list[ca.SX]:
+    """What has to be regular, so that blocks of several unknowns determine them."""
+    several = [b for b in solved.blocks if len(b.unknowns) > 1 and b.tears]
+    return [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in several]
 
 
 def _constraints(dae: Translated, invariants: list[ca.SX], states: Sequence[str]) -> tuple[ca.SX, list[int]]:

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.language.units import dimension, unit_text
@@ -30,7 +29,7 @@ def result_of(
     w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
-    (found,) = Substitution(coordinates.definitions).inserted([expressions])
+    (found,) = coordinates.substitution.inserted([expressions])
     found = ca.substitute(found, coordinates.t0, time)
     function = ca.Function(
         "variables", [time, coordinates.x, coordinates.z, coordinates.w], [ca.densify(found)]

@@ -11,12 +11,11 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
-from gantrytau.compiler.alphabets import Substitution, column, values_at
+from gantrytau.compiler.alphabets import column, values_at
 from gantrytau.compiler.blocks.pattern import block_pattern
-from gantrytau.compiler.blocks.pivots import Guide
-from gantrytau.compiler.blocks.solution import Block, solve_blocks
+from gantrytau.compiler.blocks.solution import Block, SolvedBlocks
 from gantrytau.compiler.index_reduction import Key
-from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.translated import Translated, solved
 from gantrytau.errors import StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -45,22 +44,20 @@ class Cut:
     strata: "Strata"
     kinds: tuple[str, ...]
     known: Mapping[str, ca.SX]
-    blocks: tuple[Block, ...]
+    blocks: SolvedBlocks
     left: tuple[Key, ...]
     twins: tuple[ca.SX, ...]
 
     @property
     def implicit(self) -> tuple[Block, ...]:
         """The blocks without closed form."""
-        return tuple(b for b in self.blocks if b.solution is None)
+        return self.blocks.implicit
 
     def in_known(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """The residuals of blocks without closed form, then the expressions, in what is known and what these blocks find."""
         dae = self.strata.dae
-        definitions = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
-        definitions += [d for block in self.blocks for d in block.definitions]
-        found = [*(r for b in self.implicit for r in b.residuals), *expressions]
-        (whole,) = Substitution(tuple(definitions)).inserted([column(found)])
+        known = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
+        (whole,) = self.blocks.after(known).inserted([column([*self.blocks.residuals, *expressions])])
         found = ca.densify(whole).elements()
         if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
             raise StructureError(
@@ -142,20 +139,16 @@ class Strata:
         wanted = [self.dae.expression(n) for n in self.names(find)] if find else []
         wanted += [residuals[k] for k in left] if not find else []
         symbols = {s.name() for e in wanted for s in ca.symvar(e)} & set(unknowns)
-        rest = {k: residuals[k] for k in sorted(residuals) if k not in left}
         incidence = self.dae.indexed.incidence
-        pattern = block_pattern({k: incidence[k] for k in rest}, unknowns, sorted(symbols))
+        rest = {k: incidence[k] for k in sorted(incidence) if k not in left}
+        pattern = block_pattern(rest, unknowns, sorted(symbols))
         if pattern.undetermined:
             raise StructureError(
                 f"{self.dae.name}: {why or 'the equations left over have unknowns'}. Undetermined: "
                 f"{', '.join(pattern.undetermined[:5])}. Expected tool, joints and forces that together describe the whole "
                 "mechanism: name others"
             )
-        by_name = {n: self.dae.reduced.chains.named(n) for _, found in pattern.blocks for n in found}
-        guide = Guide(self.dae.start, self.dae.table.values, self.dae.choice.states)
-        return Cut(
-            self, tuple(kinds), known, tuple(solve_blocks(pattern.blocks, rest, by_name, guide)), left, twins
-        )
+        return Cut(self, tuple(kinds), known, solved(self.dae, pattern), left, twins)
 
     def _passive(self) -> tuple[str, ...]:
         """Rates that the motion of the tool determines without any force, and that occur in the balance of forces."""

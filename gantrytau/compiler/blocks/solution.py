@@ -3,8 +3,9 @@
 Numbers guide the symbolic choices: pivots are accepted by their values at sample points.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -61,19 +62,45 @@ class Block:
         guide.partners.update({equation: partners.get(equation, "") for equation, _ in self.equations})
 
 
+@dataclass(frozen=True, eq=False)
+class SolvedBlocks:
+    """Blocks in the order of their solution, put together."""
+
+    blocks: tuple[Block, ...]
+
+    @cached_property
+    def implicit(self) -> tuple[Block, ...]:
+        """Those without closed form."""
+        return tuple(b for b in self.blocks if b.solution is None)
+
+    @property
+    def tears(self) -> list[ca.SX]:
+        """What is left to be found, by iteration or as an algebraic variable."""
+        return [y for b in self.implicit for y in b.tears]
+
+    @property
+    def residuals(self) -> list[ca.SX]:
+        """The equations that are left for it."""
+        return [r for b in self.implicit for r in b.residuals]
+
+    def after(self, known: Iterable[tuple[ca.SX, ca.SX]]) -> Substitution:
+        """All symbols in terms of what `known` is written in, and of the tears that are left."""
+        return Substitution((*known, *(pair for b in self.blocks for pair in b.definitions)))
+
+
 def solve_blocks(
     pattern: Sequence[tuple[tuple[Key, ...], tuple[str, ...]]],
     residuals: Mapping[Key, ca.SX],
     symbols: Mapping[str, ca.SX],
     guide: Guide,
-) -> list[Block]:
+) -> SolvedBlocks:
     """The solutions of blocks, given as (equations, unknowns) in the order of their solution."""
     found: list[Block] = []
     for equations, unknowns in pattern:
         block = solve_block(equations, unknowns, residuals, symbols, guide)
         block.enter(guide)
         found.append(block)
-    return found
+    return SolvedBlocks(tuple(found))
 
 
 def solve_block(

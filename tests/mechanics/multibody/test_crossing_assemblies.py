@@ -8,9 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gantrytau import SolveError, Start, simulate, translate
-from gantrytau.simulation.conditioning import Look
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.singular_poses import approach, doubtful
+from gantrytau.simulation.singular_poses import Look, approach, doubtful
 from gantrytau_models import FourBar
 
 POINTS = (51, 101, 251, 252, 333, 1001, 2001)
