@@ -62,36 +62,27 @@ class Policy:
     progress: Progress | None = None
 
     def __post_init__(self):
-        self._expect(
-            "tolerance",
-            isinstance(self.tolerance, float) and 0 < self.tolerance < 1,
-            "a number between 0 and 1",
-        )
-        self._expect("max_iterations", _whole(self.max_iterations), "a whole number of at least 1")
-        seconds = isinstance(self.max_time, (int, float)) and self.max_time > 0
-        self._expect("max_time", seconds, "seconds above 0")
-        told = self.progress is None or callable(self.progress)
-        self._expect("progress", told, "a function of (iteration, objective)")
-        accuracy = self.refine is None or (isinstance(self.refine, float) and 1e-9 <= self.refine < 1)
-        self._expect("refine", accuracy, "a relative accuracy from 1e-9 to below 1, as 1e-6")
-        self._expect("starts", _whole(self.starts), "a whole number of at least 1")
-        known = self.lengths in ("given", "free")
-        self._expect("lengths", known, "'given' or 'free' (the optimiser places the borders of the elements)")
+        accuracy, told = self.refine, self.progress
+        for name, holds, expected in (
+            ("tolerance", isinstance(self.tolerance, float) and 0 < self.tolerance < 1, "a number between 0 and 1"),
+            ("max_iterations", _whole(self.max_iterations), "a whole number of at least 1"),
+            ("max_time", isinstance(self.max_time, (int, float)) and self.max_time > 0, "seconds above 0"),
+            ("progress", told is None or callable(told), "a function of (iteration, objective)"),
+            ("refine", accuracy is None or (isinstance(accuracy, float) and 1e-9 <= accuracy < 1),
+             "a relative accuracy from 1e-9 to below 1, as 1e-6"),
+            ("starts", _whole(self.starts), "a whole number of at least 1"),
+            ("lengths", self.lengths in ("given", "free"),
+             "'given' or 'free' (the optimiser places the borders of the elements)"),
+        ):  # fmt: skip
+            if not holds:
+                raise ModelError(f"{name}={getattr(self, name)!r}: expected {expected}", argument=name)
         if self.shooting and self.refine is not None:
-            raise ModelError(
-                "refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'",
-                argument="refine",
-            )
+            said = "refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'"
+            raise ModelError(said, argument="refine")
         if self.collocation.points.size == 1 and self._ramps:
-            raise ModelError(
-                "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points",
-                argument="points",
-            )
+            said = "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points"
+            raise ModelError(said, argument="points")
         self.mesh  # noqa: B018 - refuses what is no mesh
-
-    def _expect(self, name: str, holds: bool, expected: str) -> None:
-        if not holds:
-            raise ModelError(f"{name}={getattr(self, name)!r}: expected {expected}", argument=name)
 
     @property
     def shooting(self) -> bool:

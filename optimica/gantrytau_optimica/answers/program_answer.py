@@ -62,11 +62,15 @@ class ProgramAnswer(Answer):
         return self.solution.solve_time
 
     @property
+    def numbers(self) -> dict[str, float]:
+        """The free and the held numbers by name."""
+        values = self.solution.w[self.program.places.free].tolist()
+        return dict(zip((n.name for n in self.program.problem.free), values, strict=True))
+
+    @property
     def free(self) -> dict[str, float]:
         """The free numbers by name."""
-        numbers = self.program.problem.free
-        values = self.solution.w[self.program.places.free].tolist()
-        return {n.name: value for n, value in zip(numbers, values, strict=True) if not n.held}
+        return {n.name: self.numbers[n.name] for n in self.program.problem.free if not n.held}
 
     @cached_property
     def parameters(self) -> dict[str, float]:

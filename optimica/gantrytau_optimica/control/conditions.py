@@ -9,7 +9,6 @@ import numpy as np
 from gantrytau import Dae, ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import Course, Phase, SampleSum
-from gantrytau_optimica.control.guesses import derivative_symbol
 from gantrytau_optimica.problem.optimization import Point, Target
 from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, LinkedPaths, SymbolicProblem
@@ -85,8 +84,8 @@ def _jumping(read: SymbolicProblem, link: LinkedPaths) -> set[str]:
 
 
 def _key(dae: Dae, name: str) -> str:
-    symbol = derivative_symbol(dae, name)
-    return name if symbol is None else symbol[0]
+    alias = dae.root(name)
+    return (alias and alias.symbol) or name
 
 
 def with_targets(

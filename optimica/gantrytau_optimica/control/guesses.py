@@ -99,11 +99,11 @@ def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> 
         if elements[0] in dae.parameter_symbols:
             continue
         for k, element in enumerate(elements):
-            target = derivative_symbol(dae, element)
-            if target is None:
+            alias = dae.root(element)
+            if alias is None or alias.root is None:
                 continue
-            symbol, factor, offset = target
-            found[symbol] = _one(name, value, k, len(elements), factor, offset, horizon[0], span)
+            offset = dae.number(alias.offset)
+            found[alias.symbol] = _one(name, value, k, len(elements), alias.factor, offset, horizon[0], span)
     return found
 
 
@@ -213,10 +213,9 @@ def _ends(
         if known is None or value is None or value != _number(dae, constraint.upper, chosen):
             continue
         which, leaf = known
-        target = derivative_symbol(dae, leaf.name())
-        if target is not None:
-            symbol, factor, offset = target
-            found.setdefault(symbol, {})[which] = (value - offset) / factor
+        alias = dae.root(leaf.name())
+        if alias is not None and alias.root is not None:
+            found.setdefault(alias.symbol, {})[which] = dae.number(alias.root_value(value))
     return found
 
 
@@ -323,11 +322,3 @@ def typical_size(problem: ControlProblem, signal: Signal, bounds: tuple[float, f
     algebraic = {a.name for phase in problem.phases for a in phase.algebraics}
     least = 1e-6 if signal.name in algebraic else 1e-14  # what rounding leaves of a zero is no size
     return size if least < size < 1e15 else 1.0
-
-
-def derivative_symbol(dae: Dae, name: str) -> tuple[str, float, float] | None:
-    """(symbol, factor, offset) with name = factor * symbol + offset, or None for a constant."""
-    alias = dae.root(name)
-    if alias is None or alias.root is None:
-        return None
-    return alias.symbol, alias.factor, dae.number(alias.offset)

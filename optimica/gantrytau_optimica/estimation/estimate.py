@@ -206,9 +206,8 @@ def _answer(
 ) -> Estimate:
     """The record, once it is clear that the data determine the parameters."""
     w = optimum.solution.w
-    order = [n.name for n in found.program.problem.free]
-    values = w[found.program.places.free]
-    parameters = dict(zip(order, values.tolist(), strict=True))
+    parameters = optimum.numbers
+    order = list(parameters)
     at_bounds = {}
     for number in read.numbers:
         for bound in (number.min, number.max):

@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.estimation.residuals import residuals
-from gantrytau_optimica.transcription.layout import Places
+from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribe
 
@@ -26,9 +26,8 @@ def mesh_shift(
     program = optimum.program
     meshes = [_halved(layout.mesh) for layout in program.places.layouts]
     finer = residuals(transcribe(problem, meshes, program.places.layouts[0].scheme))
-    w = finer.on_manifold(
-        _carried_over(optimum, finer.program.places), optimum.solution.w[program.places.free]
-    )
+    near = warm_start(list(optimum.phases.values()), finer.program)
+    w = finer.on_manifold(near, optimum.solution.w[program.places.free])
     if w is None:
         return np.full(jacobian.shape[1], np.nan)
     return -np.linalg.lstsq(jacobian, finer.values(w) - errors, rcond=None)[0]
@@ -38,15 +37,3 @@ def _halved(mesh: Mesh) -> Mesh:
     """Every element cut into two."""
     middles = (mesh.borders[:-1] + mesh.borders[1:]) / 2
     return Mesh(np.sort(np.concatenate([mesh.borders, middles])), (), mesh.shortest)
-
-
-def _carried_over(optimum: Optimum, places: Places) -> np.ndarray:
-    """The solution as unknowns on another mesh."""
-    w = np.zeros(places.size)
-    w[places.free] = optimum.solution.w[optimum.program.places.free]
-    for layout, phase in zip(places.layouts, optimum.phases.values(), strict=True):
-        for number in range(len(layout.tracks)):
-            mine = layout.of(number)
-            element, place = phase.mesh.locate(layout.moment[mine - layout.first])
-            w[mine] = phase.layout.tracks[number].values(optimum.solution.w, element, place)
-    return w

@@ -21,9 +21,7 @@ STATIONARY = 1e-6  # gradient of the Lagrangian relative to its terms, a hundred
 def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     """The same optimum with more parameters held, at the values they have."""
     old, program = optimum.built, optimum.program
-    values = dict(
-        zip((n.name for n in program.problem.free), optimum.solution.w[program.places.free], strict=True)
-    )
+    values = optimum.numbers
     held = [n.name for n in program.problem.free if n.held]
     pieces = {s.name: s.pieces for phase in program.problem.phases for s in phase.inputs}
     built = _same_sizes(build(old.read, {}, [*held, *missing], pieces), old, values)

@@ -121,10 +121,8 @@ class Sensitivities:
 
     @cached_property
     def _values(self) -> dict[str, float]:
-        problem = self.optimum.program.problem
-        values = self.optimum.solution.w[self.optimum.program.places.free].tolist()
-        found = dict(zip((n.name for n in problem.free), values, strict=True))
-        return {name: found[name] for name in self.parameters}
+        numbers = self.optimum.numbers
+        return {name: numbers[name] for name in self.parameters}
 
     @cached_property
     def _vectors(self) -> dict[str, list[int]]:

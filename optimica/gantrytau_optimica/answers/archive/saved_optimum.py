@@ -12,7 +12,7 @@ from gantrytau import Dae, ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.control.guesses import Stretched, derivative_symbol
+from gantrytau_optimica.control.guesses import Stretched
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.mesh import Mesh
 
@@ -163,9 +163,9 @@ class SavedOptimum(Answer):
                 f"guess: the saved {self.name} has none of the variables of {dae.name}; give a solution of a model with "
                 "the same names"
             )
-        symbols = {target[0] for n in found if (target := derivative_symbol(dae, n)) is not None}
-        wanted = {n: derivative_symbol(dae, n) for n in (*dae.states, *dae.inputs)}
-        missing = [n for n, target in wanted.items() if target is not None and target[0] not in symbols]
+        given = {"", *(alias.symbol for n in found if (alias := dae.root(n)) is not None)}
+        wanted = {n: dae.root(n) for n in (*dae.states, *dae.inputs)}
+        missing = [n for n, alias in wanted.items() if alias is not None and alias.symbol not in given]
         if missing:
             some = ", ".join(missing[:8]) + (f" and {len(missing) - 8} more" if len(missing) > 8 else "")
             warnings.warn(
