@@ -13,7 +13,7 @@ from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.instants_on_mesh import instants
-from gantrytau.simulation.signals import Samples, Signal
+from gantrytau.simulation.signals import PiecewiseLinear, Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
 
 CHUNK = 10  # output intervals between two projections onto the constraints
@@ -38,7 +38,7 @@ class Run:
         self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, tolerance: float
     ):
         self.coordinates, self.tolerance = coordinates, tolerance
-        samples = {n: s for n, s in signals.items() if isinstance(s, Samples)}
+        samples = {n: s for n, s in signals.items() if isinstance(s, PiecewiseLinear)}
         self.samples = [samples[n] for n in coordinates.sampled]
         knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
         knots = knots[(knots > grid[0]) & (knots < grid[-1])]

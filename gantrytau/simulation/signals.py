@@ -12,14 +12,14 @@ from gantrytau.language.symbols import time
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class PiecewiseLinear:
     """Values at given times, joined by straight lines: times (n,) in s, values (n,)."""
 
     times: np.ndarray
     values: np.ndarray
 
 
-Signal = ca.SX | Samples  # an expression of time, or samples
+Signal = ca.SX | PiecewiseLinear  # an expression of time, or samples
 
 
 def read_signals(given: Mapping[str, Any], expand: Callable[[str], Sequence[str]]) -> dict[str, Signal]:
@@ -95,4 +95,4 @@ def _samples(name: str, times: Any, values: Any, size: int) -> list[Signal]:
         raise ModelError(f"input {name}: sample {row} is not finite; remove or repair it")
     if times.size < 2 or np.any(np.diff(times) <= 0):
         raise ModelError(f"input {name}: sample times must be at least two and rise strictly; sort them")
-    return [Samples(times, values[:, k]) for k in range(size)]
+    return [PiecewiseLinear(times, values[:, k]) for k in range(size)]

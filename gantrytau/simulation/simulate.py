@@ -21,7 +21,7 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
-from gantrytau.simulation.signals import Samples, Signal, read_signals
+from gantrytau.simulation.signals import PiecewiseLinear, Signal, read_signals
 from gantrytau.simulation.to_result import result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
@@ -106,7 +106,7 @@ def _check_inputs(dae: Translated, signals: Mapping[str, Signal], start: float, 
                 "to impose it, translate with given=..., to change a parameter use parameters=",
                 argument="inputs",
             )
-        if isinstance(signal, Samples) and (signal.times[0] > start or signal.times[-1] < stop):
+        if isinstance(signal, PiecewiseLinear) and (signal.times[0] > start or signal.times[-1] < stop):
             raise ModelError(
                 f"input {name}: samples cover {signal.times[0]:g} to {signal.times[-1]:g} s, expected "
                 f"{start:g} to {stop:g} s; add samples or simulate a shorter time",

@@ -10,7 +10,7 @@ from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.language.units import dimension, unit_text
 from gantrytau.results.result import Result
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.signals import Samples, Signal
+from gantrytau.simulation.signals import PiecewiseLinear, Signal
 
 
 def result_of(
@@ -25,7 +25,7 @@ def result_of(
     """Every variable and derivative (or only `outputs`) at the given times."""
     dae = coordinates.dae
     samples = [signals[n] for n in coordinates.sampled]
-    values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, Samples)]
+    values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, PiecewiseLinear)]
     w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
