@@ -81,7 +81,7 @@ def floats(value: object) -> np.ndarray:
         return np.array(np.nan)
 
 
-def told(value: object) -> str:
+def shown(value: object) -> str:
     """A value in one line of a message."""
     return str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
 
@@ -90,6 +90,6 @@ def _numbers(value: object, name: str, place: str) -> np.ndarray:
     array = floats(value)
     if array.shape == () and np.isnan(array):
         raise ModelError(
-            f"{place}: found {name} = {told(value)}, expected an array of numbers, not complex; give one row a pose"
+            f"{place}: found {name} = {shown(value)}, expected an array of numbers, not complex; give one row a pose"
         )
     return array

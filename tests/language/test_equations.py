@@ -73,6 +73,12 @@ def plant(statement):
         (lambda p: p.x == max(p.y, 0), r"truth value .* casadi\.fmax"),
         (lambda p: p.x == math.sin(p.y), r"found nan in `x == nan`.* module math .* use those of gantrytau"),
         (lambda p: p.x == p.velocty, r"Bench has no 'velocty'; did you mean 'velocity'\?"),
+        (lambda p: p.x == p.y.squared, r"SX has no 'squared'"),
+        (lambda p: p.x == ca.sinus(p.y), r"casadi has no 'sinus'; did you mean"),
+        (
+            lambda p: ca.sin([p.x, p.y]) == 0,
+            r"no number or expression among symbols; join lists with casadi\.vertcat",
+        ),
         (lambda p: p.r + p.q == 0, r"x is 3x1, while y is 2x1"),
         (lambda p: ca.cross(p.q, p.r) == 0, r"Dimension of a \(2x1 \) must equal that of b \(3x1\)"),
         (lambda p: p.r[3] == 0, r"out of bounds with supplied length of 3"),
@@ -199,7 +205,7 @@ def test_a_missing_world_is_named_with_the_remedy():
 def test_too_few_equations():
     class Pump(Model):
         pressure = Real(unit="Pa")
-        flow = Real(unit="m3/s")
+        flow = Real(unit="m3/s", undetermined="no valve holds it")
 
         def equations(self):
             yield self.pressure == 1e5
@@ -209,9 +215,11 @@ def test_too_few_equations():
 
     with pytest.raises(
         StructureError,
-        match=r"^Station: 2 unknowns, 1 equation\. Undetermined: pump\.flow\. Add 1 .* in pump,",
+        match=r"^Station: 2 unknowns, 1 equation\. Undetermined: pump\.flow \(no valve holds it\)\. Add 1 .* in pump,",
     ):
         translate(Station())
+    with pytest.raises(StructureError, match=r"Undetermined: pump\.flow \(the valve is stuck\)"):
+        translate(Station(pump=dict(flow=dict(undetermined="the valve is stuck"))))
 
 
 def test_too_many_equations():

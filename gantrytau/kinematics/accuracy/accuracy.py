@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, told, vectors
+from gantrytau.kinematics.poses import floats, shown, vectors
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
 from gantrytau.kinematics.rotations import angle_between, cross
 from gantrytau.language.model import Model
@@ -161,7 +161,7 @@ def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> A
     axes = floats(semi_axes)
     if axes.shape != (3, 3) or not ((axes >= 0) & (axes < 0.1 * lengths.min())).all():
         raise ModelError(
-            f"{name}: found semi_axes {told(semi_axes)}, expected three rows (one per actuator) of three lengths in m "
+            f"{name}: found semi_axes {shown(semi_axes)}, expected three rows (one per actuator) of three lengths in m "
             "(along x, y, z of the base), of at least 0 and below a tenth of a link; convert millimetres"
         )
     carts = linked.geometry.cart_joints(kinematics.ik(places))

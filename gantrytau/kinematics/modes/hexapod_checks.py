@@ -8,7 +8,7 @@ from gantrytau.errors import ModelError, StructureError
 from gantrytau.kinematics.modes.link_crossings import PAIRS
 from gantrytau.kinematics.modes.study_coordinates import quadrics
 from gantrytau.kinematics.modes.study_roots import placed
-from gantrytau.kinematics.poses import floats, real, told
+from gantrytau.kinematics.poses import floats, real, shown
 
 EXACT = 1e-9  # by the size of the hexapod: joints nearer than this coincide
 DEPENDENT = 1e-10  # least singular value of the conditions of the links by the largest; the F1 has 0.05
@@ -64,7 +64,7 @@ def _array(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
     found = floats(value)
     if found.shape == ():
         raise ModelError(
-            f"{_PATH}: found {name} {told(value)}, expected {expected}; give numbers, not complex ones"
+            f"{_PATH}: found {name} {shown(value)}, expected {expected}; give numbers, not complex ones"
         )
     if found.shape != shape:
         raise ModelError(

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.kinematics.poses import floats, real, told
+from gantrytau.kinematics.poses import floats, real, shown
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _SECTIONS = 30  # of a segment, which leave 0.5e-6 of it
@@ -44,7 +44,7 @@ class Box:
             )
         R = floats(self.R)
         if R.shape != (3, 3) or not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=1e-6):
-            raise ModelError(f"Box.R: found {told(self.R)}, expected a rotation matrix (3, 3)")
+            raise ModelError(f"Box.R: found {shown(self.R)}, expected a rotation matrix (3, 3)")
         for name, value in (("low", low), ("high", high), ("R", R)):
             object.__setattr__(self, name, value)
 
@@ -164,7 +164,7 @@ def _hold_segment(body: Any, kind: str) -> None:
 def _vector(place: str, value: Any) -> np.ndarray:
     vector = floats(value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ModelError(f"{place}: found {told(value)}, expected three finite numbers; {_REMEDY}")
+        raise ModelError(f"{place}: found {shown(value)}, expected three finite numbers; {_REMEDY}")
     return vector
 
 

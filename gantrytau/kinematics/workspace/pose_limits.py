@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, real, told
+from gantrytau.kinematics.poses import floats, poses, real, shown
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rods.rod_robots import SixRods
 from gantrytau.kinematics.rotations import angle_between
@@ -149,7 +149,7 @@ class Examiner:
         at, joints = poses(r, R, self.name), floats(q)
         if at.R is None or joints.shape != (len(at.r), len(self.kinematics.joints)):
             raise ModelError(
-                f"{self.name}: found actuators {told(q)} and orientations {told(R)} of {len(at.r)} poses, expected q "
+                f"{self.name}: found actuators {shown(q)} and orientations {shown(R)} of {len(at.r)} poses, expected q "
                 f"({len(at.r)}, {len(self.kinematics.joints)}) and R; take both from Kinematics.fk"
             )
         turns = at.R
@@ -233,7 +233,7 @@ class Examiner:
             axes = along if given is None else floats(given)
             if axes.shape not in ((3,), along.shape) or not (np.linalg.norm(axes, axis=-1) > 0).all():
                 raise ModelError(
-                    f"{self.name}: found {name} {told(axes if given is None else given)}, expected one "
+                    f"{self.name}: found {name} {shown(axes if given is None else given)}, expected one "
                     f"direction (3,) or one per link {along.shape}; where they follow from "
                     "Limits(home=...), take a place in reach"
                 )
@@ -287,7 +287,7 @@ def _strokes(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
         found = np.vstack([found, kinematics.limits[carts:]])
     if found.shape != (actuators, 2) or not (found[:, 0] < found[:, 1]).all():
         raise ModelError(
-            f"Limits.strokes: found {told(strokes)}, expected ({actuators}, 2) of (least, largest) coordinates of "
+            f"Limits.strokes: found {shown(strokes)}, expected ({actuators}, 2) of (least, largest) coordinates of "
             f"{kinematics.dae.name} in m and rad, or one such pair for all carts",
             argument="strokes",
         )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, real, told
+from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.kinematics.workspace.cells import Cells, axis_number, border
 from gantrytau.kinematics.workspace.figures import draw_layer, draw_solid
 from gantrytau.kinematics.workspace.pose_limits import Examiner, Limits
@@ -76,7 +76,7 @@ def workspace(
     bounds = _bounds(examiner) if box is None else floats(box)
     if bounds.shape != (3, 2) or not (np.isfinite(bounds).all() and (bounds[:, 0] <= bounds[:, 1]).all()):
         raise ModelError(
-            f"{examiner.name}: found the box {told(bounds if box is None else box)}, expected three finite "
+            f"{examiner.name}: found the box {shown(bounds if box is None else box)}, expected three finite "
             "pairs (least, largest) of x, y and z in m; give box=, or strokes of all carts in Limits"
         )
     axes = _cells(examiner.name, bounds, spacing)
