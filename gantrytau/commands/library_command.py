@@ -8,19 +8,19 @@ from typing import Any
 import typer
 
 from gantrytau import Declared
-from gantrytau.commands.arguments import model_choice as models
+from gantrytau.commands.arguments import model_choice
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import as_json
 
 
 def library(json: Json = False) -> None:
     """List what the library holds: complete models, components to build your own, and measures of real robots."""
-    parts = models.parts()
-    whole = {name: found for name, found in models.library().items() if name not in parts}
+    parts = model_choice.parts()
+    whole = {name: found for name, found in model_choice.library().items() if name not in parts}
     held = {
         "models": _explained(whole),
         "components": {**components(), "gantrytau_models": _explained(parts)},
-        "prototypes": models.sources(),
+        "prototypes": model_choice.sources(),
     }
     if json:
         typer.echo(as_json(held))
@@ -51,7 +51,7 @@ def components() -> dict[str, dict[str, str]]:
 
 
 def _explained(classes: Mapping[str, type]) -> dict[str, str]:
-    return {name: models.first_sentence(found.__doc__) for name, found in classes.items()}
+    return {name: model_choice.first_sentence(found.__doc__) for name, found in classes.items()}
 
 
 def _belongs(name: str, value: type, module: Any) -> bool:

@@ -1,4 +1,4 @@
-"""`gantrytau optimize`: an optimal-control problem solved, its answer as figures, files and pictures."""
+"""`gantrytau optimize`: an optimal-control problem solved, its answer as figures, files and picture_output."""
 
 import sys
 import time
@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gantrytau import GantryTauError, SolveError
+from gantrytau.commands.arguments import solver_options
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
 from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
 from gantrytau.commands.arguments.saved_guesses import FORMATS, read_result
-from gantrytau.commands.printing import optimum_summary as answers
-from gantrytau.commands.printing import picture_output as pictures
-from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing import optimum_summary, picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     FAULT,
     INTERRUPTED,
@@ -26,20 +25,11 @@ from gantrytau.commands.printing.reporting import (
     refusing,
     reporting,
 )
-from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import FlatModel
+    from gantrytau_optimica import Optimum
 
-SPELLING = Spelling(
-    ("optimize",),
-    {name: f"--{name}" for name in ("elements", "points", "scheme", "tolerance", "refine", "starts", "guess")}
-    | {"max_iterations": "--max-iterations", "max_time": "--max-time"},
-    exactly={
-        "What was reached so far is in .optimum.": "",
-        "look at .optimum": "look at what --save keeps",
-    },
-)
 ProblemName = Annotated[
     str,
     typer.Argument(
@@ -53,22 +43,15 @@ ProblemName = Annotated[
 
 def optimize(
     problem: ProblemName,
-    elements: Annotated[int, typer.Option(min=1, help="Elements of the mesh.")] = 50,
-    points: Annotated[int, typer.Option(min=1, max=9, help="Collocation points in each element.")] = 3,
-    scheme: Annotated[str, typer.Option(metavar="radau|gauss", help="Kind of points.")] = "radau",
-    tolerance: Annotated[float, typer.Option(help="Of the solver.")] = 1e-8,
-    max_iterations: Annotated[int, typer.Option(min=1, help="After which the solver gives up.")] = 1000,
-    max_time: Annotated[float, typer.Option(help="In s, after which the solver gives up.")] = 300.0,
-    refine: Annotated[
-        float | None, typer.Option(help="Relative accuracy to refine the mesh to.", show_default=False)
-    ] = None,
-    starts: Annotated[
-        int | None, typer.Option(min=1, help="Number of first guesses to try.", show_default=False)
-    ] = None,
-    guess: Annotated[
-        Path | None,
-        typer.Option(help="Where the search starts: a result saved as .csv or .nc.", show_default=False),
-    ] = None,
+    elements: solver_options.Elements = 50,
+    points: solver_options.Points = 3,
+    scheme: solver_options.Scheme = "radau",
+    refine: solver_options.Refine = None,
+    tolerance: solver_options.Tolerance = 1e-8,
+    max_iterations: solver_options.MaxIterations = 1000,
+    max_time: solver_options.MaxTime = 300.0,
+    starts: solver_options.Starts = None,
+    guess: solver_options.Guess = None,
     plot: Plotted = None,
     to: To = None,
     save: Saved = None,
@@ -83,10 +66,10 @@ def optimize(
     """
     from gantrytau_optimica import Optimization
 
-    with reporting(json, source_of(problem), SPELLING):
+    with reporting(json, source_of(problem), solver_options.SPELLING):
         drawn = listed(plot)
-        place = pictures.place(drawn, to)
-        saving.rehearse(save)
+        place = picture_output.place(drawn, to)
+        result_output.rehearse(save)
         policy: dict[str, Any] = dict(elements=elements, points=points, scheme=scheme, tolerance=tolerance)
         policy |= dict(max_iterations=max_iterations, max_time=max_time)
         policy |= {
@@ -102,10 +85,10 @@ def optimize(
             _leave(error, chosen, save, json)
         files, wrong = _written(optimum, save, drawn, place)
         if json:
-            found = answers.summary(chosen, optimum, files)
+            found = optimum_summary.summary(chosen, optimum, files)
             typer.echo(as_json({**found, "error": wrong} if wrong else found))
         else:
-            answers.show(optimum, flat, files)
+            optimum_summary.show(optimum, flat, files)
         if wrong:
             note(wrong)
             raise typer.Exit(MISUSE)
@@ -122,7 +105,7 @@ def _flat(chosen: Chosen, drawn: tuple[str, ...]) -> "FlatModel":
     return flat
 
 
-def _solved(chosen: Chosen, quiet: bool, policy: dict[str, Any]) -> Any:
+def _solved(chosen: Chosen, quiet: bool, policy: dict[str, Any]) -> "Optimum":
     """The optimum; SolveError if none is found."""
     import gantrytau_optimica
 
@@ -150,17 +133,17 @@ def _live(name: str, quiet: bool) -> Iterator[Callable[[int, float], None] | Non
 
 
 def _written(
-    optimum: Any, save: Path | None, drawn: tuple[str, ...], place: str | None
+    optimum: "Optimum", save: Path | None, drawn: tuple[str, ...], place: str | None
 ) -> tuple[list[str], str]:
     """The files of a solution, and why some are not written, which does not cost the answer."""
     files: list[str] = []
     wrong: list[str] = []
     try:
-        files += saving.save(optimum.result, save)
+        files += result_output.save(optimum.result, save)
     except GantryTauError as error:
         wrong.append(str(error))
     try:
-        files += pictures.draw(optimum, drawn, place) if place else []
+        files += picture_output.draw(optimum, drawn, place) if place else []
     except GantryTauError as error:
         wrong.append(str(error))
     return files, "\n".join(wrong)
@@ -172,11 +155,11 @@ def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> 
     if optimum is None:
         raise error
     pressed = optimum.status == "interrupted"
-    message, files = SPELLING.of(error), []
+    message, files = solver_options.SPELLING.of(error), []
     if save is not None and optimum.iterations > 0:
         kept = save.with_name(f"{save.stem}.unfinished{save.suffix}")  # a solution saved before stays
         try:
-            files = saving.save(optimum.result, kept)
+            files = result_output.save(optimum.result, kept)
             message += f"\nWhat was reached until then is in {kept}"
             if kept.suffix.lower() in FORMATS and (pressed or "limit reached" in optimum.status):
                 message += f"; --guess {kept} goes on from there"
@@ -185,6 +168,6 @@ def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> 
     elif pressed:
         message += "\nWith --save what was reached would have been kept"
     if json:
-        typer.echo(as_json({**answers.summary(chosen, optimum, files), "error": message}))
+        typer.echo(as_json({**optimum_summary.summary(chosen, optimum, files), "error": message}))
     note(message)
     raise typer.Exit(INTERRUPTED if pressed else FAULT) from None

@@ -1,4 +1,4 @@
-"""`gantrytau simulate`: a model over time, its result as figures, files and pictures."""
+"""`gantrytau simulate`: a model over time, its result as figures, files and picture_output."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -9,6 +9,7 @@ from gantrytau import SolveError
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
+    Inputs,
     Json,
     ModelName,
     Plotted,
@@ -19,8 +20,7 @@ from gantrytau.commands.arguments.options import (
     listed,
 )
 from gantrytau.commands.arguments.values import signal
-from gantrytau.commands.printing import picture_output as pictures
-from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, busy, fail, reporting
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -40,16 +40,7 @@ def simulate(
     start: Annotated[float, typer.Option(help="Time at which to start, in s.")] = 0.0,
     tolerance: Annotated[float, typer.Option(help="Relative and absolute error per step.")] = 1e-8,
     points: Annotated[int, typer.Option(help="Number of output times.")] = 501,
-    input_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--input",
-            metavar="NAME=VALUE",
-            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
-            "as f=forces.csv:f. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
+    input_: Inputs = None,
     output: Saved = None,
     plot: Plotted = None,
     to: To = None,
@@ -63,17 +54,17 @@ def simulate(
     """
     with reporting(json, source_of(model), SPELLING):
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
-        saving.rehearse(output)
-        place = pictures.place(drawn, to)
+        result_output.rehearse(output)
+        place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
         dae = _translated(chosen, drawn)
         try:
             result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
         except SolveError as error:
             _stop(error, output, json)
-        files = saving.save(result, output)
+        files = result_output.save(result, output)
         if place:
-            files += pictures.draw(result, drawn, place)
+            files += picture_output.draw(result, drawn, place)
         summary = _summary(chosen, dae, result, files)
         if json:
             typer.echo(as_json(summary))
@@ -105,7 +96,7 @@ def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     message = str(error).partition(";")[0] if pressed else str(error)
     files: list[str] = []
     if output is not None and error.result is not None:
-        files = saving.save(error.result, output)
+        files = result_output.save(error.result, output)
         message += f"\nWhat was computed until then is in {output}"
     elif pressed:
         message += "; with --output its result would have been saved"

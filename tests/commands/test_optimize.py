@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import gantrytau_optimica
-from gantrytau.commands.optimize_command import SPELLING, optimize
+from gantrytau.commands.arguments.solver_options import SPELLING
+from gantrytau.commands.optimize_command import optimize
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 

@@ -10,19 +10,19 @@ import gantrytau
 import gantrytau_fmu
 import gantrytau_optimica
 from gantrytau import ModelError
-from gantrytau.commands.calibrate.calibration_options import SPELLING as CALIBRATE
-from gantrytau.commands.calibrate.plan_command import SPELLING as PLAN
-from gantrytau.commands.fmu.fmu_export import SPELLING as EXPORT
-from gantrytau.commands.fmu.fmu_run import SPELLING as RUN
-from gantrytau.commands.optimize_command import SPELLING as OPTIMIZE
-from gantrytau.commands.simulate_command import SPELLING as SIMULATE
+from gantrytau.commands import simulate_command
+from gantrytau.commands.arguments import solver_options
+from gantrytau.commands.calibrate import calibration_options, plan_command
+from gantrytau.commands.fmu import export_options, fmu_run
 
+OPTIMIZE, CALIBRATE = solver_options.SPELLING, calibration_options.SPELLING
+PLAN, RUN = plan_command.SPELLING, fmu_run.SPELLING
 COMMANDS = {
-    "simulate": SIMULATE,
+    "simulate": simulate_command.SPELLING,
     "optimize": OPTIMIZE,
     "calibrate": CALIBRATE,
     "calibrate cell.toml": PLAN,
-    "fmu export": EXPORT,
+    "fmu export": export_options.SPELLING,
     "fmu run": RUN,
 }
 

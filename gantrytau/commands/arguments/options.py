@@ -49,6 +49,16 @@ Saved = Annotated[
     Path | None,
     typer.Option(help="Save all variables: .csv, .nc, .mat (Dymola) or .parquet.", show_default=False),
 ]
+Inputs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--input",
+        metavar="NAME=VALUE",
+        help="Value of an input: a number, or a column of a CSV file with a column 'time', as f=forces.csv:f. "
+        "Repeatable.",
+        show_default=False,
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]
 
 

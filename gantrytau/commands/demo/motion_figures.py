@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gantrytau import replacing
 from gantrytau.commands.demo.thesis_table import ROWS
@@ -10,10 +10,12 @@ from gantrytau.commands.demo.thesis_table import ROWS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from gantrytau_optimica import Optimum
+
 CART_COLOURS = ("#1f77b4", "#d95f02", "#2a9d5c")
 
 
-def draw_paths(optima: Mapping[str, Any], file: Path) -> "Figure":
+def draw_paths(optima: "Mapping[str, Optimum]", file: Path) -> "Figure":
     """The paths of the tool, from above and from the side (thesis Figure 3.9)."""
     import matplotlib.pyplot as plt
 
@@ -39,7 +41,7 @@ def draw_paths(optima: Mapping[str, Any], file: Path) -> "Figure":
     return _saved(figure, file)
 
 
-def draw_torques(optima: Mapping[str, Any], limit: float, file: Path) -> "Figure":
+def draw_torques(optima: "Mapping[str, Optimum]", limit: float, file: Path) -> "Figure":
     """The motor torques over time, with their limits (thesis Figure 3.10)."""
     import matplotlib.pyplot as plt
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from gantrytau_optimica import Optimum
+
 
 @dataclass(frozen=True)
 class ThesisMotion:
@@ -27,7 +29,7 @@ ROWS = (
 )
 
 
-def summary(row: ThesisMotion, optimum: Any) -> dict[str, Any]:
+def summary(row: ThesisMotion, optimum: "Optimum") -> dict[str, Any]:
     """The figures of one row, as numbers."""
     return {
         "row": row.title,

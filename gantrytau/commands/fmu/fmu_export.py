@@ -12,23 +12,12 @@ from gantrytau import did_you_mean
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.fmu import export_options
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting
-from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau_fmu import Experiment
-
-INTERFACES = {
-    "both": ("model-exchange", "co-simulation"),
-    "me": ("model-exchange",),
-    "cs": ("co-simulation",),
-}
-SPELLING = Spelling(
-    ("export_fmu", "translate"),
-    {name: f"--{name}" for name in ("platforms", "given", "find", "states", "tolerance", "solver", "fmi")},
-)
-VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
 
 
 def export(
@@ -36,69 +25,22 @@ def export(
     to: Annotated[
         Path | None, typer.Option(help="The file to write.", show_default="the model's name.fmu")
     ] = None,
-    fmi: Annotated[str, typer.Option("--fmi", metavar="2.0|3.0", help="Version of the standard.")] = "3.0",
-    platforms: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAMES",
-            help="'native' for this machine, 'all', or x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, "
-            "x86_64-darwin, aarch64-darwin, separated by commas; others than this machine need the extra 'cross'.",
-            show_default="native",
-        ),
-    ] = None,
-    solver: Annotated[
-        str, typer.Option(metavar="dopri5|rodas4", help="Of Co-Simulation; rodas4 for stiff models.")
-    ] = "dopri5",
-    interface: Annotated[
-        str, typer.Option(metavar="me|cs|both", help="Model Exchange, Co-Simulation, or both.")
-    ] = "both",
-    given: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAMES",
-            help="The inputs of the FMU, separated by commas, instead of the model's.",
-            show_default=False,
-        ),
-    ] = None,
-    find: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAMES", help="Its outputs, separated by commas.", show_default="all variables"),
-    ] = None,
-    states: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAMES", help="Preferred states, separated by commas.", show_default="chosen by gantrytau"
-        ),
-    ] = None,
-    tolerance: Annotated[float, typer.Option(help="Relative, of Co-Simulation.")] = 1e-6,
-    stop: Annotated[
-        float | None, typer.Option(help="Default experiment: its end, in s.", show_default="1.0")
-    ] = None,
-    step: Annotated[
-        float | None,
-        typer.Option(help="Default experiment: step of Co-Simulation, in s.", show_default="0.004"),
-    ] = None,
-    description: Annotated[
-        str, typer.Option(metavar="TEXT", help="What the file says of the model.", show_default="the model's")
-    ] = "",
-    author: Annotated[
-        str, typer.Option(metavar="TEXT", help="Who wrote the model.", show_default=False)
-    ] = "",
-    copyright_: Annotated[
-        str, typer.Option("--copyright", metavar="TEXT", help="Whose the model is.", show_default=False)
-    ] = "",
-    license_: Annotated[
-        str,
-        typer.Option(
-            "--license", metavar="TEXT", help="Licence of the model, as BSD-3-Clause.", show_default=False
-        ),
-    ] = "",
-    model_version: Annotated[
-        str, typer.Option(metavar="TEXT", help="Version of the model.", show_default=False)
-    ] = "",
-    no_sources: Annotated[
-        bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")
-    ] = False,
+    fmi: export_options.Version = "3.0",
+    platforms: export_options.Platforms = None,
+    interface: export_options.Interface = "both",
+    no_sources: export_options.NoSources = False,
+    given: export_options.Given = None,
+    find: export_options.Find = None,
+    states: export_options.States = None,
+    solver: export_options.SolverName = "dopri5",
+    tolerance: export_options.Tolerance = 1e-6,
+    stop: export_options.Stop = None,
+    step: export_options.Step = None,
+    description: export_options.Description = "",
+    author: export_options.Author = "",
+    copyright_: export_options.Copyright = "",
+    license_: export_options.License = "",
+    model_version: export_options.ModelVersion = "",
     prototype: PrototypeName = None,
     set_: Settings = None,
     json: Json = False,
@@ -110,10 +52,11 @@ def export(
     """
     from gantrytau_fmu import SOLVERS
 
-    with reporting(json, source_of(model), SPELLING):
+    with reporting(json, source_of(model), export_options.SPELLING):
         policy: dict[str, Any] = {
-            "fmi": VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
-            "interfaces": INTERFACES.get(interface) or _unknown("--interface", interface, INTERFACES),
+            "fmi": export_options.VERSIONS.get(fmi) or _unknown("--fmi", fmi, ("2.0", "3.0")),
+            "interfaces": export_options.INTERFACES.get(interface)
+            or _unknown("--interface", interface, export_options.INTERFACES),
             "solver": solver if solver in SOLVERS else _unknown("--solver", solver, SOLVERS),
             "tolerance": tolerance,
             "platforms": listed(platforms) or ("native",),

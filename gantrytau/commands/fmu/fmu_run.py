@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gantrytau import SolveError, did_you_mean
-from gantrytau.commands.arguments.options import Json, Plotted, Saved, To, listed
+from gantrytau.commands.arguments.options import Inputs, Json, Plotted, Saved, To, listed
 from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
-from gantrytau.commands.printing import picture_output as pictures
-from gantrytau.commands.printing import result_output as saving
+from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     FAULT,
     INTERRUPTED,
@@ -61,16 +60,7 @@ def run(
             show_default=False,
         ),
     ] = None,
-    input_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--input",
-            metavar="NAME=VALUE",
-            help="Value of an input: a number, or a column of a CSV file with a column 'time', "
-            "as f=forces.csv:f. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
+    input_: Inputs = None,
     order: Annotated[
         str | None,
         typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.", show_default="gauss-seidel"),
@@ -96,8 +86,8 @@ def run(
         _check(file, order, me, isolate)
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
         start = dict(_setting(text) for text in set_ or ())
-        saving.rehearse(output)
-        place = pictures.place(drawn, to)
+        result_output.rehearse(output)
+        place = picture_output.place(drawn, to)
         policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
         told: list[str] = []
         try:
@@ -105,9 +95,9 @@ def run(
                 result = _result(file, policy, order=order or DEFAULT_ORDER, me=me, isolate=isolate)
         except SolveError as error:
             _stop(error, output, json)
-        files = saving.save(result, output)
+        files = result_output.save(result, output)
         if place:
-            files += pictures.draw(result, drawn, place)
+            files += picture_output.draw(result, drawn, place)
         summary = {
             "file": str(file),
             "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
@@ -183,7 +173,7 @@ def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
     message = str(error).partition(";")[0] if pressed else SPELLING.of(error)
     files: list[str] = []
     if output is not None and error.result is not None:
-        files = saving.save(error.result, output)
+        files = result_output.save(error.result, output)
         message += f"\nWhat was computed until then is in {output}"
     elif pressed:
         message += "; with --output its result would have been saved"

@@ -10,9 +10,10 @@ from gantrytau.commands.arguments.model_choice import Chosen
 
 if TYPE_CHECKING:
     from gantrytau import FlatModel
+    from gantrytau_optimica import Optimum
 
 
-def summary(chosen: Chosen, optimum: Any, files: list[str]) -> dict[str, Any]:
+def summary(chosen: Chosen, optimum: "Optimum", files: list[str]) -> dict[str, Any]:
     """The optimum as a record for programs; times of the work in s."""
     return {
         "problem": chosen.name,
@@ -34,7 +35,7 @@ def summary(chosen: Chosen, optimum: Any, files: list[str]) -> dict[str, Any]:
     }
 
 
-def show(optimum: Any, flat: "FlatModel", files: list[str]) -> None:
+def show(optimum: "Optimum", flat: "FlatModel", files: list[str]) -> None:
     """The report, the free numbers with their units, and the files."""
     typer.echo(optimum.report())
     if optimum.free:
