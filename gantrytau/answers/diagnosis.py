@@ -131,7 +131,7 @@ def _moved(dae: Translated) -> tuple[Moved, ...]:
     """Start values that the start does not have, of aliases too."""
     started = [v for v in dae.flat.variables if v.start is not None]
     names = [n for v in started for n in v.elements]
-    asked = [x for v in started for x in dae.table.number(ca.vertcat(*(v.start or ()))).tolist()]
+    asked = [x for v in started for x in dae.table.numbers(ca.vertcat(*(v.start or ()))).tolist()]
     found = dae.numbers(names, dae.start).tolist() if names else []
     moved = [
         Moved(n, a, f)

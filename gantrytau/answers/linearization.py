@@ -111,7 +111,9 @@ def linearize(
     wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
     rows = tuple(n for name in wanted for n in dae.expand(name))
     chosen = [dae.known.index(n) for n in columns]
-    A, B = slopes.of([_rate(dae, n) for n in dae.choice.states], [f"der({n})" for n in dae.states])
+    A, B = slopes.of(
+        [dae.reduced.chains.rate(n) for n in dae.choice.states], [f"der({n})" for n in dae.states]
+    )
     C, D = slopes.of([dae.expression(n) for n in rows], rows)
     point = named_values(dae, values)
     return Linearization(dae.name, A, B[:, chosen], C, D[:, chosen], dae.states, columns, rows, point)
@@ -133,11 +135,6 @@ def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
         return dae
     found = (*dae.request.find, *(n for n in outputs if split_derivative(n)[1]))
     return translate_flat(dae.flat, replace(dae.request, find=found))
-
-
-def _rate(dae: Translated, state: str) -> ca.SX:
-    base, order = split_derivative(state)
-    return dae.reduced.chains.sx(base, order + 1)
 
 
 def _checked(dae: Translated, at: Mapping[str, Any]) -> dict[str, float]:

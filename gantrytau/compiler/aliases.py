@@ -96,6 +96,11 @@ class Chains:
         """The symbol of that name, `x` or `der(x)`."""
         return self.sx(*split_derivative(name))
 
+    def rate(self, name: str) -> ca.SX:
+        """The symbol of the derivative of the symbol of that name."""
+        base, order = split_derivative(name)
+        return self.sx(base, order + 1)
+
 
 class _Terms:
     """A sum of factors times symbols plus an offset of parameters."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 
@@ -30,15 +31,15 @@ class ParameterTable:
         old = ca.vertcat(*(self.symbols[name] for name in self.expressions))
         return ca.substitute(expression, old, ca.vertcat(*self.expressions.values()))
 
-    def number(self, expression: ca.SX) -> np.ndarray:
-        """The value of an expression of parameters."""
-        names = list(self.values)
+    def numbers(self, expression: ca.SX) -> np.ndarray:
+        """The values of expressions of parameters, (n,)."""
         if expression.is_constant():
             return np.array(ca.DM(expression)).ravel()
-        value = ca.substitute(
-            expression, ca.vertcat(*(self.symbols[n] for n in names)), ca.DM([self.values[n] for n in names])
-        )
-        return np.array(ca.evalf(value)).ravel()
+        return values_at(expression, self.values).ravel()
+
+    def number(self, expression: ca.SX) -> float:
+        """The value of one expression of parameters."""
+        return float(self.numbers(expression)[0])
 
 
 def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:

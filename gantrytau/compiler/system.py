@@ -9,7 +9,6 @@ import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.translated import Translated
-from gantrytau.language.symbols import split_derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,6 @@ def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
     """Put the blocks of a Dae together; see Dae.system."""
     chains, table = dae.reduced.chains, dae.table
     definitions, algebraics = _left_implicit(dae, form)
-    rates = [chains.sx(base, order + 1) for base, order in map(split_derivative, dae.choice.states)]
     draft = System(
         dae=dae,
         time=dae.flat.time,
@@ -72,7 +70,7 @@ def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
         parameters=table.independent,
         p=column([table.symbols[n] for n in table.independent]),
         definitions=tuple(definitions),
-        ode=column(rates),
+        ode=column([chains.rate(n) for n in dae.choice.states]),
         residuals=column([a.residual for a in algebraics]),
     )
     closed = [a.closed for a in algebraics if a.closed is not None]

@@ -190,7 +190,7 @@ class Translated:
 
     def number(self, expression: ca.SX | float) -> float:
         """The value of an expression of parameters."""
-        return float(self.table.number(ca.SX(expression))[0])
+        return self.table.number(ca.SX(expression))
 
     def numbers(self, names: Iterable[str], values: Mapping[str, float]) -> np.ndarray:
         """Values of scalars, from numbers of all symbols of the reduced equations."""

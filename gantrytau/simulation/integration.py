@@ -47,7 +47,7 @@ class Run:
         fine[::parts] = grid
         mesh = np.unique(np.concatenate([fine if coordinates.conditioning.needed else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
-        periods = np.array([table.number(s.period)[0] for s in events])
+        periods = np.array([table.number(s.period) for s in events])
         self.instants = instants(mesh, coordinates.held, periods)
         self.mesh = self.instants.mesh
         self.kept = np.searchsorted(self.mesh, grid)

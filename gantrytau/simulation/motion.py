@@ -41,7 +41,7 @@ def all_coordinates(
     matrices = _matrices(solved)
     levels, rows = _invariants(dae, {i for i, _ in given})
     wanted = [
-        column([chains.sx(base, k + 1) for base, k in map(split_derivative, states)]),
+        column([chains.rate(n) for n in states]),
         column(solved.residuals),
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
         dae.to_reduced(column([e.residual for e in dae.redundant])),

@@ -107,7 +107,7 @@ class _Listed:
         for word in ("min", "max", "nominal"):
             values = getattr(declaration, word)
             if values is not None:
-                number = float(self.dae.table.number(values[place])[0])
+                number = self.dae.number(values[place])
                 if np.isfinite(number) and (word != "nominal" or number > 0):
                     found[word] = number
         return found

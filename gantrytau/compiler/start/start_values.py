@@ -28,7 +28,7 @@ def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> Start
     for variable in flat.variables:
         if variable.start is None:
             continue
-        numbers = table.number(ca.vertcat(*variable.start))
+        numbers = table.numbers(ca.vertcat(*variable.start))
         for name, number in zip(variable.elements, numbers, strict=True):
             _place(variable, name, float(number), reduced, values, owners, fixed)
     for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
@@ -42,19 +42,19 @@ def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
     variable = next(v for v in flat.variables if name in v.elements)
     if variable.start is None:
         return 0.0
-    return float(table.number(variable.start[variable.elements.index(name)])[0])
+    return table.number(variable.start[variable.elements.index(name)])
 
 
 def _place(variable: FlatVariable, name: str, number: float, reduced, values, owners, fixed) -> None:
     alias, table = reduced.aliases[name], reduced.table
     if alias.root is None:
-        constant = float(table.number(alias.offset)[0])
+        constant = table.number(alias.offset)
         if variable.fixed and abs(number - constant) > 1e-9 * max(1.0, abs(constant)):
             raise InitializationError(
                 f"{name}: found the fixed start {number:g}, but it is constant and equal to {constant:g}; leave it out"
             )
         return
-    symbol, value = alias.symbol, float(table.number(alias.root_value(number))[0])
+    symbol, value = alias.symbol, table.number(alias.root_value(number))
     if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
         raise InitializationError(
             f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
