@@ -1,5 +1,7 @@
 """XML of others, looked through before a parser builds anything from it."""
 
+from xml.parsers import expat
+
 from gantrytau.errors import ModelError
 
 _DEPTH = 100  # of elements inside each other; readers recurse
@@ -19,8 +21,6 @@ def check_xml(text: bytes, where: str) -> None:
 
     A document type is refused, as with it come entities: files of the machine, and billions of laughs.
     """
-    from xml.parsers import expat
-
     depth = 0
 
     def declared(version: str, encoding: str | None, standalone: int) -> None:

@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 
 from gantrytau.errors import GantryTauError, InitializationError, SolveError
 from gantrytau_fmu.systems.component import Component
+from gantrytau_fmu.systems.slave import Slave
 
 _START = "import sys; sys.path[:] = {path!r}; from gantrytau_fmu.systems.isolation import serve; serve()"
 _LENGTH = struct.Struct("<Q")
@@ -153,8 +154,6 @@ def serve() -> None:
             call, arguments = _read(source)
             try:
                 if call == "Slave":
-                    from gantrytau_fmu.systems.slave import Slave
-
                     slave, value = Slave(*arguments), None
                 else:
                     value = getattr(slave, call)(*arguments)
