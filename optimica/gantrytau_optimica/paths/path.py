@@ -26,6 +26,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
 from gantrytau.language.declarations import Formula
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.paths.fitting import (
     Array,
     Curve,
@@ -336,7 +337,8 @@ class Path:
         bend.set_ylabel("curvature [1/m]")
         bend.grid(alpha=0.3)
         if file is not None:
-            figure.savefig(file, dpi=150)
+            with replacing(file) as partial:
+                figure.savefig(partial, dpi=150)
         return figure
 
     def _symbolic(self, s: ca.SX) -> ca.SX:
