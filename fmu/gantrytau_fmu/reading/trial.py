@@ -104,6 +104,7 @@ def _loaded(folder: Path, model: Any, kind: str, identifier: str, journal: Journ
             journal.stage(name)
             return super()._call(name, *arguments)
 
+    Told.__name__ = made.__name__  # by which FMPy knows the version
     return Told(
         guid=model.guid,
         unzipDirectory=str(folder),
