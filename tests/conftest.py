@@ -2,26 +2,46 @@
 
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 TESTS = Path(__file__).parent
-LONGEST = (  # twenty seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
+LONGEST = (  # fifteen seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/building/test_compiling.py",
     "notebooks/test_notebooks.py",
+    "commands/calibrate/test_calibrate_cell.py",
+    "models/mechanisms/test_f1.py",
+    "mechanics/multibody/test_crossing_assemblies.py",
+    "models/mechanisms/test_stewart.py",
+    "models/mechanisms/test_four_bar.py",
     "fmu/runtime/test_singular_poses.py",
     "models/control/test_tracking.py",
-    "models/mechanisms/test_f1.py",
-    "fmu/test_clients.py",
+    "commands/calibrate/test_calibrate_verdict.py",
     "models/mechanisms/test_six_link.py",
-    "models/mechanisms/test_stewart.py",
-    "fmu/runtime/test_parameters.py",
-    "mechanics/multibody/test_crossing_assemblies.py",
-    "commands/test_simulate.py",
-    "models/mechanisms/test_four_bar.py",
-    "fmu/runtime/test_fuzz.py",
-    "simulation/test_simulation.py",
+    "fmu/test_clients.py",
+    "optimica/calibration/test_turning.py",
+    "optimica/procedure/test_plan.py",
     "mechanics/multibody/test_loops.py",
+    "optimica/refinement/test_refinement.py",
+    "optimica/procedure/test_resuming.py",
+    "optimica/calibration/design/test_pose_selection.py",
+    "writing/test_modelica_models.py",
+    "optimica/procedure/test_fresh_robots.py",
+    "optimica/known_answers/test_gantry.py",
+    "fmu/runtime/test_parameters.py",
+    "optimica/paths/test_path_motions.py",
+    "models/mechanisms/test_wrist.py",
+    "models/control/test_feedforward.py",
+    "kinematics/test_kinematics_of_models.py",
+    "optimica/known_answers/test_mechanisms.py",
+    "models/mechanisms/test_delta.py",
 )
+
+# nothing may depend on how busy the machine is
+hypothesis.settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("any machine")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -275,13 +275,8 @@ def translated(model):
 
 @pytest.fixture(scope="module")
 def mechanisms(tmp_path_factory):
-    """Large ones: compiled as fast as those beyond LARGE are, which takes a quarter of the time and rounds alike."""
-
     @cache
     def made(model, solver):
-        path = tmp_path_factory.mktemp("mechanisms") / "m.fmu"
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("gantrytau_fmu.export.LARGE", 0)
-            return export(translated(model), path, solver=solver)
+        return export(translated(model), tmp_path_factory.mktemp("mechanisms") / "m.fmu", solver=solver)
 
     return made
