@@ -9,9 +9,12 @@ from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting, write_text
+from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import Dae
+
+SPELLING = Spelling(("translate",), {"given": "--given", "find": "--find"})
 
 
 def equations(
@@ -53,7 +56,7 @@ def equations(
     """
     from gantrytau import translate
 
-    with reporting(json, source_of(model)):
+    with reporting(json, source_of(model), SPELLING):
         known, wanted = listed(given), listed(find)
         if not c and (jacobian or forward or reverse):
             raise CommandError("--jacobian, --forward and --reverse are derivatives of C code; add --c")

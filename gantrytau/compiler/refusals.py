@@ -97,7 +97,8 @@ def no_state(title: str, name: str, states: Sequence[str]) -> StructureError:
     """A state that is asked for and cannot be one beside the others."""
     return StructureError(
         f"{title}: {name} cannot be a state together with the others asked for; the states of this model can be "
-        f"{', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer"
+        f"{', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer",
+        argument="states",
     )
 
 

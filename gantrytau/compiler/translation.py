@@ -64,13 +64,19 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
     variables = {n for v in flat.variables for n in v.elements}
     for name in known:
         if name.startswith("der("):
-            raise ModelError(f"given: {name} is a derivative, expected variables; name the variable itself")
+            raise ModelError(
+                f"given: {name} is a derivative, expected variables; name the variable itself",
+                argument="given",
+            )
         if name not in variables:
-            raise ModelError(f"given: {name} is no variable, but follows from others; name those")
+            raise ModelError(
+                f"given: {name} is no variable, but follows from others; name those", argument="given"
+            )
         if name in events:
             raise ModelError(
                 f"given: {name} is set at instants (by sampled or stick_slip), expected another variable; leave it "
-                "out, it is known anyway"
+                "out, it is known anyway",
+                argument="given",
             )
     table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
     return table, (*(known or flat.inputs), *events)
