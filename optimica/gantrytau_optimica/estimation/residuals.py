@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from gantrytau import ModelError
 from gantrytau_optimica.transcription.assemble import Assembled, Term, assemble
+from gantrytau_optimica.transcription.costs import sample_errors
 from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.point_functions import running
 from gantrytau_optimica.transcription.program import Program
@@ -99,20 +99,11 @@ def residuals(program: Program) -> Residuals:
     places, terms, sizes = program.places, [], []
     total = sum(s.times.size for s in program.problem.sums)
     for layout in places.layouts:
-        start, final = (float(t) for t in (layout.phase.start_time, layout.phase.final_time))
-        for one in layout.phase.sums:
-            element, place = layout.mesh.locate((one.times - start) / (final - start))
-            value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
+        for one, error, element, place, known in sample_errors(layout):
             count = one.times.size
             rows = sum(sizes) + np.arange(count)
             scatter = sparse.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(total, count))
-            known = np.vstack([one.values, one.deviations])
-            error = (one.expression - value) / deviation
-            terms.append(
-                running(places, layout).term(
-                    error, element, place, scatter, extra=((value, deviation), known)
-                )
-            )
+            terms.append(running(places, layout).term(error, element, place, scatter, extra=known))
             sizes.append(count)
     return Residuals(program, _assembled(places, terms, total), tuple(sizes))
 

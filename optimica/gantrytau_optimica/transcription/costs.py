@@ -1,14 +1,18 @@
 """What is summed into the objective: integrals, penalties on steps, and errors at samples."""
 
+from collections.abc import Iterator
+
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.control.control_problem import ControlProblem, SampleSum
 from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
 from gantrytau_optimica.transcription.point_functions import running
+
+Known = tuple[tuple[ca.SX, ca.SX], np.ndarray]  # symbols, and their values (2, N)
 
 
 def running_costs(places: Places, layout: Layout) -> list[Term]:
@@ -57,9 +61,18 @@ def sample_sums(places: Places, layout: Layout) -> list[Term]:
         raise ModelError(
             f"{problem.name}: lengths='free' and sums over samples do not go together; give the lengths of the elements"
         )
-    for one in layout.phase.sums:
-        run = running(places, layout)
+    for one, error, element, place, known in sample_errors(layout):
         weight = float(ca.jacobian(problem.objective, one.symbol))
+        weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
+        found.append(running(places, layout).term(error**2, element, place, weights, extra=known))
+    return found
+
+
+def sample_errors(layout: Layout) -> Iterator[tuple[SampleSum, ca.SX, np.ndarray, np.ndarray, Known]]:
+    """For every sum over samples of a phase (model - measured) / deviation, element and place of all its samples, and
+    symbols and values of measured and deviation there.
+    """
+    for one in layout.phase.sums:
         start, final = float(layout.phase.start_time), float(layout.phase.final_time)
         element, place = layout.mesh.locate((one.times - start) / (final - start))
         after = (place > 1 - 1e-9) & (
@@ -67,11 +80,8 @@ def sample_sums(places: Places, layout: Layout) -> list[Term]:
         )  # at a jump what holds from then on counts
         element, place = np.where(after, element + 1, element), np.where(after, 0.0, place)
         value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
-        error = ((one.expression - value) / deviation) ** 2
-        weights = sparse.csr_matrix(np.full((1, one.times.size), weight))
-        known = np.vstack([one.values, one.deviations])
-        found.append(run.term(error, element, place, weights, extra=((value, deviation), known)))
-    return found
+        error = (one.expression - value) / deviation
+        yield one, error, element, place, ((value, deviation), np.vstack([one.values, one.deviations]))
 
 
 def differences(places: Places, chain: np.ndarray) -> Sparse:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gantrytau import Fixed, simulate, translate
+from gantrytau import Fixed, Input, Model, Parameter, Real, der, simulate, translate
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
@@ -37,6 +37,31 @@ def noisy(truth: np.ndarray, deviation: float, seed: int = 0) -> np.ndarray:
 @pytest.fixture(scope="module")
 def tanks():
     return estimate(QuadrupleTank, BOTH, tank_experiment(1))
+
+
+class Stepped(Model):
+    """A decay on which an input is added: the output jumps with it."""
+
+    k = Parameter(0.5, unit="1/s", description="rate")
+    x = Real(start=1.0, fixed=True, description="what decays")
+    u = Input(description="what is added")
+    y = Real(description="output")
+
+    def equations(self):
+        yield der(self.x) == -self.k * self.x
+        yield self.y == self.x + self.u
+
+
+def test_what_holds_after_a_step_counts_at_its_instant():
+    t = np.linspace(0.0, 2.0, 9)
+    u = (t >= 1.0) * 1.0
+    inputs = {"u": Samples(t, u, kind="constant")}
+    fit = estimate(
+        Stepped, {"k": Free(0.5)}, Experiment({"y": (t, np.exp(-0.7 * t) + u)}, inputs), elements=8
+    )
+    assert fit.parameters["k"] == pytest.approx(0.7, abs=1e-6)  # the collocation on 8 elements
+    np.testing.assert_allclose(fit.residuals["experiment_1", "y"], 0.0, atol=1e-9)
+    assert abs(fit.optimum.playback.objective_error) < 1e-4  # of 4e5 for an error of 1
 
 
 def test_holes_of_the_quadruple_tank(tanks):

@@ -178,7 +178,7 @@ def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, l
             values.append(ca.DM(played.at(point.expression, when)[:, 0]))
         sums: dict[int, float] = {}
         for one in phase.sums:
-            error = (played.at(one.expression, one.times)[0] - one.values) / one.deviations
+            error = (played.at(one.expression, one.times, after=True)[0] - one.values) / one.deviations
             key = one.symbol.element_hash()
             sums[key] = sums.get(key, 0.0) + float(error @ error)
         for key, one in {s.symbol.element_hash(): s for s in phase.sums}.items():

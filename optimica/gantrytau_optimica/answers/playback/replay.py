@@ -60,9 +60,13 @@ class Replayed:
         rows = np.array(self.trajectory.function(expressions)(self.times[None, :], self.signals))
         return rows if rows.shape[1] == self.times.size else np.repeat(rows, self.times.size, axis=1)
 
-    def at(self, expressions: ca.SX, times: np.ndarray) -> np.ndarray:
-        """Expressions (m,) at times (k,), (m, k), interpolated between the places of their pieces."""
-        piece = np.clip(np.searchsorted(self.pieces[:, 1], times - 1e-12), 0, len(self.pieces) - 1)
+    def at(self, expressions: ca.SX, times: np.ndarray, after: bool = False) -> np.ndarray:
+        """Expressions (m,) at times (k,), (m, k), interpolated between the places of their pieces.
+
+        A border belongs to the piece before it, or the one after it.
+        """
+        beside = 1e-9 * float(np.min(np.diff(self.pieces))) if after else -1e-12
+        piece = np.clip(np.searchsorted(self.pieces[:, 1], times + beside), 0, len(self.pieces) - 1)
         begin, end = self.pieces[piece].T
         place = np.clip((times - begin) / (end - begin), 0.0, 1.0)
         weights = lagrange(np.tile(PLACES, (times.size, 1)), place)
