@@ -239,6 +239,18 @@ def test_higher_derivatives_of_a_state(wanted):
     assert float(second(2.0, 3.0, 5.0)) == 5.0 * 2.0 + 3.0 * 3.0 * 2.0
 
 
+def test_rates_of_time_and_of_parameters():
+    class Fall(Model):
+        g = Parameter(9.81, unit="m/s2")
+        v = Real(unit="m/s")
+
+        def equations(self):
+            yield der(self.v) == -self.g
+
+    dae = translate(Fall())
+    assert [float(dae.expression(n)) for n in ("der(time)", "der(der(time))", "der(g)")] == [1.0, 0.0, 0.0]
+
+
 def test_connectors_inside_connectors():
     class Cable(Connector):
         line = Array(Pin, 2)

@@ -120,12 +120,18 @@ def test_a_line_force_between_points_that_coincide():
         (["hinge.phii"], ModelError, "has no variable or parameter 'hinge.phii'; did you mean 'hinge.phi'"),
         (["hinge.phi", "body.w[1]", "hinge.w"], StructureError, "cannot be a state"),
         (["body.q[1]"], GantryTauError, "body.q"),
+        (["body.frame_a.R[0,1]"], StructureError, "body.frame_a.R[0,1] is no variable and cannot be a state"),
     ],
 )
 def test_states_that_cannot_be(states, kind, words):
     with pytest.raises(kind) as raised:
         translate(Swing(), states=states)
     assert words in str(raised.value)
+
+
+def test_what_follows_from_variables_cannot_be_given():
+    with pytest.raises(ModelError, match=r"given: body\.frame_a\.R\[0,1\] is no variable, but follows from"):
+        translate(Swing(), given=["body.frame_a.R[0,1]"])
 
 
 def test_a_causality_that_leaves_a_motion_open_says_what_is_missing():
