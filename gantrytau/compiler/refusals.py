@@ -1,6 +1,6 @@
 """What the compiler cannot do with a model, in the words of the model: errors with what was found, expected and to do."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -21,17 +21,18 @@ def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatMode
     )
     text = f"{flat.name}: {n} unknown{'' if n == 1 else 's'}, {m} equation{'' if m == 1 else 's'}."
     if found.free:
-        reached = {reduced.unknowns[j]: j in found.free for j in found.undetermined}
-        text += _undetermined(reached, len(found.free), reduced, flat)
+        text += _undetermined(
+            [reduced.unknowns[j] for j in found.undetermined], len(found.free), reduced, flat
+        )
     if found.surplus:
         text += _overdetermined(found.overdetermined, len(found.surplus), reduced, signature)
     return StructureError(text)
 
 
-def _undetermined(reached: Mapping[str, bool], count: int, reduced: Reduced, flat: FlatModel) -> str:
-    """reached: names of which `count` are free, True for those that no equation was found for."""
+def _undetermined(unknowns: Sequence[str], count: int, reduced: Reduced, flat: FlatModel) -> str:
+    """unknowns: of which any `count` may be free, inputs and those that say the likely cause being told first."""
     inputs = {reduced.aliases[n].root: n for n in flat.inputs if n not in reduced.known}
-    names = sorted(reached, key=lambda n: (n not in inputs, not reached[n], n.count(".")))
+    names = sorted(unknowns, key=lambda n: (n not in inputs, n not in flat.hints, n.count(".")))
     first = inputs.get(names[0], names[0])
     hint = flat.hints.get(names[0])
     others = ", ".join(inputs.get(n, n) for n in names[1:6]) + (", ..." if len(names) > 6 else "")
