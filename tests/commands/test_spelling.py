@@ -42,13 +42,13 @@ def written(node):
 def sites():
     """Arguments and messages of all errors that name an argument, with file and line."""
     for package in (gantrytau, gantrytau_optimica, gantrytau_fmu):
-        for file in sorted(Path(package.__file__).parent.rglob("*.py")):
+        for file in sorted(Path(str(package.__file__)).parent.rglob("*.py")):
             for node in ast.walk(ast.parse(file.read_text())):
                 if isinstance(node, ast.Call):
                     named = {keyword.arg: keyword.value for keyword in node.keywords}
                     argument = named.get("argument")
                     if isinstance(argument, ast.Constant) and node.args:
-                        yield f"{file.name}:{node.lineno}", argument.value, written(node.args[0])
+                        yield f"{file.name}:{node.lineno}", str(argument.value), written(node.args[0])
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -67,7 +67,7 @@ def test_every_error_on_an_argument_names_the_option(command):
 
 def test_what_is_said_in_other_words_is_written_in_the_packages():
     """A reworded sentence shows up here, not as Python on a terminal."""
-    roots = [Path(package.__file__).parent for package in (gantrytau, gantrytau_optimica, gantrytau_fmu)]
+    roots = [Path(str(package.__file__)).parent for package in (gantrytau, gantrytau_optimica, gantrytau_fmu)]
     sources = [
         file.read_text()
         for root in roots
