@@ -1,5 +1,6 @@
 """Where a parallelogram falls flat it can go on as one or crossed: no output grid lets a simulation step over it."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from gantrytau import SolveError, Start, simulate, translate
+from gantrytau import Dae, SolveError, Start, simulate, translate
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.singular_poses import Look, approach, doubtful
 from gantrytau_models import FourBar
@@ -21,8 +22,15 @@ MOMENT = 2 * GRAVITY * R  # N.m when flat
 CLOSE = 1e-4  # s; the time is found by a straight line over the last thousandth of the distance
 
 
-def parallelogram(phi: float, w: float, coupler: float = GROUND) -> FourBar:
-    return FourBar(GROUND, dict(length=R, phi=Start(phi), w=Start(w)), coupler, R)
+@cache
+def parallelogram(phi: float, w: float, coupler: float = GROUND) -> Dae:
+    return translate(FourBar(GROUND, dict(length=R, phi=Start(phi), w=Start(w)), coupler, R))
+
+
+@cache
+def at_rest() -> Dae:
+    """With the starts that the linkage has by itself."""
+    return translate(FourBar(1.0, 0.3, 1.0, 0.3))
 
 
 def flat(phi: float, w: float, torque: float, stop: float = 1.0) -> float:
@@ -40,7 +48,7 @@ def flat(phi: float, w: float, torque: float, stop: float = 1.0) -> float:
     return root
 
 
-def until_singular(model: FourBar, **settings: Any):
+def until_singular(model: Dae, **settings: Any):
     """The motion, and the time of the singular pose that ends it, NaN without one."""
     try:
         return simulate(model, **settings), np.nan
@@ -51,7 +59,7 @@ def until_singular(model: FourBar, **settings: Any):
 @pytest.mark.parametrize("points", POINTS)
 def test_every_grid_stops_at_the_flat_pose(points):
     with pytest.raises(SolveError, match="singular pose") as caught:
-        simulate(FourBar(1.0, 0.3, 1.0, 0.3), stop=1.0, points=points)
+        simulate(at_rest(), stop=1.0, points=points)
     error = caught.value
     assert error.time == pytest.approx(flat(1.0, 0.0, 0.0), abs=CLOSE)
     motion = error.result
@@ -62,7 +70,7 @@ def test_every_grid_stops_at_the_flat_pose(points):
 @pytest.mark.parametrize("stop", [0.29, 5.0, 100.0])
 def test_the_length_of_the_simulation_moves_nothing(stop):
     with pytest.raises(SolveError, match="singular pose") as caught:
-        simulate(FourBar(1.0, 0.3, 1.0, 0.3), stop=stop, points=51)
+        simulate(at_rest(), stop=stop, points=51)
     assert caught.value.time == pytest.approx(flat(1.0, 0.0, 0.0), abs=CLOSE)
 
 
@@ -83,7 +91,7 @@ def test_starts_and_torques_at_random():
 
 def test_samples_at_irregular_times():
     """The mesh has their times too: intervals of all lengths."""
-    random, dae = np.random.default_rng(5), translate(FourBar(1.0, 0.3, 1.0, 0.3))
+    random, dae = np.random.default_rng(5), at_rest()
     for count, torque in zip((3, 40, 400), (0.0, -2.0, 3.0), strict=True):
         times = np.concatenate([[0.0], np.sort(random.uniform(0.0, 1.0, count)), [1.0]])
         with pytest.raises(SolveError, match="singular pose") as caught:
