@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, ModelError, Parameter, SolveError
-from gantrytau.commands.demo.motion_problems import FreePath
+from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import Free, Optimization, final, initial, link, optimize, prepare
 from gantrytau_optimica.studies.sensitivities import sensitivities
 from tests.optimica.problems import LinearQuadratic, Mass
@@ -148,14 +148,16 @@ def test_the_motion_of_the_robot_changes_as_when_solved_again(gantry, derivative
 
 
 def test_the_fastest_motion_of_the_robot():
-    prepared = prepare(FreePath, parameters=[PLATE, VISCOUS], tolerance=1e-11)
+    """Along the line, where it is one motion: off it, many branches lie within 1e-4 s of each other."""
+    binding = "robot.carts[2].law.f_v"  # of the cart whose torque decides
+    prepared = prepare(OnLine, parameters=[PLATE, binding], tolerance=1e-11)
     optimum = prepared.solve()
     found = sensitivities(optimum)
-    for name, value, step in ((PLATE, 9.13, 0.02), (VISCOUS, 355.25, 0.1)):
+    for name, value, step in ((PLATE, 9.13, 0.02), (binding, 388.77, 0.1)):
         above, below = (again(prepared, optimum, name, value + d) for d in (step, -step))
         slope = (above.final_time - below.final_time) / (2 * step)
-        assert found.objective[name] == pytest.approx(slope, rel=1e-4)
-    assert found.objective[PLATE] > 0
+        assert found.objective[name] == pytest.approx(slope, rel=1e-6)
+        assert slope > 0
 
 
 def test_parameters_not_named_before_give_the_same_numbers(derivatives):
