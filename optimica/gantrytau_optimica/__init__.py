@@ -16,19 +16,19 @@ from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, sing
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
 from gantrytau_optimica.calibration.devices.sight import Bars
-from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
-from gantrytau_optimica.calibration.report.parameter_rows import (
-    ParameterRow,
-    calibrated_geometry,
-    parameter_rows,
-)
+from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.report.report import About, frame_motion, report_numbers, write_report
-from gantrytau_optimica.calibration.rods.arms import read_arms
+from gantrytau_optimica.calibration.rods.arm_closure import read_arms
 from gantrytau_optimica.calibration.surveys.error_maps import error_map
 from gantrytau_optimica.calibration.surveys.guideways import linearity
 from gantrytau_optimica.calibration.surveys.orientation_errors import orientation_causes, orientation_errors
 from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, cross_validate, held_out
+from gantrytau_optimica.calibration.trust.parameter_rows import (
+    ParameterRow,
+    calibrated_geometry,
+    parameter_rows,
+)
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment

@@ -25,7 +25,7 @@ def about(
     """What a report says besides the calibration. robot: its name; checked: fits without each part of the poses in turn."""
     from gantrytau_optimica import About, frame_motion
 
-    turned = found.geometry.kind != "three" or measured.data.R is not None
+    turned = found.nominal_rods.turns or measured.data.R is not None
     target = "the target that was measured, in the place of the tool; t of a frame holds its offset"
     facts = {"measurements": str(measured.path), **(plan.facts if plan else {})}
     return About(
@@ -79,7 +79,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
     errors = found.errors[good] * 1e6
     kept = "of the fit itself" if np.array_equal(found.held_out, found.rows) else "not fitted"
     typer.echo(
-        f"{found.geometry.name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
+        f"{found.nominal_rods.name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
         f"{measured.path.name}, in {found.iterations} steps"
     )
     typer.echo(
@@ -102,7 +102,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
         typer.echo(f"Written: {file}")
     if not any(file.endswith(PARAMETERS) for file in files):
         typer.echo(
-            f"No {PARAMETERS}: {found.geometry.name} has no parameters for what was identified; the numbers are in "
+            f"No {PARAMETERS}: {found.nominal_rods.name} has no parameters for what was identified; the numbers are in "
             "the report"
         )
 

@@ -1,29 +1,35 @@
 """`calibrate`: the parameters of a robot from measured poses."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
-from gantrytau_optimica.calibration.judging.plausibility import check_robot, misses_of
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
+from gantrytau_optimica.calibration.judging.plausibility import Misses, check_robot, misses_of
 from gantrytau_optimica.calibration.judging.verdicts import (
+    arms_in_frame,
     check_carts,
     check_count,
     in_frame,
     judged,
     usable_rows,
 )
+from gantrytau_optimica.calibration.rods.arm_closure import Orientation, arms_of
 from gantrytau_optimica.calibration.rods.error_models import (
     check_model,
+    links_of_arms,
     nominal_links,
     six_links,
     started_linear,
 )
-from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry, read_geometry
+from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
 
 
 def calibrate(
@@ -58,40 +64,81 @@ def calibrate(
             "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
             argument="constraints",
         )
-    geometry = read_geometry(robot)
-    _check_columns(geometry, measurements)
-    check_model(model, geometry, measurements)
+    nominal_rods = read_nominal(robot)
+    _check_columns(nominal_rods, measurements)
+    check_model(model, nominal_rods, measurements)
+    if nominal_rods.turntables and start == "linear":
+        raise ModelError(
+            f"calibrate: found start='linear' for {nominal_rods.name}, expected 'nominal'; closure is linear in the "
+            "parameters of linear guideways only"
+        )
     findings = list(measurements.findings)
     rows = usable_rows(findings, measurements)
-    check_carts(geometry, measurements, rows)
+    check_carts(nominal_rods, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
-    if geometry.kind == "turning":
-        from gantrytau_optimica.calibration.turning_calibration import calibrate_turning
-
-        policy: Any = dict(method=method, start=start, orientation=orientation, prior=prior, loss=loss)
-        policy["constraints"] = constraints
-        return calibrate_turning(geometry, measurements, rows, (fitted, held_out), **policy)
     data = measurements.select(fitted)
-    links = nominal_links(geometry, data, six_links(model, geometry))
-    check_count(max(len(link.start) for link in links), fitted, findings)
-    check_robot(geometry, misses_of(links), data.q, data.r, data.R, rows)
-    nominal = links
-    if start == "nominal" or _needs_values(prior):
-        nominal, more = in_frame(geometry, links, data, rows)
-        findings += more
-    known = "linear" if findings and findings[-1].kind == "frame" else start  # of directions
-    links = started_linear(links) if start == "linear" else nominal
-    values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
-    known_misses = misses_of(nominal) if start == "nominal" else None
-    fits = fit_model(model, links, data, known, prior, loss, values)
+    asked = _Asked(model, start, prior, loss, orientation)
+    fits, known, more = _fitted(nominal_rods, data, asked, (rows, fitted, findings))
     if method == "ipopt":
-        from gantrytau_optimica.calibration.fitting.by_ipopt import solve, solve_constrained
+        from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
 
         fits = solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
     found = Calibration(
-        geometry, measurements, model, fits, fitted, held_out, method, loss, nominal=known_misses
+        nominal_rods,
+        measurements,
+        model,
+        tuple(fits),
+        fitted,
+        held_out,
+        method,
+        loss,
+        orientation,
+        nominal=known,
     )
-    return found.with_findings([*findings, *judged(found)])
+    return found.with_findings([*findings, *more, *judged(found)])
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked of a fit, as `calibrate` says."""
+
+    model: Any
+    start: str
+    prior: Mapping[str, Any] | None
+    loss: str
+    orientation: Orientation
+
+
+def _fitted(
+    robot: NominalRods,
+    data: Measurements,
+    asked: _Asked,
+    where: tuple[np.ndarray, np.ndarray, list[Finding]],
+) -> tuple[list[Fit], Misses | None, list[Finding]]:
+    """The fits, how nominal values miss the measurements if they were used, and what was noticed.
+
+    where: rows of the measurements that are usable and those that are fitted, and what is known of them.
+    """
+    rows, fitted, findings = where
+    if robot.turntables:
+        arms = arms_of(robot, asked.orientation)
+        check_count(max(arm.count for arm in arms) // 3, fitted, findings)
+        links = links_of_arms(arms, data)
+        check_robot(robot, misses_of(links), data.q, data.r, data.R, rows)
+        there, more = arms_in_frame(robot, arms, data, rows)
+        nominal = links = links if there is arms else links_of_arms(there, data)
+    else:
+        links = nominal_links(robot, data, six_links(asked.model, robot))
+        check_count(max(len(link.start) for link in links), fitted, findings)
+        check_robot(robot, misses_of(links), data.q, data.r, data.R, rows)
+        nominal, more = links, []
+        if asked.start == "nominal" or _needs_values(asked.prior):
+            nominal, more = in_frame(robot, links, data, rows)
+        links = started_linear(links) if asked.start == "linear" else nominal
+    directions = "linear" if more else asked.start
+    values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
+    fits = fit_model(asked.model, links, data, directions, Prior(asked.prior, values), asked.loss)
+    return fits, misses_of(nominal) if asked.start == "nominal" else None, more
 
 
 def _needs_values(prior: Mapping[str, Any] | None) -> bool:
@@ -114,15 +161,15 @@ def _check_words(**words: str) -> None:
             )
 
 
-def _check_columns(geometry: Geometry, measurements: Measurements) -> None:
+def _check_columns(robot: NominalRods, measurements: Measurements) -> None:
     if not isinstance(measurements, Measurements):
         raise ModelError(
             f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
         )
-    expected = len(geometry.arms) + geometry.turntables
+    expected = len(robot.rods.joints)
     if measurements.q.shape[1] != expected:
         raise ModelError(
-            f"calibrate: found measurements of {measurements.q.shape[1]} actuators for {geometry.name}, expected "
+            f"calibrate: found measurements of {measurements.q.shape[1]} actuators for {robot.name}, expected "
             f"{expected}, one for each guideway and turntable; check the columns q1, q2, ..."
         )
 

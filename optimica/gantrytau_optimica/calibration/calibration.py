@@ -1,162 +1,28 @@
-"""What `calibrate` found: parameters, how sure they are, and how well they predict poses that were held out."""
+"""What `calibrate` found: identified rods, as a robot, as kinematics and as a report."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from gantrytau import GantryTauError, Model, ModelError
-from gantrytau.errors import did_you_mean
-from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
-from gantrytau_optimica.calibration.data.findings import Finding
-from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
-from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
-from gantrytau_optimica.calibration.judging.plausibility import Misses
-from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
-from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
-from gantrytau_optimica.calibration.rods.named_parameters import Named, arm_of, named_parameters, rod_links
-from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
+from gantrytau.kinematics import Kinematics
+from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.report.report import write_report
+from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements.
-
-    model, method, loss: as they were asked for; fits: links that share numbers, at their minima; rows: those of the
-    measurements that were fitted; held_out: those that validate; findings: what was noticed on the way; nominal: how nominal
-    values in the frame of the measurements miss them, None if they were not used.
-    """
-
-    geometry: Geometry
-    measurements: Measurements
-    model: Any
-    fits: Sequence[Fit]
-    rows: np.ndarray
-    held_out: np.ndarray
-    method: str
-    loss: str
-    findings: tuple[Finding, ...] = ()
-    nominal: Misses | None = None
-
-    def __repr__(self) -> str:
-        return (
-            f"<Calibration of {self.geometry.name}, model {self.model}: {len(self.names)} numbers from {len(self.rows)} "
-            f"poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
-        )
-
-    def with_findings(self, findings: Sequence[Finding]) -> Self:
-        """The same with other findings, without working anything out anew."""
-        found = replace(self, findings=tuple(findings))
-        found.__dict__.update({name: value for name, value in self.__dict__.items() if name != "findings"})
-        return found
-
-    @cached_property
-    def parameters(self) -> Mapping[str, Any]:
-        """Values by name: `arms[i].length`, `.offset`, `.direction`; of six links `arms[i].links[j].length`, `.offset`,
-        `.plate_offset`; of measured guideways `.frame_offset` and `.frame_rotation` (a rotation vector).
-        """
-        return Named(named_parameters(self.geometry, self.fits))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the identified numbers, scalars."""
-        return tuple(name for fit in self.fits for name in fit.free_names)
-
-    @cached_property
-    def undetermined(self) -> tuple[str, ...]:
-        """Names of numbers that data do not hold: they stayed near their start values."""
-        return tuple(name for fit in self.fits for name in undetermined(fit))
-
-    @property
-    def rank(self) -> int:
-        """How many combinations of the identified numbers data hold."""
-        return sum(fit.minimum.rank for fit in self.fits)
-
-    def undetermined_part(self, name: str) -> bool:
-        """Whether data do not hold a number, or an element of a vector."""
-        return any(lost == name or lost.rpartition("[")[0] == name for lost in self.undetermined)
-
-    @property
-    def success(self) -> bool:
-        """Whether the last step of every group of links was negligible."""
-        return all(fit.minimum.success for fit in self.fits)
-
-    @property
-    def iterations(self) -> int:
-        """Steps, the most of any group of links."""
-        return max(fit.minimum.iterations for fit in self.fits)
-
-    @property
-    def cost(self) -> float:
-        """Sum of the squares of all closure errors of the fitted poses, m4."""
-        return float(sum(np.sum(fit.group.errors(fit.x) ** 2) for fit in self.fits))
-
-    @cached_property
-    def noise(self) -> float:
-        """Standard deviation of one coordinate of a measured position that explains what is left, m."""
-        return float(np.sqrt(np.mean(np.concatenate(link_noise(self.fits, self.loss)) ** 2)))
-
-    @cached_property
-    def _covariance(self) -> np.ndarray:
-        return joint_covariance(self.fits, self.loss)
-
-    def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
-        """Covariance (k, k) of parameters in their order; a vector's name stands for its three elements.
-
-        names: default all that data hold. Links share the noise of a position, so that numbers of different arms vary
-        together. Raises ModelError for unknown names and for numbers that data do not hold.
-        """
-        if isinstance(names, str):
-            raise ModelError(f"covariance: found '{names}', expected a list of names; write ['{names}']")
-        wanted = [n for n in self.names if n not in self.undetermined] if names is None else names
-        places = [k for name in wanted for k in self._places(name)]
-        return self._covariance[np.ix_(places, places)]
-
-    def _places(self, name: str) -> list[int]:
-        aliases = [name, name[name.index("direction") :]] if "direction" in name else [name]
-        for alias in aliases:
-            wanted = [n for n in self.names if n == alias or n.rpartition("[")[0] == alias]
-            if wanted:
-                lost = [n for n in wanted if n in self.undetermined]
-                if lost:
-                    raise ModelError(
-                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; turn the plate "
-                        "more between poses, or give a prior"
-                    )
-                return [self.names.index(n) for n in wanted]
-        if name in self.parameters:
-            raise ModelError(f"covariance: {name} was not identified but held at its value; leave it out")
-        raise ModelError(f"covariance: there is no parameter '{name}'{did_you_mean(name, self.parameters)}")
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations of the identified numbers by name; inf for what data do not hold."""
-        found = np.sqrt(np.diag(self._covariance))
-        lost = set(self.undetermined)
-        return {n: float("inf") if n in lost else float(d) for n, d in zip(self.names, found, strict=True)}
-
-    @cached_property
-    def chains(self) -> CalibratedKinematics:
-        """Kinematics of the calibrated links as they were fitted, of models 2 to 5 too."""
-        few = self.rows[np.linspace(0, len(self.rows) - 1, min(len(self.rows), 500)).astype(int)]
-        r = self.measurements.r[few]
-        middle = few[np.argmin(np.linalg.norm(r - np.median(r, axis=0), axis=1))]
-        R = self.measurements.R
-        turns = sum(len(fit.group.chains) for fit in self.fits) > 3
-        pose = np.eye(3) if R is None else R[middle] if turns else mean_rotation(R[few])
-        return CalibratedKinematics(
-            rod_links(self.fits, self.measurements.rails), self.measurements.r[middle], pose
-        )
+class Calibration(FittedRods):
+    """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements."""
 
     @cached_property
     def kinematics(self) -> Any:
-        """`Kinematics` of the calibrated robot, with `.ik .fk .jacobian`; of models 2 to 5 `chains`, with the same."""
-        from gantrytau.kinematics import Kinematics
-
+        """`Kinematics` of the calibrated robot, with `.ik .fk .jacobian`; of models 2 to 5, and of quaternions of any
+        length, `chains`.
+        """
+        if self.orientation == "free" and self.nominal_rods.turntables:
+            return self.chains
         try:
             return Kinematics(self.robot)
         except GantryTauError:  # no model has measured guideways or directions of single links
@@ -164,89 +30,38 @@ class Calibration:
 
     @cached_property
     def robot(self) -> Model:
-        """The robot with the identified parameters. Raises ModelError for models 2 to 5, which no robot can hold."""
-        return calibrated_robot(self)
-
-    @cached_property
-    def error_vectors(self) -> np.ndarray:
-        """Measured less predicted positions of the held-out poses, (N, 3) in m."""
-        return self._held_out.r - self._predicted[0]
-
-    @cached_property
-    def _held_out(self) -> Measurements:
-        return self.measurements.select(self.held_out)
-
-    @cached_property
-    def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
-        q, r, R = self._held_out.q, self._held_out.r, self._held_out.R
-        return self.chains.fk(q, (r, R) if self.chains.turns and R is not None else r)
-
-    @cached_property
-    def errors(self) -> np.ndarray:
-        """Distances of measured and predicted positions of the held-out poses (5.5), (N,) in m."""
-        return np.sqrt(np.einsum("ij,ij->i", self.error_vectors, self.error_vectors))
-
-    @cached_property
-    def left_out(self) -> np.ndarray:
-        """Rows that a robust loss leaves without weight, as findings say: `.error` and `.angle_error` leave them out too."""
-        return self.suspicion.rows if self.loss == "robust" else self.held_out[:0]
-
-    @property
-    def error(self) -> np.float64:
-        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted."""
-        return _mean(self.errors[~np.isin(self.held_out, self.left_out)])
-
-    @cached_property
-    def angle_errors(self) -> np.ndarray:
-        """Angles between measured and predicted orientations of the held-out poses, (N,) in rad; NaN without R."""
-        R = self.measurements.R
-        if R is None:
-            return np.full(len(self.held_out), np.nan)
-        turned = np.einsum("nji,njk->nik", self._predicted[1], R[self.held_out])
-        return np.linalg.norm(rotation_vector(turned), axis=1)
-
-    @property
-    def angle_error(self) -> np.float64:
-        """Mean of `angle_errors`, rad, without `left_out`; NaN where no orientations were measured."""
-        return _mean(self.angle_errors[~np.isin(self.held_out, self.left_out)])
-
-    @property
-    def plate_turns(self) -> bool:
-        """Whether the links hold the orientation of the plate."""
-        return any(chain.R is not None for fit in self.fits for chain in fit.group.chains)
-
-    def link_errors(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m."""
-        found = []
-        for fit in self.fits:
-            for chain, e in zip(fit.group.chains, fit.distances().T, strict=True):
-                found.append((chain.name, chain.q, e))
-        return found
-
-    @cached_property
-    def suspicion(self) -> Suspicion:
-        """Rows that close worse than noise explains, seen by a fit without them."""
-        return suspicion(self)
-
-    def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-        """For each actuator its column in q, errors (N, m) of a group of m links at some fitted poses, their slopes by the
-        numbers, those that were held too (N, m, p), and by the actuator (N, m), zero for links of others; by weights
-        where a loss gave them.
+        """The robot with the identified parameters, started in a measured pose. Raises ModelError for models 2 to 5 and for
+        quaternions of any length, which no robot can hold.
         """
-        for fit in self.fits:
-            errors, jacobian, by_cart = [], [], []
-            weights = np.ones(len(few)) if fit.weights is None else fit.weights[few]
-            chains = [chain.at(few) for chain in fit.group.chains]
-            here = replace(fit.group, chains=tuple(chains), free=np.ones_like(fit.group.free))
-            for k, chain in enumerate(chains):
-                p = here.numbers(k, fit.x)
-                errors.append(weights * chain.error(p))
-                jacobian.append(weights[:, None] * here.slopes(fit.x, k))
-                by_cart.append(weights * chain.by_cart(p))
-            arms = np.array([arm_of(chain.name) for chain in chains])
-            for arm in np.unique(arms):
-                slopes = np.where(arms == arm, np.column_stack(by_cart), 0.0)
-                yield int(arm), np.column_stack(errors), np.stack(jacobian, axis=1), slopes
+        nominal = self.nominal_rods
+        if self.model in (2, 3, 4, 5):
+            raise ModelError(
+                f"robot: model {self.model} has measured guideways or a direction for each link, which {nominal.name} has "
+                "not; use .kinematics, or calibrate with model=None"
+            )
+        if self.model == 1 and nominal.turns:
+            raise ModelError(
+                "robot: model 1 has one link on each arm, and the robot six; use .kinematics, or model=None"
+            )
+        if self.orientation == "free" and nominal.turntables:
+            raise ModelError(
+                "robot: found orientation='free', whose quaternions turn no rigid turntable, expected 'local' or 'unit'; "
+                "calibrate with one of these, or use .kinematics"
+            )
+        values = dict(self.parameters)
+        for table in nominal.rods.turntables:
+            u = values[table.orientation]
+            values[table.orientation] = u / np.linalg.norm(u)
+        robot = with_numbers(nominal.robot, values | self._given_places())
+        if nominal.turntables:
+            return robot
+        return robot.modified(dict(tool=dict(r=dict(start=list(self.chains.start_r)))))
+
+    def _given_places(self) -> dict[str, np.ndarray]:
+        """What is given in a frame of its own that the frame of the measurements moved: turntables on carts."""
+        arms = {name: value for arm in self.arms for name, value in arm.values.items()}
+        names = [table.offset for table in self.nominal_rods.rods.turntables]
+        return {name: arms[name] for name in names}
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
@@ -254,43 +69,4 @@ class Calibration:
         A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
         Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
         """
-        from gantrytau_optimica.calibration.report.report import write_report
-
         return write_report(self, Path(path))
-
-
-def _mean(values: np.ndarray) -> np.float64:
-    """The mean of what is finite, NaN of nothing."""
-    finite = values[np.isfinite(values)]
-    return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
-
-
-def calibrated_robot(found: Calibration) -> Model:
-    """The model with identified parameters in place of its own, started in a measured pose."""
-    if found.model in (2, 3, 4, 5):
-        raise ModelError(
-            f"robot: model {found.model} has measured guideways or a direction for each link, which "
-            f"{found.geometry.name} has not; use .kinematics, or calibrate with model=None"
-        )
-    if found.model == 1 and found.geometry.kind == "six":
-        raise ModelError(
-            "robot: model 1 has one link on each arm, and the robot six; use .kinematics, or model=None"
-        )
-    arms = []
-    for i, arm in enumerate(found.geometry.arms):
-        values = found.parameters
-        direction = list(values[f"arms[{i}].direction"])
-        if found.geometry.kind == "three":
-            own = {k: values[f"arms[{i}].{k}"] for k in ("length", "offset")}
-            arms.append(dict(length=own["length"], offset=list(own["offset"]), direction=direction))
-            continue
-        links = [
-            dict(
-                length=values[f"{link.name}.length"],
-                offset=list(values[f"{link.name}.offset"]),
-                plate_offset=list(values[f"{link.name}.plate_offset"]),
-            )
-            for link in arm.links
-        ]
-        arms.append(dict(direction=direction, links=links))
-    return found.geometry.robot.modified(dict(arms=arms, tool=dict(r=dict(start=list(found.chains.start_r)))))

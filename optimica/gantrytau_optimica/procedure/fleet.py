@@ -18,8 +18,8 @@ from gantrytau.kinematics.rods.rod_robots import SixRods, ThreeRods, TurningRods
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Examiner
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.devices.sight import Bars
-from gantrytau_optimica.calibration.fitting.arm_fit import scales
-from gantrytau_optimica.calibration.rods.arms import Arm, read_arms
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, read_arms
+from gantrytau_optimica.calibration.rods.arm_factors import scales
 from gantrytau_optimica.procedure.nearest_bodies import nearest_bodies
 
 WIDER = 2.0  # times the error of a tape measure, at which a robot must be safe too
@@ -100,7 +100,7 @@ class Fleet:
         return (self.nominal, *self.wider, *self.others)
 
     @cached_property
-    def arms(self) -> tuple[Arm, ...]:
+    def arms(self) -> tuple[ArmClosure, ...]:
         """The nominal robot as calibration sees it."""
         return read_arms(self.robot)
 
@@ -161,7 +161,7 @@ def build_fleet(robot: Model, limits: Limits, *, tape: float, robots: int, seed:
 
 
 def _others(
-    kinematics: Kinematics, arms: Sequence[Arm], tape: float, random: np.random.Generator
+    kinematics: Kinematics, arms: Sequence[ArmClosure], tape: float, random: np.random.Generator
 ) -> tuple[Kinematics, Kinematics]:
     """A robot with other parameters, by chance, and one with `WIDER` times these errors."""
     home = kinematics.home.q
@@ -179,7 +179,7 @@ def _others(
 
 
 def _moved(
-    kinematics: Kinematics, arms: Sequence[Arm], errors: Sequence[np.ndarray], times: float
+    kinematics: Kinematics, arms: Sequence[ArmClosure], errors: Sequence[np.ndarray], times: float
 ) -> Kinematics:
     moved = [arm.moved(times * error) for arm, error in zip(arms, errors, strict=True)]
     return kinematics.replaced({name: arm.values[name] for arm in moved for name in arm.free})

@@ -7,7 +7,7 @@ import numpy as np
 from gantrytau_optimica.calibration.design.identifiability import Poses
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.calibration.fitting.arm_fit import scales
+from gantrytau_optimica.calibration.rods.arm_factors import scales
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.fleet import Fleet
 from gantrytau_optimica.procedure.plan_goal import PlanGoal

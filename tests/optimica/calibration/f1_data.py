@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gantrytau_models import F1GantryTau, prototypes
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of
-from gantrytau_optimica.calibration.rods.arms import Arm, Orientation, read_arms
 from tests.references import f1
 
 DEVICE = 1e-5  # m, of a laser tracker, per axis
@@ -20,11 +20,11 @@ class Poses(NamedTuple):
     R: np.ndarray
 
 
-def f1_arms(orientation: Orientation = "local", *, name="F1", gains=False) -> tuple[Arm, ...]:
+def f1_arms(orientation: Orientation = "local", *, name="F1", gains=False) -> tuple[ArmClosure, ...]:
     return read_arms(F1GantryTau(getattr(prototypes, name)), orientation, gains=gains)
 
 
-def f1_poses(arms: tuple[Arm, ...], count: int, *, seed: int = 0) -> Poses:
+def f1_poses(arms: tuple[ArmClosure, ...], count: int, *, seed: int = 0) -> Poses:
     """Poses of the plate below the carts, carts within 0.4 m of each other, plate turned up to 20 degrees either way."""
     rng, drawn = (
         np.random.default_rng(seed),

@@ -4,11 +4,11 @@ import numpy as np
 
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, read_arms
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of
-from gantrytau_optimica.calibration.rods.arms import Arm, read_arms
 
 
-def carts(arms: tuple[Arm, ...], r: np.ndarray, R: np.ndarray) -> np.ndarray:
+def carts(arms: tuple[ArmClosure, ...], r: np.ndarray, R: np.ndarray) -> np.ndarray:
     """The carts behind the tool that close the first link of each arm, (N, 3)."""
     q = np.empty((len(r), 3))
     for i, arm in enumerate(arms):

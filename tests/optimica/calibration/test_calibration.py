@@ -156,9 +156,9 @@ def test_a_prior_holds_what_few_poses_do_not(poses):
     start = nominal(0.001)
     held = calibrate(start, few, prior={"length": 1e-6, "arms[1].direction": (TRUTH.arms[1].direction, 1e-7)})
     free = calibrate(start, few)
-    before = calibrate(start, measured(poses), holdout=None).geometry.arms
-    for i, name in enumerate(LENGTHS):
-        assert held.parameters[name] == pytest.approx(before[i].links[0].length, abs=4e-6)
+    before = calibrate(start, measured(poses), holdout=None).nominal_rods.values
+    for name in LENGTHS:
+        assert held.parameters[name] == pytest.approx(before[name], abs=4e-6)
         assert held.deviations[name] < 1.1e-6 < free.deviations[name]
     assert held.parameters["arms[1].direction"] == pytest.approx(TRUTH.arms[1].direction, abs=4e-7)
 
@@ -240,7 +240,7 @@ def test_robots_and_names_that_are_none(found, poses):
 
     with pytest.raises(ModelError, match="expected a model instance"):
         calibrate(cast(Any, "L1"), measured(poses))
-    with pytest.raises(ModelError, match="without parameters arms"):
+    with pytest.raises(ModelError, match="found Pendulum that does not say what its rods are"):
         calibrate(Pendulum(), measured(poses))
     with pytest.raises(ModelError, match="expected Measurements"):
         calibrate(nominal(), poses)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
-from gantrytau_optimica.calibration.fitting.arm_fit import fit_arm
+from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from tests.optimica.calibration import f1_data
 
 TRUTH = prototypes.F1
@@ -97,8 +97,11 @@ def test_a_prior_by_the_last_part_of_its_name(data):
     assert max(d for name, d in found.deviations.items() if "plate_offset" in name) < 1.2e-4
     with pytest.raises(ModelError, match="not identified"):
         calibrate(nominal(), data[1], prior={"plate_ofset": 1e-4})
-    with pytest.raises(ModelError, match="one number above 0"):
-        calibrate(nominal(), data[1], prior={"plate_offset": (0.1, 1e-4)})
+    with pytest.raises(ModelError, match="expected one above 0"):
+        calibrate(nominal(), data[1], prior={"plate_offset": -1e-4})
+    name, value = "arms[0].links[0].length", float(TRUTH.arms[0].links[0].length) + 1e-3
+    held = calibrate(nominal(), data[1], prior={name: (value, 1e-9)})  # a pair: about a value of its own
+    assert held.parameters[name] == pytest.approx(value, abs=1e-6)
 
 
 def test_the_frame_of_the_device_is_another(data):

@@ -243,3 +243,8 @@ def _rail_file(path: Path) -> np.ndarray:
 
     columns, _ = _table(path, wrong)
     return np.column_stack([columns[name] for name in ("q", *_POSITION)])
+
+
+def thinned(count: int, poses: int = 200) -> np.ndarray:
+    """At most `poses` rows, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, poses)).astype(int))

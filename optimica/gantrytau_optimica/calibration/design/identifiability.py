@@ -15,16 +15,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gantrytau import Model, ModelError, StructureError
-from gantrytau_optimica.calibration.fitting.arm_fit import (
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.rods.arm_factors import (
     NOISE,
-    TAPE,
     checked_poses,
     half_covariance,
     scales,
     triangle,
 )
 from gantrytau_optimica.calibration.rods.arm_poses import pose_rows
-from gantrytau_optimica.calibration.rods.arms import Arm, Orientation, read_arms
+from gantrytau_optimica.calibration.rods.groups import TAPE
 
 NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
 TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out
@@ -190,7 +190,7 @@ def check_deviations(noise: float, angle: float, tape: float) -> None:
             raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
 
 
-def _of_arm(arm: Arm, poses: Poses, noise: tuple[float, float], tape: float) -> ArmIdentifiability:
+def _of_arm(arm: ArmClosure, poses: Poses, noise: tuple[float, float], tape: float) -> ArmIdentifiability:
     scale, data = scales(arm), checked_poses(arm, *poses)
     factor = triangle(arm, *data, scale)[:, :-1]
     _, s, directions = np.linalg.svd(factor, full_matrices=True)

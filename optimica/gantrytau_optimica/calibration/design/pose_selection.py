@@ -26,9 +26,10 @@ from gantrytau_optimica.calibration.design.identifiability import (
     finite_poses,
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
-from gantrytau_optimica.calibration.fitting.arm_fit import NOISE, TAPE, checked_poses, scales
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.rods.arm_factors import NOISE, checked_poses, scales
 from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, tool_gain
-from gantrytau_optimica.calibration.rods.arms import Arm, Orientation, read_arms
+from gantrytau_optimica.calibration.rods.groups import TAPE
 
 Method = Literal["d-optimal", "tool", "condition", "random"]
 METHODS = ("d-optimal", "tool", "condition", "random")
@@ -162,7 +163,7 @@ def enough_poses(
     return np.sort(finite[chosen])
 
 
-def _gains(arms: Sequence[Arm], poses: Poses) -> np.ndarray:
+def _gains(arms: Sequence[ArmClosure], poses: Poses) -> np.ndarray:
     """dx/dp of all unknowns, arms one after another, (N, 6 or 3, p)."""
     return np.concatenate([gain for gain, _ in tool_gain(arms, *poses)], axis=2)
 
@@ -175,7 +176,7 @@ def _predicted(gains: np.ndarray, covariance: np.ndarray) -> Prediction:
 
 def _candidates(
     robot: Model, measurements: Any, orientation: Orientation
-) -> tuple[tuple[Arm, ...], Poses, np.ndarray]:
+) -> tuple[tuple[ArmClosure, ...], Poses, np.ndarray]:
     """The arms, the candidates whose numbers are finite, and their rows."""
     arms, (poses, rows) = read_arms(robot, orientation), finite_poses(measurements)
     return arms, Poses(*[checked_poses(arm, *poses) for arm in arms][-1]), rows
@@ -185,7 +186,7 @@ def _rows_of(poses: Poses, rows: np.ndarray) -> Poses:
     return Poses(poses.q[rows], poses.r[rows], None if poses.R is None else np.asarray(poses.R)[rows])
 
 
-def _blocks(arms: Sequence[Arm], poses: Poses) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _blocks(arms: Sequence[ArmClosure], poses: Poses) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """J S of each arm, (N, m, rank), and W, (rank, rank), in the directions that all candidates together determine."""
     blocks, weights = [], []
     for arm, (gain, J) in zip(arms, tool_gain(arms, *poses), strict=True):
@@ -214,7 +215,7 @@ def _well_conditioned(blocks: Sequence[np.ndarray], n: int) -> np.ndarray:
 
 
 def _parameter_covariance(
-    arms: Sequence[Arm], poses: Poses, noise: tuple[float, float], tape: float
+    arms: Sequence[ArmClosure], poses: Poses, noise: tuple[float, float], tape: float
 ) -> np.ndarray:
     """Covariance of all unknowns after a fit, arms one after another, (p, p).
 

@@ -16,9 +16,9 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.design.identifiability import Poses, finite_poses
-from gantrytau_optimica.calibration.fitting.arm_fit import checked_poses
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of
-from gantrytau_optimica.calibration.rods.arms import Arm, Orientation, read_arms
 
 STEP = 5e-5  # m, or without unit: that of Table 5.10
 
@@ -81,7 +81,9 @@ def sensitivity_table(
     return SensitivityTable(tuple(names), position, angle, cost, step, len(q))
 
 
-def _of_parameter(arms: Sequence[Arm], i: int, step: np.ndarray, here: Poses) -> tuple[float, float, float]:
+def _of_parameter(
+    arms: Sequence[ArmClosure], i: int, step: np.ndarray, here: Poses
+) -> tuple[float, float, float]:
     position = angle = cost = 0.0
     for sign in (1.0, -1.0):
         arm = arms[i].moved(sign * step)

@@ -13,9 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau.kinematics.rotations import left_jacobian, told_vector
-from gantrytau_optimica.calibration.fitting.truncated_fit import Fit
-from gantrytau_optimica.calibration.rods.closure import ALONG, PLATE
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
 MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
@@ -105,12 +103,7 @@ def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
 
 def _moved(fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str) -> list[np.ndarray]:
     """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
-    turned = []
-    for f, k in parts:
-        chain, p = fits[f].group.chains[k], fits[f].x[fits[f].group.places[k]]
-        y = 2 * chain.vector(p)
-        lever = np.zeros_like(y) if chain.R is None else chain.R @ p[PLATE]
-        turned.append((y, np.cross(lever, y) if chain.R is not None else lever))
+    turned = [fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
     if loss == "robust" or not any(w.any() for _, w in turned):
         noises = np.concatenate(link_noise(fits, loss))
         return [s * np.hstack([u, 0 * w]) for s, (u, w) in zip(noises, turned, strict=True)]
@@ -132,30 +125,26 @@ def _slopes(fit: Fit, k: int) -> np.ndarray:
 def _inverse(fit: Fit) -> np.ndarray:
     """(J'J)^-1 in the directions that were moved."""
     minimum = fit.minimum
-    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None]
+    scale = fit.group.scale[fit.group.free]
+    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
     return held.T @ held
 
 
 def _of_prior(fit: Fit) -> np.ndarray:
     """What the rows of the prior, the last of the slopes, add to the middle."""
     count = len(fit.group.prior)
-    rows = fit.minimum.slopes[len(fit.minimum.slopes) - count :]
+    rows = fit.minimum.slopes[len(fit.minimum.slopes) - count :] / fit.group.scale[fit.group.free]
     freedom = max(1, fit.count - fit.minimum.rank)
     return rows.T @ rows * (fit.minimum.cost / freedom)
 
 
 def as_told(fit: Fit) -> np.ndarray:
-    """Derivatives of the numbers that are reported by those that were moved, (n, n).
-
-    The same, but for turns of measured guideways, before a rotation that was given: what is reported is the rotation
-    vector W of both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
-    """
+    """Derivatives of the numbers that are reported by those that were moved, (n, n)."""
     whole = np.eye(len(fit.x))
-    for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
-        if chain.points is not None:
-            p, turn = fit.x[places], places[ALONG]
-            W = told_vector(chain.frame(p))
-            whole[np.ix_(turn, turn)] = np.linalg.solve(left_jacobian(W), left_jacobian(p[ALONG]))
+    for link, places in zip(fit.group.chains, fit.group.places, strict=True):
+        told = link.told(fit.x[places])
+        if told is not None:
+            whole[np.ix_(places, places)] = told
     return whole[np.ix_(fit.group.free, fit.group.free)]
 
 

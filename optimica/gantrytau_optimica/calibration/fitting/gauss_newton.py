@@ -15,15 +15,16 @@ JITTER = 1e-9  # of the cost: steps of less gain end at rounding errors, which r
 SMALLEST_ERROR = 1e-14  # m, of the closure of links of metres
 SHARES = 0.5 ** np.arange(12)  # of a step that are tried
 RELATIVE = 1e-10  # of the largest singular value, below which data say nothing
+TALL = 4  # times as many rows as columns
 
 
 @dataclass(frozen=True)
 class Minimum:
     """Where Gauss-Newton ended.
 
-    x: all numbers; errors: (m,) there; slopes: (m, n) for the free numbers; rank: how many directions were moved, the
-    first; singular: of the slopes along these; directions: the rows that belong to them, (n, n); success: whether the
-    last step was negligible.
+    x: all numbers; errors: (m,) there; slopes: (m, n) for the free numbers by their scale; rank: how many directions were
+    moved, the first; singular: of the slopes along these; directions: the rows that belong to them, (n, n); success:
+    whether the last step was negligible.
     """
 
     x: np.ndarray
@@ -47,16 +48,19 @@ def gauss_newton(
     x: np.ndarray,
     free: np.ndarray,
     *,
+    scale: np.ndarray | None = None,
     smallest: float = 0.0,
     directions: np.ndarray | None = None,
     movable: int | None = None,
 ) -> Minimum:
     """Minimise |errors(x)|^2 over x[free], beginning at x.
 
+    slopes: derivatives of the errors by x / scale, in which steps are least; scale: of each number, by default 1.
     Directions in which the slopes have a singular value below `smallest` (or 1e-10 of the largest) are left alone, so
     that what data do not hold stays where it began. Steps that do not make the errors smaller are halved.
     directions (n, n), orthonormal rows: only along the first, `movable` of them, is moved at all.
     """
+    scale = np.ones(len(x)) if scale is None else scale
     count = int(np.count_nonzero(free))
     whole = np.eye(count) if directions is None else directions
     inside, outside = whole[:movable], whole[len(whole) if movable is None else movable :]
@@ -66,11 +70,11 @@ def gauss_newton(
     while iteration < ITERATIONS and np.isfinite(step).all():
         iteration += 1
         done = np.abs(step).max(initial=0.0) < NEGLIGIBLE or gain < UNSEEN * cost
-        moved = _shortened(errors, x, free, step, cost)
-        if moved is None:
+        after = _shortened(errors, x, free, step * scale[free], cost)
+        if after is None:
             success = done or gain < JITTER * cost or gain < (SMALLEST_ERROR * singular.max(initial=0.0)) ** 2
             break
-        x, e = moved
+        x, e = after
         cost = float(e @ e)
         step, gain, singular, right, J = _step(slopes(x)[:, free], e, smallest, inside)
         if done:
@@ -103,8 +107,12 @@ def _step(J: np.ndarray, e: np.ndarray, smallest: float, inside: np.ndarray):
     """
     if not np.isfinite(J).all() or not np.isfinite(e).all():
         return np.full(J.shape[1], np.nan), 0.0, np.zeros(len(inside)), inside, J
-    left, singular, right = np.linalg.svd(J @ inside.T, full_matrices=False)
+    rows, right_side = J @ inside.T, e
+    if len(rows) > TALL * rows.shape[1]:  # the triangle first: the values of a tall matrix take longer
+        triangle = np.linalg.qr(np.column_stack([rows, e]), mode="r")
+        rows, right_side = triangle[:, :-1], triangle[:, -1]
+    left, singular, right = np.linalg.svd(rows, full_matrices=False)
     right = right @ inside
     counts = singular > _limit(singular, smallest)
-    along = left[:, counts].T @ e
+    along = left[:, counts].T @ right_side
     return right[counts].T @ (along / singular[counts]), float(along @ along), singular, right, J

@@ -1,13 +1,12 @@
 """The links of each model brought to their minima."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.truncated_fit import (
+from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
+from gantrytau_optimica.calibration.fitting.rod_fit import (
     Fit,
     Prior,
     fit_group,
@@ -15,9 +14,10 @@ from gantrytau_optimica.calibration.fitting.truncated_fit import (
     not_held,
     with_prior,
 )
-from gantrytau_optimica.calibration.judging.plausibility import thinned
 from gantrytau_optimica.calibration.rods.error_models import (
-    Link,
+    COMMON,
+    ModelLink,
+    elements,
     grouped,
     needs_rails,
     on_rail,
@@ -34,18 +34,13 @@ ANOTHER_FRAME = (
 
 def fit_model(
     model: object,
-    links: list[Link],
+    links: list[ModelLink],
     data: Measurements,
     start: str,
-    prior: Mapping[str, Any] | None,
+    expected: Prior,
     loss: str,
-    nominal: Mapping[str, float],
 ) -> list[Fit]:
-    """The fits of a model of Table 5.2, of groups of links that share numbers; start, prior, loss as in `calibrate`.
-
-    nominal: values by name, about which a prior holds numbers, if not about those they start with.
-    """
-    expected = Prior(prior, nominal)
+    """The fits of a model of Table 5.2, of groups of links that share numbers; start, loss as in `calibrate`."""
     if needs_rails(model):
         return _fit_rails(model, links, data, expected, loss)
     if model == 3:
@@ -59,11 +54,11 @@ def _fit_groups(groups: Sequence[Group], loss: str) -> list[Fit]:
     return fit_robust(groups) if loss == "robust" else [fit_group(group) for group in groups]
 
 
-def _fit_parallel(links: list[Link], start: str, prior: Prior, loss: str) -> list[Fit]:
+def _fit_parallel(links: list[ModelLink], start: str, prior: Prior, loss: str) -> list[Fit]:
     """One direction for all guideways: the nominal one, unless it is unknown or that of another frame."""
     common = _fit_groups(with_prior(grouped(parallel(links, True)), prior), loss)
     found = common[0].values
-    identified = np.array([found[f"direction[{k}]"] for k in range(3)])
+    identified = np.array([found[name] for name in elements(COMMON)])
     nominal = np.mean([link.start[4:7] for link in links], axis=0)
     cosine = identified @ nominal / np.linalg.norm(identified) / np.linalg.norm(nominal)
     if start == "linear" or np.arccos(np.clip(cosine, -1, 1)) > ANOTHER_FRAME:
@@ -71,31 +66,33 @@ def _fit_parallel(links: list[Link], start: str, prior: Prior, loss: str) -> lis
     return _fit_groups(with_prior(grouped(parallel(links, False)), prior), loss)
 
 
-def _fit_rails(model: object, links: list[Link], data: Measurements, prior: Prior, loss: str) -> list[Fit]:
+def _fit_rails(
+    model: object, links: list[ModelLink], data: Measurements, prior: Prior, loss: str
+) -> list[Fit]:
     """Models 2, 4 and 5: first where straight guideways lie, then how the measured ones do."""
     assert data.rails is not None
     single = [link for link in links if link.chain.R is None]
     if not single:  # models 4 and 5 turn guideways as model 2 finds them
-        single = started_linear([_without_plate(arm, links) for arm in range(len(data.rails))])
+        single = started_linear([_without_plate(cart, links) for cart in range(len(data.rails))])
     fits = [fit_group(group) for group in grouped(single)]
     single = [_at(link, fit) for link, fit in zip(single, fits, strict=True)]
-    placed = [_placed(k, data.rails[k.arm], not_held(fit)) for k, fit in zip(single, fits, strict=True)]
+    placed = [_placed(k, data.rails[k.cart], not_held(fit)) for k, fit in zip(single, fits, strict=True)]
     if model == 2:
         return _fit_groups(with_prior([fit.group.started(fit.x) for fit in placed], prior), loss)
-    whole: list[Link] = []
+    whole: list[ModelLink] = []
     for link in links:
         own = own_directions(link)
-        if model == 4 or link.arm == 1:
-            fit = placed[link.arm]
+        if model == 4 or link.cart == 1:
+            fit = placed[link.cart]
             turned = fit.group.chains[0].frame(fit.x[fit.group.places[0]])
             started = _at(own, fit_group(grouped([own])[0]))
-            whole += on_rail(started, data.rails[link.arm], turned)
+            whole += on_rail(started, data.rails[link.cart], turned)
         else:
             whole.append(own)
     return _fit_groups(with_prior(grouped(whole), prior), loss)
 
 
-def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
+def _placed(link: ModelLink, rail: np.ndarray, truncated: float) -> Fit:
     """The measured guideway where a link has it; how it is rolled is tried with some of the poses.
 
     truncated: as of the straight guideway.
@@ -109,15 +106,16 @@ def _placed(link: Link, rail: np.ndarray, truncated: float) -> Fit:
     return fit_group(grouped([on_rail(link, rail)[best]])[0].started(fits[best].x))
 
 
-def _with_poses(link: Link, rows: np.ndarray) -> Link:
+def _with_poses(link: ModelLink, rows: np.ndarray) -> ModelLink:
     return replace(link, chain=link.chain.at(rows))
 
 
-def _without_plate(arm: int, links: Sequence[Link]) -> Link:
-    link = next(link for link in links if link.arm == arm)
-    names = (f"arms[{arm}].length", *(f"arms[{arm}].offset[{k}]" for k in range(3)), *link.names[4:7])
-    return Link(arm, replace(link.chain, name=f"arms[{arm}]", R=None), names, link.start[:7], link.free[:7])
+def _without_plate(cart: int, links: Sequence[ModelLink]) -> ModelLink:
+    link = next(link for link in links if link.cart == cart)
+    names = (f"{link.arm}.length", *elements(f"{link.arm}.offset"), *link.names[4:7])
+    parts = {part: getattr(link, part)[:7] for part in ("start", "free", "scale")}
+    return replace(link, chain=replace(link.chain, name=link.arm, R=None), names=names, **parts)
 
 
-def _at(link: Link, fit: Fit) -> Link:
+def _at(link: ModelLink, fit: Fit) -> ModelLink:
     return replace(link, start=np.array([fit.values[name] for name in link.names]))

@@ -12,16 +12,17 @@ import numpy as np
 
 from gantrytau.kinematics.rotations import mean_rotation, motion
 from gantrytau_optimica.calibration.data.findings import CalibrationError, rows_in_words
+from gantrytau_optimica.calibration.data.measurements import thinned
 from gantrytau_optimica.calibration.data.mistakes import Mistake, mistakes
+from gantrytau_optimica.calibration.rods.arm_links import ArmLink
 from gantrytau_optimica.calibration.rods.closure import Chain
-from gantrytau_optimica.calibration.rods.error_models import Link, moved
+from gantrytau_optimica.calibration.rods.error_models import ModelLink, moved
 from gantrytau_optimica.calibration.rods.linear_start import linear_start
-from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
+from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
 BETTER = 10.0  # times smaller errors that undoing a mistake must leave
 ALIKE = 0.05  # m; a D1 is within 75 mm of an L1 whose q2 and q3 are exchanged
-POSES = 200
 TRIMMINGS = 8  # rounds of placing a frame without the points that fit it worst
 
 
@@ -29,13 +30,8 @@ TRIMMINGS = 8  # rounds of placing a frame without the points that fit it worst
 Misses = Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]
 
 
-def thinned(count: int, poses: int = POSES) -> np.ndarray:
-    """At most `poses` rows, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, poses)).astype(int))
-
-
 def check_robot(
-    geometry: Geometry, misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None, rows: np.ndarray
+    robot: NominalRods, misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None, rows: np.ndarray
 ) -> None:
     """CalibrationError if undoing a mistake makes nominal values fit that did not.
 
@@ -46,7 +42,7 @@ def check_robot(
     found = miss(misses, q, r, R)
     if found < NEAR / 10:
         return
-    trials = [(m, miss(misses, *m.undo(q, r, R))) for m in mistakes_of(geometry)]
+    trials = [(m, miss(misses, *m.undo(q, r, R))) for m in mistakes_of(robot)]
     mistake, left = min(trials, key=lambda trial: trial[1])
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
@@ -58,13 +54,13 @@ def check_robot(
         )
 
 
-def mistakes_of(geometry: Geometry) -> Iterator[Mistake]:
+def mistakes_of(robot: NominalRods) -> Iterator[Mistake]:
     """Mistakes that can be made with measurements of this robot."""
-    return mistakes(len(geometry.arms), geometry.turntables, geometry.kind != "three")
+    return mistakes(len(robot.arms), robot.turntables, robot.turns)
 
 
 def explained_rows(
-    geometry: Geometry, misses: Misses, limit: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+    robot: NominalRods, misses: Misses, limit: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> Iterator[tuple[Mistake, np.ndarray]]:
     """Mistakes that explain some of these rows: links close within `limit` once it is undone; places of these rows.
 
@@ -72,7 +68,7 @@ def explained_rows(
     than one is true.
     """
     found = misses(q, r, R)
-    known = list(mistakes_of(geometry))
+    known = list(mistakes_of(robot))
     left = np.array([misses(*mistake.undo(q, r, R)) for mistake in known])
     good = (left < limit) & (left * BETTER < found)
     while good.any():
@@ -92,7 +88,7 @@ def miss(misses: Misses, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> 
 
 
 def swapped_carts(
-    links: Sequence[Link], off: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+    links: Sequence[ModelLink], off: float, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> tuple[str, float] | None:
     """What stands in the wrong columns, and by how much guideways are off then, m; None if no other order of the carts, nor
     a mirrored frame, brings guideways to their nominal places in any frame. off: m, by which they are off as it is.
@@ -118,15 +114,14 @@ def swapped_carts(
     return (words, left) if left < ALIKE and left * BETTER < off else None
 
 
-def misses_of(links: Sequence[Link]) -> Misses:
-    """How far links with linear guideways are from their start lengths."""
+def misses_of(links: Sequence[ModelLink]) -> Misses:
+    """How far links are from their start lengths."""
+    arms = {id(link.chain.poses): link.chain.poses.arm for link in links if isinstance(link.chain, ArmLink)}
+    straight = [(link.chain, link.start) for link in links if isinstance(link.chain, Chain)]
 
     def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-        errors = []
-        for link in links:
-            chain = Chain("", q[:, link.arm], r, None if link.chain.R is None else R)
-            y = np.linalg.norm(chain.vector(link.start), axis=1)
-            errors.append(np.abs(y - link.start[0]))
+        errors = [np.abs(chain.over(q, r, R).gap(start)) for chain, start in straight]
+        errors += [np.abs(arm.errors(q, r, R)).max(axis=1) for arm in arms.values()]
         return np.max(errors, axis=0)
 
     return misses
@@ -148,21 +143,21 @@ class Fitting:
     off: float
 
 
-def compare(links: Sequence[Link], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> Fitting:
+def compare(links: Sequence[ModelLink], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> Fitting:
     """Nominal values beside measurements: in their frame, and in the frame that suits them best."""
     few = thinned(len(q), 1000)
     q, r, R = q[few], r[few], None if R is None else R[few]
     nominal, found, left = [], [], []
     middle = q.mean(axis=0)
     for link in links:
-        chain = Chain("", q[:, link.arm], r)
+        chain = Chain("", link.cart, q[:, link.cart], r)
         x = linear_start(chain)
         left.append(np.median(np.abs(np.linalg.norm(chain.vector(x), axis=1) - x[0])))
         # a joint on the plate moves the guideway that is found, in the axes of the measurements
         lever = np.zeros(3) if link.chain.R is None or R is None else mean_rotation(R) @ link.start[7:10]
         for s in (-1.0, 1.0):  # two points of the guideway
-            nominal.append(link.start[1:4] + (middle[link.arm] + s) * link.start[4:7])
-            found.append(x[1:4] + lever + (middle[link.arm] + s) * x[4:7])
+            nominal.append(link.start[1:4] + (middle[link.cart] + s) * link.start[4:7])
+            found.append(x[1:4] + lever + (middle[link.cart] + s) * x[4:7])
     a, b = np.array(nominal), np.array(found)
     turn, shift = motion(a, b)
     off = np.linalg.norm(b - shift - a @ turn.T, axis=1).max()

@@ -1,22 +1,21 @@
 """Whether what is left of a fit is noise: tests of the closure errors of each link."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from gantrytau_optimica.calibration.calibration import Calibration
 
-
-def residual_tests(found: "Calibration") -> list[dict[str, Any]]:
-    """Tests of the closure errors of fitted poses, in the order measured, for each link.
+def residual_tests(link_errors: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> list[dict[str, Any]]:
+    """Tests of the closure errors of fitted poses, in the order measured, for each link: its name, positions of its cart and
+    errors, (N,) each.
 
     normal: skewness and kurtosis (D'Agostino and Pearson, 1973); neighbours: correlation of one pose with the next;
     along the guideway: share of the errors that a polynomial of the eighth degree in q explains (F test), as bends of a
     guideway do. probability: that noise alone gives as large a value; a small one points to an error of the model.
     """
     tests = []
-    for link, q, e in found.link_errors():
+    for link, q, e in link_errors:
         if len(e) < 20:  # what the tests of normality need
             continue
         for name, value, probability in (_normal(e), _neighbours(e), _along(e, q)):

@@ -7,21 +7,16 @@ was not fitted, far from those that were, would look like an outlier. Few poses 
 widens as Student's distribution does.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.truncated_fit import Fit, fit_group, not_held
+from gantrytau_optimica.calibration.fitting.named_parameters import calibrated_arms, rod_links
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit, fit_group, not_held
 from gantrytau_optimica.calibration.judging.plausibility import BETTER, NEAR, Misses
 from gantrytau_optimica.calibration.rods.forward import BLOCK, RodLink
-from gantrytau_optimica.calibration.rods.guideway_points import between
-from gantrytau_optimica.calibration.rods.named_parameters import arm_of, rod_links
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.calibration.calibration import Calibration
 
 CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
 OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
@@ -60,42 +55,50 @@ def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.nda
     return (sizes / np.maximum(scales, 1e-12)[:, None]).max(axis=0), float(scales.max())
 
 
-def suspicion(found: "Calibration") -> Suspicion:
-    """Of a calibration of linear guideways: rows fitted and held out."""
-    mask = np.zeros(len(found.measurements), dtype=bool)
-    mask[found.rows] = mask[found.held_out] = True
+def suspicion(
+    fits: Sequence[Fit],
+    measurements: Measurements,
+    fitted: np.ndarray,
+    held_out: np.ndarray,
+    nominal: Misses | None,
+) -> Suspicion:
+    """Of fits to the rows `fitted`: rows fitted and held out; nominal: how nominal values miss them, if they are known."""
+    mask = np.zeros(len(measurements), dtype=bool)
+    mask[fitted] = mask[held_out] = True
     used = np.flatnonzero(mask)
-    fits, bad = list(found.fits), used[:0]
-    sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    fits, bad = list(fits), used[:0]
+    sizes, typical = relative_distances(fits, measurements, used, fitted)
     # among many poses a mistake in a few is seen without nominal values
-    if (len(used) < MANY or (sizes > OUTLIER).any()) and (coarse := far_rows(found, used)).size:
-        fits = [fit_group(fit.group, 1.0 - np.isin(found.rows, coarse)) for fit in fits]
-        sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
+    if (len(used) < MANY or (sizes > OUTLIER).any()) and (
+        coarse := far_rows(nominal, measurements, used)
+    ).size:
+        fits = [fit_group(fit.group, 1.0 - np.isin(fitted, coarse)) for fit in fits]
+        sizes, typical = relative_distances(fits, measurements, used, fitted)
     freedom = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
     for _ in range(CLEANINGS):
         fresh = used[sizes > limit(freedom)]
         if np.array_equal(fresh, bad):
             break
         bad = fresh
-        weights = 1.0 - np.isin(found.rows, bad)
+        weights = 1.0 - np.isin(fitted, bad)
         if weights.sum() < KEPT * len(weights):
             break
         fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
-        sizes, typical = relative_distances(fits, found.measurements, used, found.rows)
-    links = rod_links(fits, found.measurements.rails)
+        sizes, typical = relative_distances(fits, measurements, used, fitted)
+    distances = _distances_of(fits)
 
     def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-        return np.abs(_distances(links, q, r, R)).max(axis=0)
+        return np.abs(distances(q, r, R)).max(axis=0)
 
     return Suspicion(bad, misses, typical)
 
 
-def far_rows(found: "Calibration", used: np.ndarray) -> np.ndarray:
+def far_rows(nominal: Misses | None, measurements: Measurements, used: np.ndarray) -> np.ndarray:
     """Rows that nominal values miss by far more than the others; none where they miss most, or nothing is known."""
-    if found.nominal is None:
+    if nominal is None:
         return used[:0]
-    data = found.measurements.select(used)
-    missed = found.nominal(data.q, data.r, data.R)
+    data = measurements.select(used)
+    missed = nominal(data.q, data.r, data.R)
     usual = float(np.median(missed))
     far = used[missed > max(NEAR, BETTER * usual)]
     return far if usual < NEAR and len(far) < (1 - KEPT) * len(used) else used[:0]
@@ -105,20 +108,26 @@ def relative_distances(
     fits: Sequence[Fit], measurements: Measurements, rows: np.ndarray, fitted: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """The largest closure error of each of some rows in robust standard deviations of its link, (rows,), and the worst."""
-    links = rod_links(fits, measurements.rails)
-    whole = measurements.select(rows)
+    distances, whole = _distances_of(fits), measurements.select(rows)
     parts = []
     for first in range(0, len(rows), BLOCK):
         part = slice(first, first + BLOCK)
-        parts.append(
-            _distances(links, whole.q[part], whole.r[part], None if whole.R is None else whole.R[part])
-        )
+        parts.append(distances(whole.q[part], whole.r[part], None if whole.R is None else whole.R[part]))
     spread = _spread(fits, whole, np.isin(rows, fitted)) if len(rows) < MANY else 1.0
     return standardised(np.concatenate(parts, axis=1), spread)
 
 
+def _distances_of(
+    fits: Sequence[Fit],
+) -> Callable[[np.ndarray, np.ndarray, np.ndarray | None], np.ndarray]:
+    """How far links are from their lengths, (links, rows) in m, of q (rows, n), r (rows, 3), R (rows, 3, 3)."""
+    if arms := calibrated_arms(fits):
+        return lambda q, r, R: np.hstack([arm.errors(q, r, R) for arm in arms]).T
+    links = rod_links(fits)
+    return lambda q, r, R: _distances(links, q, r, R)
+
+
 def _distances(links: Sequence[RodLink], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-    """How far links are from their lengths, (links, rows) in m."""
     q, r = np.ascontiguousarray(q.T), np.ascontiguousarray(r.T)
     found = np.empty((len(links), r.shape[1]))
     for k, link in enumerate(links):
@@ -133,24 +142,17 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
     """sqrt(1 -+ h) of the links, in their order, (links, N)."""
     found = []
     for fit in fits:
-        group, minimum = fit.group, fit.minimum
-        chains = []
-        for chain in group.chains:
-            q = data.q[:, arm_of(chain.name)]
-            rails = data.rails if chain.points is not None else None
-            points = None if rails is None else between(rails[arm_of(chain.name)], q)
-            R = None if chain.R is None else data.R
-            chains.append(replace(chain, q=q, r=data.r, R=R, points=points))
-        here = replace(group, chains=tuple(chains))
+        minimum, scale = fit.minimum, fit.group.scale[fit.group.free]
+        here = fit.group.over(data.q, data.r, data.R)
         used = fitted.copy()
         if fit.weights is not None:
             used[fitted] = fit.weights > 0
-        held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None]
-        lost = minimum.directions[minimum.rank :] / not_held(fit) if fit.minimum.cost > 0 else held[:0]
-        for k, chain in enumerate(chains):
+        held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
+        lost = minimum.directions[minimum.rank :] / not_held(fit) * scale if minimum.cost > 0 else held[:0]
+        for k, link in enumerate(here.chains):
             J = here.slopes(fit.x, k)
             own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
             h = own.sum(axis=1)
             spread = np.where(used, np.maximum(1.0 - h, LEAST), 1.0 + h + other.sum(axis=1))
-            found.append((chain.name, np.sqrt(spread)))
-    return np.array([spread for _, spread in sorted(found, key=lambda pair: pair[0])])
+            found.append((link.cart, link.name, np.sqrt(spread)))
+    return np.array([spread for _, _, spread in sorted(found, key=lambda one: one[:2])])

@@ -14,9 +14,9 @@ import numpy as np
 from gantrytau import Model
 from gantrytau_optimica.calibration.design.identifiability import Poses
 from gantrytau_optimica.calibration.design.pose_selection import predict
-from gantrytau_optimica.calibration.fitting.arm_fit import scales
+from gantrytau_optimica.calibration.rods.arm_closure import Orientation, read_arms
+from gantrytau_optimica.calibration.rods.arm_factors import scales
 from gantrytau_optimica.calibration.rods.arm_poses import tool_gain
-from gantrytau_optimica.calibration.rods.arms import Orientation, read_arms
 
 PART = 0.3  # of the largest share of a direction, from which on a number is named
 NAMED = 4  # numbers of a direction

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
-from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
+from gantrytau_optimica.calibration.judging.device_frames import frame_of, moved_arms
+from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.plausibility import (
     NEAR,
     Fitting,
@@ -15,12 +16,12 @@ from gantrytau_optimica.calibration.judging.plausibility import (
     miss,
     misses_of,
     swapped_carts,
-    thinned,
 )
 from gantrytau_optimica.calibration.judging.slips import slip, smooth_functions
 from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
-from gantrytau_optimica.calibration.rods.error_models import Link, moved
-from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.rods.error_models import ModelLink, links_of_arms, moved
+from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
@@ -43,9 +44,9 @@ def usable_rows(findings: Sequence[Finding], measurements: Measurements) -> np.n
     return np.flatnonzero(good)
 
 
-def check_carts(geometry: Geometry, measurements: Measurements, rows: np.ndarray) -> None:
+def check_carts(robot: NominalRods, measurements: Measurements, rows: np.ndarray) -> None:
     """CalibrationError for a cart that stands still."""
-    for k in range(len(geometry.arms)):
+    for k in range(len(robot.arms)):
         q = measurements.q[rows, k]
         if len(rows) and q.max() - q.min() < STILL:
             raise CalibrationError(
@@ -70,8 +71,8 @@ def check_count(parameters: int, rows: np.ndarray, findings: Sequence[Finding]) 
 
 
 def in_frame(
-    geometry: Geometry, links: list[Link], data: Measurements, rows: np.ndarray
-) -> tuple[list[Link], list[Finding]]:
+    robot: NominalRods, links: list[ModelLink], data: Measurements, rows: np.ndarray
+) -> tuple[list[ModelLink], list[Finding]]:
     """Links whose start fits the frame of the measurements; CalibrationError for another robot."""
     if miss(misses_of(links), data.q, data.r, data.R) < NEAR:
         return links, []
@@ -88,20 +89,44 @@ def in_frame(
         words, off = swapped
         raise CalibrationError(
             f"Measurements: found {words} in {rows_in_words(rows)} (guideways lie {fitting.off:.3g} m off those of "
-            f"{geometry.name} however the frame is placed, {off:.3g} m with that undone); correct the columns of the "
+            f"{robot.name} however the frame is placed, {off:.3g} m with that undone); correct the columns of the "
             "measurements",
             kind="swapped columns" if "column" in words else "sign",
             rows=rows,
         )
     if fitting.off > NEAR:
         raise CalibrationError(
-            f"Measurements: found guideways that lie {fitting.off:.3g} m off those of {geometry.name} however the "
+            f"Measurements: found guideways that lie {fitting.off:.3g} m off those of {robot.name} however the "
             f"frame is placed, in {rows_in_words(rows)}, expected {NEAR:g} m at most; these are measurements of another "
             "robot, or its nominal values are wrong: start='linear' needs none",
             kind="another robot",
             rows=rows,
         )
     return moved(links, fitting.turn, fitting.shift), [in_words(fitting, rows)]
+
+
+def arms_in_frame(
+    robot: NominalRods, arms: tuple[ArmClosure, ...], data: Measurements, rows: np.ndarray
+) -> tuple[tuple[ArmClosure, ...], list[Finding]]:
+    """Arms on turntables in the frame of the measurements; CalibrationError for another robot."""
+    misses = misses_of(links_of_arms(arms, data))
+    missed = miss(misses, data.q, data.r, data.R)
+    if missed < NEAR:
+        return arms, []
+    fitting = frame_of(robot.robot, misses, data)
+    if fitting is not None:
+        there = moved_arms(arms, fitting.turn, fitting.shift)
+        left = miss(misses_of(links_of_arms(there, data)), data.q, data.r, data.R)
+        if left < NEAR:
+            return there, [in_words(fitting, rows)]
+        missed = min(missed, left)
+    raise CalibrationError(
+        f"Measurements: found {rows_in_words(rows)} in which links miss their nominal lengths by {missed:.3g} m in the "
+        f"median however the frame is placed, expected {NEAR:g} m at most; these are measurements of another robot, or its "
+        "nominal values are wrong",
+        kind="another robot",
+        rows=rows,
+    )
 
 
 def in_words(fitting: Fitting, rows: np.ndarray) -> Finding:
@@ -116,7 +141,7 @@ def in_words(fitting: Fitting, rows: np.ndarray) -> Finding:
     return Finding("frame", rows, words)
 
 
-def judged(found: Calibration) -> list[Finding]:
+def judged(found: FittedRods) -> list[Finding]:
     """What is doubtful after a fit: rows with mistakes, outliers, slips, and numbers that data do not hold.
 
     CalibrationError for rows whose columns are swapped or in mm, unless a robust loss left them without weight, and for
@@ -139,16 +164,16 @@ def judged(found: Calibration) -> list[Finding]:
     return [*findings, *_misfit(found, seen, findings), *_far(found), *_in_doubt(found)]
 
 
-def _far(found: Calibration) -> Iterator[Finding]:
+def _far(found: FittedRods) -> Iterator[Finding]:
     """Lengths and joints on the plate that data hold, and that are not where they nominally are."""
     if found.nominal is None:
         return
     far = []
-    for link in (link for arm in found.geometry.arms for link in arm.links):
-        for what, value in (("length", link.length), ("plate_offset", link.plate_offset)):
-            name = f"{link.name}.{what}"
-            if name in found.parameters and not found.undetermined_part(name):
-                off = float(np.linalg.norm(found.parameters[name] - value))
+    values = found.nominal_rods.values
+    for rod in (rod for arm in found.nominal_rods.arms for rod in arm.rods):
+        for name in (rod.length, rod.plate_offset):
+            if name is not None and name in found.parameters and not found.undetermined_part(name):
+                off = float(np.linalg.norm(found.parameters[name] - values[name]))
                 far += [f"{name} by {off:.3g} m"] if off > NEAR else []
     if far:
         words = (
@@ -158,7 +183,7 @@ def _far(found: Calibration) -> Iterator[Finding]:
         yield Finding("far", found.rows, words)
 
 
-def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Iterator[Finding]:
+def _misfit(found: FittedRods, seen: Suspicion, findings: list[Finding]) -> Iterator[Finding]:
     if seen.typical < MISFIT:
         return
     rows = np.union1d(found.rows, found.held_out)
@@ -178,7 +203,7 @@ def _misfit(found: Calibration, seen: Suspicion, findings: list[Finding]) -> Ite
     yield Finding("misfit", rows, f"{words}; expected {remedy}")
 
 
-def _slipped(found: Calibration) -> Iterator[Finding]:
+def _slipped(found: FittedRods) -> Iterator[Finding]:
     few = thinned(len(found.rows), LOOKED_AT)
     for column, errors, jacobian, slopes in found.systems(few):
         data = found.measurements.select(found.rows[few])
@@ -189,7 +214,7 @@ def _slipped(found: Calibration) -> Iterator[Finding]:
         last = found.rows[few[seen.last]] if seen.last < len(few) else len(found.measurements)
         rows = np.union1d(found.rows, found.held_out)
         rows = rows[(rows >= first) & (rows < last)]
-        cart = column < len(found.geometry.arms)
+        cart = column < len(found.nominal_rods.arms)
         size = f"{seen.size * 1e3:+.3g} mm" if cart else f"{seen.size * 1e3:+.3g} mrad"
         where = rows_in_words(rows, len(found.measurements))
         words = (
@@ -199,7 +224,7 @@ def _slipped(found: Calibration) -> Iterator[Finding]:
         yield Finding("slip", rows, words)
 
 
-def _in_doubt(found: Calibration) -> Iterator[Finding]:
+def _in_doubt(found: FittedRods) -> Iterator[Finding]:
     lost = found.held_out[~np.isfinite(found.errors)]
     if lost.size:
         left = f"{agreeing(lost, 'they are')} left out of the error"
@@ -233,7 +258,7 @@ def _whole_vectors(names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _mistaken(found: Calibration, seen: Suspicion) -> list[Finding]:
+def _mistaken(found: FittedRods, seen: Suspicion) -> list[Finding]:
     data, rows = found.measurements, seen.rows
     if not rows.size or seen.typical > EXPLAINED:
         return []
@@ -246,7 +271,7 @@ def _mistaken(found: Calibration, seen: Suspicion) -> list[Finding]:
             f"{mistake.words} in {rows_in_words(rows[places])}; correct {'this row' if len(places) == 1 else 'these rows'}",
         )
         for mistake, places in explained_rows(
-            found.geometry, seen.misses, limit, data.q[rows], data.r[rows], R
+            found.nominal_rods, seen.misses, limit, data.q[rows], data.r[rows], R
         )
     ]
     if findings and found.loss != "robust":

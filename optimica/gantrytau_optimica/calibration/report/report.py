@@ -6,16 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau_optimica.calibration.judging.device_frames import frame_of
+from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.judging.plausibility import compare
 from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
 from gantrytau_optimica.calibration.report.report_page import html_report
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.rods.error_models import nominal_links, six_links
 
 BINS = 24
 OTHERS = (
@@ -65,7 +66,7 @@ class About:
     motion: Motion | None = None
 
 
-def report_numbers(found: "Calibration", about: About | None = None) -> dict[str, Any]:
+def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, Any]:
     """Everything that the report says, as plain numbers and lists; lengths in m, angles in rad."""
     about = about or About()
     errors, vectors = found.errors, found.error_vectors
@@ -74,7 +75,7 @@ def report_numbers(found: "Calibration", about: About | None = None) -> dict[str
     counts, edges = np.histogram(errors[good], bins=BINS)
     return {
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "robot": about.robot or found.geometry.name,
+        "robot": about.robot or found.nominal_rods.name,
         "facts": dict(about.facts),
         "verdict": {"good": about.good, "words": about.verdict},
         "model": found.model,
@@ -97,7 +98,7 @@ def report_numbers(found: "Calibration", about: About | None = None) -> dict[str
         "undetermined": list(found.undetermined),
         "covariance": {"names": known, "values": found.covariance().tolist()},
         "principal_axes": principal_axes(vectors[good]),
-        "residual_tests": residual_tests(found),
+        "residual_tests": residual_tests(found.link_errors()),
         "histogram": {"counts": counts.tolist(), "edges_m": edges.tolist()},
         "findings": [{"kind": f.kind, "rows": f.rows.tolist(), "message": f.message} for f in found.findings],
         "notes": list(about.notes),
@@ -105,25 +106,21 @@ def report_numbers(found: "Calibration", about: About | None = None) -> dict[str
     }
 
 
-def fits_all(found: "Calibration") -> bool:
+def fits_all(found: FittedRods) -> bool:
     """Whether errors are those of the fitted poses, as none were held out."""
     return np.array_equal(found.held_out, found.rows)
 
 
-def frame_motion(found: "Calibration") -> Motion | None:
+def frame_motion(found: FittedRods) -> Motion | None:
     """From the frame of the measurements to that of the nominal values, None where they are the same."""
-    from gantrytau_optimica.calibration.judging.plausibility import compare
-    from gantrytau_optimica.calibration.rods.arm_frames import frame_of
-    from gantrytau_optimica.calibration.rods.error_models import nominal_links, six_links
-
     if not any(finding.kind == "frame" for finding in found.findings):
         return None
     data = found.measurements.select(found.rows)
-    if found.geometry.kind == "turning":
+    if found.nominal_rods.turntables:
         assert found.nominal is not None
-        fitting = frame_of(found.geometry.robot, found.nominal, data)
+        fitting = frame_of(found.nominal_rods.robot, found.nominal, data)
     else:
-        links = nominal_links(found.geometry, data, six_links(found.model, found.geometry))
+        links = nominal_links(found.nominal_rods, data, six_links(found.model, found.nominal_rods))
         fitting = compare(links, data.q, data.r, data.R)
     if fitting is None:
         return None
@@ -140,7 +137,7 @@ def _transformation(motion: Motion | None) -> dict[str, Any] | None:
     }
 
 
-def _validation(found: "Calibration", about: About) -> dict[str, float | None] | None:
+def _validation(found: FittedRods, about: About) -> dict[str, float | None] | None:
     """Of poses that were left out of fits in turn, or of those held out; None where all errors are those of the fit."""
     if about.validation is not None:
         errors = np.delete(about.validation, found.left_out)
@@ -151,9 +148,9 @@ def _validation(found: "Calibration", about: About) -> dict[str, float | None] |
     return _spread(found.errors[good])
 
 
-def nominal_values(found: "Calibration") -> dict[str, float]:
+def nominal_values(found: FittedRods) -> dict[str, float]:
     """The numbers by name that the robot had before, of those that were looked for."""
-    values = found.geometry.values
+    values = found.nominal_rods.values
     return scalars({name: values[name] for name in found.parameters if name in values})
 
 
@@ -166,7 +163,7 @@ def scalars(values: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def _poses(found: "Calibration", about: About) -> list[dict[str, Any]]:
+def _poses(found: FittedRods, about: About) -> list[dict[str, Any]]:
     """The error of each pose, in the order of rows; of very many poses the worst."""
     sizes, angles = found.errors, found.angle_errors
     places = np.arange(len(sizes))
@@ -217,7 +214,7 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     }
 
 
-def write_report(found: "Calibration", path: Path, about: About | None = None) -> Path:
+def write_report(found: FittedRods, path: Path, about: About | None = None) -> Path:
     """Both files, whole or not at all; the path of the page, which ends in .html.
 
     Raises ModelError for names that end in that of another format, and for what cannot be written.

@@ -12,14 +12,14 @@ import numpy as np
 
 from gantrytau import SolveError
 from gantrytau.kinematics.rotations import turned
-from gantrytau_optimica.calibration.rods.arms import Arm
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 
 STEPS = 12
 GOOD = 1e-9  # m, what is left of closure errors; steps are a thousand times larger where they do not converge
 CLOSED = 1e-12  # m, rounding of lengths of metres and of the terms they come from
 
 
-def pose_rows(arms: Sequence[Arm], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+def pose_rows(arms: Sequence[ArmClosure], q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
     """Derivatives of the closure errors of all links by the pose, (N, links, 6), or (N, links, 3) without R."""
     rows = []
     for arm in arms:
@@ -27,14 +27,19 @@ def pose_rows(arms: Sequence[Arm], q: np.ndarray, r: np.ndarray, R: np.ndarray |
         if R is None:
             rows.append(g)
             continue
-        joints = np.stack([arm.values[f"{link}.plate_offset"] for link in arm.links])
+        joints = np.stack([arm.vector_of(rod.plate_offset) for rod in arm.said.rods])
         levers = np.einsum("nij,mj->nmi", R, joints)
         rows.append(np.concatenate([g, np.cross(levers, g)], axis=2))
     return np.concatenate(rows, axis=1)
 
 
 def poses_of(
-    arms: Sequence[Arm], q: np.ndarray, r: np.ndarray, R: np.ndarray | None, *, all_of_them: bool = True
+    arms: Sequence[ArmClosure],
+    q: np.ndarray,
+    r: np.ndarray,
+    R: np.ndarray | None,
+    *,
+    all_of_them: bool = True,
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The poses at actuator positions q, (N, n), near the poses r, (N, 3), and R, (N, 3, 3) or None.
 
@@ -73,7 +78,7 @@ def _steps(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
 
 
 def tool_gain(
-    arms: Sequence[Arm], q: np.ndarray, r: np.ndarray, R: np.ndarray | None
+    arms: Sequence[ArmClosure], q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Per arm dx/dp, (N, 6 or 3, p), and its Jacobian of closure errors, (N, m, p).
 

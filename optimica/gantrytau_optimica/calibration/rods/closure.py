@@ -10,10 +10,12 @@ a rotation that is given, so that turn stays small. Dressler (2012), sections 4.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from gantrytau.kinematics.rotations import left_jacobian, of_vector
+from gantrytau.kinematics.rotations import left_jacobian, of_vector, told_vector
+from gantrytau_optimica.calibration.rods.guideway_points import between
 
 BLOCK = 2000  # poses; their columns take 160 kB, or 500 kB where the plate turns
 ALL = slice(None)
@@ -26,14 +28,17 @@ LENGTH, OFFSET, ALONG, PLATE = slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 1
 class Chain:
     """One link over the measured poses: q (N,), r (N, 3), R (N, 3, 3) or None; a guideway's points at q (N, 3) or None.
 
-    turned: the rotation (3, 3) of measured guideways before `turn` acts; name: of the link.
+    name: of the link; cart: the column of its cart; rail: points (k, 4) of a measured guideway, turned: the rotation (3, 3)
+    of it before `turn` acts.
     """
 
     name: str
+    cart: int
     q: np.ndarray
     r: np.ndarray
     R: np.ndarray | None = None
     points: np.ndarray | None = None
+    rail: np.ndarray | None = None
     turned: np.ndarray | None = None
 
     @property
@@ -76,10 +81,45 @@ class Chain:
         along = around @ self.points / max(float(around @ around), 1e-300)
         return -2.0 * (self.vector(p) @ (self.frame(p) @ along))
 
+    def by_actuator(self, p: np.ndarray) -> dict[int, np.ndarray]:
+        """de/dq, (N,), by columns of q."""
+        return {self.cart: self.by_cart(p)}
+
+    def by_pose(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """de/dT and de/dphi, phi a rotation vector in the world, (N, 3) each; zero where the plate does not turn."""
+        u = 2 * self.vector(p)
+        return u, np.zeros_like(u) if self.R is None else np.cross(self.R @ p[PLATE], u)
+
+    def distance(self, p: np.ndarray) -> np.ndarray:
+        """The error as a difference of lengths, about e / 2L, (N,) in m."""
+        return self.error(p) / (2 * p[0])
+
+    def gap(self, p: np.ndarray) -> np.ndarray:
+        """How far the link is from its length, (N,) in m."""
+        return np.linalg.norm(self.vector(p), axis=1) - p[0]
+
+    def told(self, p: np.ndarray) -> np.ndarray | None:
+        """Derivatives of the numbers that are reported by those that are moved, (size, size), None for the same.
+
+        Turns of measured guideways are moved before a rotation that was given: what is reported is the rotation vector W of
+        both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
+        """
+        if self.points is None:
+            return None
+        found, W = np.eye(self.size), told_vector(self.frame(p))
+        found[ALONG, ALONG] = np.linalg.solve(left_jacobian(W), left_jacobian(p[ALONG]))
+        return found
+
     def at(self, rows: np.ndarray) -> "Chain":
         """The link over some of the poses."""
         R, points = (None if array is None else array[rows] for array in (self.R, self.points))
         return replace(self, q=self.q[rows], r=self.r[rows], R=R, points=points)
+
+    def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "Chain":
+        """The link over other poses, q (N, n), r (N, 3), R (N, 3, 3)."""
+        own = q[:, self.cart]
+        points = None if self.rail is None else between(self.rail, own)
+        return replace(self, q=own, r=r, R=None if self.R is None else R, points=points)
 
     def _on_guideway(self, p: np.ndarray) -> np.ndarray:
         assert self.points is not None
@@ -182,9 +222,9 @@ def columns(chain: Chain, centre_q: float, centre_r: np.ndarray, rows: slice = A
     return F.T
 
 
-def condense(chain: Chain, weights: np.ndarray | None = None) -> "Chain | Condensed | Weighted":
-    """The chain in few rows where its guideway is linear; weights (N,) of the errors of the poses, or None for 1."""
-    if chain.points is not None or len(chain.q) < 31:
+def condense(chain: Any, weights: np.ndarray | None = None) -> Any:
+    """The link in few rows where its guideway is linear; weights (N,) of the errors of the poses, or None for 1."""
+    if not isinstance(chain, Chain) or chain.points is not None or len(chain.q) < 31:
         return chain if weights is None else Weighted(chain, weights)
     centre_q, centre_r = centre(chain)
     return Condensed(chain, triangle(chain, centre_q, centre_r, weights), centre_q, centre_r)
@@ -192,9 +232,9 @@ def condense(chain: Chain, weights: np.ndarray | None = None) -> "Chain | Conden
 
 @dataclass(frozen=True)
 class Weighted:
-    """A chain whose errors are multiplied by weights (N,)."""
+    """A link whose errors are multiplied by weights (N,)."""
 
-    chain: Chain
+    chain: Any
     weights: np.ndarray
 
     @property

@@ -13,7 +13,7 @@
 Dressler (2012), section 5.3.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,26 +21,38 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import mean_rotation, of_vector, turning
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.rods.arm_factors import NOISE, scales
+from gantrytau_optimica.calibration.rods.arm_links import ArmLink, links_of
 from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.groups import Group
 from gantrytau_optimica.calibration.rods.guideway_points import between, straight
 from gantrytau_optimica.calibration.rods.linear_start import linear_start
-from gantrytau_optimica.calibration.rods.nominal_geometry import Geometry
+from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
 MODELS = (None, "parallel", 1, 2, 3, 4, 5)
+COMMON = "direction"  # of all guideways, by name
 ROLLS = 12  # trials for how a measured guideway lies about its own axis
 TURNS = 0.02  # rad; a plate that turns less than this does not hold B without a start value
 
 
 @dataclass(frozen=True)
-class Link:
-    """One link of a model: its poses, the names of its numbers, start values, and which of them are identified."""
+class ModelLink:
+    """One link of a model: path of its arm, its poses, names of its numbers, start values, which of them are
+    identified, and what of each moves a joint by a metre.
+    """
 
-    arm: int
-    chain: Chain
+    arm: str
+    chain: Chain | ArmLink
     names: tuple[str, ...]
     start: np.ndarray
     free: np.ndarray
+    scale: np.ndarray
+
+    @property
+    def cart(self) -> int:
+        """The number of its arm, the column of its cart in q."""
+        return self.chain.cart
 
 
 def needs_rails(model: object) -> bool:
@@ -48,71 +60,117 @@ def needs_rails(model: object) -> bool:
     return model in (2, 4, 5)
 
 
-def six_links(model: object, geometry: Geometry) -> bool:
-    """Whether a model has six links and a plate that turns."""
-    return geometry.kind == "six" if model in (None, "parallel") else model in (3, 4, 5)
+def six_links(model: object, robot: NominalRods) -> bool:
+    """Whether a model has all links of a robot without turntables, and a plate that turns."""
+    if robot.turntables:
+        return False
+    return robot.turns if model in (None, "parallel") else model in (3, 4, 5)
 
 
-def check_model(model: object, geometry: Geometry, measurements: Measurements) -> None:
+def check_model(model: object, robot: NominalRods, measurements: Measurements) -> None:
     """ModelError if there is no such model, or the robot or the measurements lack what it needs."""
     if isinstance(model, bool) or model not in MODELS:
         raise ModelError(
             f"calibrate: found model={model!r}, expected model=None, 'parallel', or 1 to 5",
             argument="model",
         )
-    if geometry.kind == "turning" and model is not None:
+    if robot.turntables and model is not None:
         raise ModelError(
-            f"calibrate: found model={model!r} for {geometry.name}, expected model=None; those models have no turntables",
+            f"calibrate: found model={model!r} for {robot.name}, expected model=None; those models have no turntables",
             argument="model",
         )
-    if model in (3, 4, 5) and geometry.kind != "six":
+    if model in (3, 4, 5) and not robot.turns:
         raise ModelError(
-            f"calibrate: found {geometry.name} for model={model}, expected a robot with all six links; take "
+            f"calibrate: found {robot.name} for model={model}, expected a robot with all six links; take "
             "SixLinkGantryTau, or model=1",
             argument="model",
         )
-    if (six_links(model, geometry) or geometry.kind == "turning") and measurements.R is None:
+    if (six_links(model, robot) or robot.turntables) and measurements.R is None:
         raise ModelError(
             "calibrate: found measurements without R for six links, expected orientations of the plate; measure poses, or "
             "take model=1",
             argument="model",
         )
-    if needs_rails(model) and (measurements.rails is None or len(measurements.rails) != len(geometry.arms)):
+    if needs_rails(model) and (measurements.rails is None or len(measurements.rails) != len(robot.arms)):
         found = "no rails" if measurements.rails is None else f"{len(measurements.rails)} rails"
         raise ModelError(
             f"calibrate: found measurements with {found} for model={model}, expected measured points of all "
-            f"{len(geometry.arms)} guideways; give rails=[...] in Measurements, or take "
+            f"{len(robot.arms)} guideways; give rails=[...] in Measurements, or take "
             f"model={1 if model == 2 else 3}",
             argument="model",
         )
 
 
-def nominal_links(geometry: Geometry, data: Measurements, all_links: bool) -> list[Link]:
+def nominal_links(robot: NominalRods, data: Measurements, all_links: bool) -> list[ModelLink]:
     """Links with straight guideways that start from nominal values, a direction for each arm.
 
     Where the robot has six links and the model takes one on each arm, joints on the plate move to the tool (4.7), by
     the mean measured orientation.
     """
     found = []
-    for i, arm in enumerate(geometry.arms):
-        if all_links or geometry.kind == "three":
-            for link in arm.links:
-                start = np.concatenate([[link.length], link.offset, arm.direction, link.plate_offset])
-                found.append(_straight(i, link.name, f"arms[{i}].direction", start, data, all_links))
+    for cart, arm in enumerate(robot.arms):
+        along = robot.values[arm.direction]
+        if all_links or not robot.turns:
+            for rod in arm.rods:
+                on_plate = robot.vector(rod.plate_offset)
+                start = np.concatenate([[robot.values[rod.length]], robot.joint(arm, rod), along, on_plate])
+                offset = rod.offset or arm.offset or f"{rod.name}.offset"
+                names = [rod.length, *elements(offset), *elements(arm.direction)]
+                names += elements(rod.plate_offset) if rod.plate_offset else []
+                found.append(_straight((arm.name, cart), rod.name, names, start, (data.q, data.r, data.R)))
             continue
         turn = np.eye(3) if data.R is None else mean_rotation(data.R)
-        offset = np.mean([link.offset - turn @ link.plate_offset for link in arm.links], axis=0)
-        length = float(np.mean([link.length for link in arm.links]))
-        start = np.concatenate([[length], offset, arm.direction])
-        found.append(_straight(i, f"arms[{i}]", f"arms[{i}].direction", start, data, False))
+        offset = np.mean(
+            [robot.joint(arm, k) - turn @ robot.vector(k.plate_offset) for k in arm.rods], axis=0
+        )
+        start = np.concatenate([[np.mean([robot.values[k.length] for k in arm.rods])], offset, along])
+        names = [f"{arm.name}.length", *elements(f"{arm.name}.offset"), *elements(arm.direction)]
+        found.append(_straight((arm.name, cart), arm.name, names, start, (data.q, data.r, data.R)))
     return found
 
 
-def _straight(i: int, name: str, direction: str, start: np.ndarray, data: Measurements, plate: bool) -> Link:
-    names = [f"{name}.length", *elements(f"{name}.offset"), *elements(direction)]
-    names += elements(f"{name}.plate_offset") if plate else []
-    chain = Chain(name, data.q[:, i], data.r, data.R if plate else None)
-    return Link(i, chain, tuple(names), start[: len(names)], np.ones(len(names), dtype=bool))
+def _straight(
+    arm: tuple[str, int], name: str, names: list[str], start: np.ndarray, poses: tuple
+) -> ModelLink:
+    """poses: (q, r, R)."""
+    q, r, R = poses
+    chain = Chain(name, arm[1], q[:, arm[1]], r, R if len(names) > 7 else None)
+    size = len(names)
+    return ModelLink(arm[0], chain, tuple(names), start[:size], np.ones(size, dtype=bool), np.ones(size))
+
+
+def links_of_arms(arms: Sequence[ArmClosure], data: Measurements) -> list[ModelLink]:
+    """The links of the arms of a robot with turntables."""
+    return [link for arm in arms for link in _carried(arm, data.q, data.r, data.R)]
+
+
+def links_of_arm(arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> list[ModelLink]:
+    """The links of an arm from its own values: as `Chain`, whose poses condense, unless turntables carry them."""
+    if arm.turntables or set(arm.free) != {*_numbers(arm)}:
+        return _carried(arm, q, r, R)
+    found = []
+    for rod in arm.said.rods:
+        start = [[arm.values[rod.length]], arm.vector_of(arm.said.offset) + arm.vector_of(rod.offset)]
+        start += [arm.values[arm.said.direction], arm.vector_of(rod.plate_offset)]
+        joint = rod.offset or arm.said.offset or ""
+        names = [rod.length, *elements(joint), *elements(arm.said.direction)]
+        names += elements(rod.plate_offset) if rod.plate_offset else []
+        found.append(_straight((arm.name, arm.cart), rod.name, names, np.concatenate(start), (q, r, R)))
+    return found
+
+
+def _carried(arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> list[ModelLink]:
+    free, scale = np.ones(arm.count, dtype=bool), scales(arm)
+    return [ModelLink(arm.name, link, arm.names, arm.vector, free, scale) for link in links_of(arm, q, r, R)]
+
+
+def _numbers(arm: ArmClosure) -> Iterator[str | None]:
+    """What a link without turntables is made of: one joint for each rod."""
+    yield arm.said.direction
+    for rod in arm.said.rods:
+        yield from (rod.length, rod.offset or arm.said.offset)
+        if rod.plate_offset:
+            yield rod.plate_offset
 
 
 def elements(name: str) -> list[str]:
@@ -120,7 +178,7 @@ def elements(name: str) -> list[str]:
     return [f"{name}[{k}]" for k in range(3)]
 
 
-def started_linear(links: Sequence[Link]) -> list[Link]:
+def started_linear(links: Sequence[ModelLink]) -> list[ModelLink]:
     """The same links with start values from their poses alone; directions of one arm are averaged.
 
     A plate that hardly turns does not show where its joints are: they keep their nominal places on it.
@@ -142,7 +200,7 @@ def started_linear(links: Sequence[Link]) -> list[Link]:
     return found
 
 
-def moved(links: Sequence[Link], turn: np.ndarray, shift: np.ndarray) -> list[Link]:
+def moved(links: Sequence[ModelLink], turn: np.ndarray, shift: np.ndarray) -> list[ModelLink]:
     """The same links in another frame: T' = turn T + shift."""
     found = []
     for link in links:
@@ -157,12 +215,12 @@ def _turn(R: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.sum((R - mean_rotation(R)) ** 2, axis=(1, 2))) / 2))
 
 
-def parallel(links: Sequence[Link], free: bool) -> list[Link]:
+def parallel(links: Sequence[ModelLink], free: bool) -> list[ModelLink]:
     """All links along one direction, the mean of what they start with, which is identified or held."""
     along = np.mean([link.start[4:7] for link in links], axis=0)
     found = []
     for link in links:
-        names = (*link.names[:4], *elements("direction"), *link.names[7:])
+        names = (*link.names[:4], *elements(COMMON), *link.names[7:])
         start = np.concatenate([link.start[:4], along, link.start[7:]])
         kept = link.free.copy()
         kept[4:7] = free
@@ -170,21 +228,24 @@ def parallel(links: Sequence[Link], free: bool) -> list[Link]:
     return found
 
 
-def own_directions(link: Link) -> Link:
+def own_directions(link: ModelLink) -> ModelLink:
     """The link with a direction of its own (model 3)."""
     return replace(link, names=(*link.names[:4], *elements(f"{link.chain.name}.direction"), *link.names[7:]))
 
 
-def on_rail(link: Link, rail: np.ndarray, turned: np.ndarray | None = None) -> list[Link]:
+def on_rail(link: ModelLink, rail: np.ndarray, turned: np.ndarray | None = None) -> list[ModelLink]:
     """The link on a measured guideway, placed along its straight one; several trials of how that is rolled.
 
     turned: the rotation from the axes of the guideway's measurement, if known; then it is held.
     """
-    points = between(rail, link.chain.q)
+    straight_link = link.chain
+    assert isinstance(straight_link, Chain)  # models with measured guideways have no turntables
+    points = between(rail, straight_link.q)
     at_zero, along = straight(rail)
     names = (
-        *(n.replace(".offset[", ".frame_offset[") for n in link.names[:4]),
-        *elements(f"arms[{link.arm}].frame_rotation"),
+        link.names[0],
+        *elements(f"{link.chain.name}.frame_offset"),
+        *elements(f"{link.arm}.frame_rotation"),
         *link.names[7:],
     )
     free = link.free.copy()
@@ -195,13 +256,13 @@ def on_rail(link: Link, rail: np.ndarray, turned: np.ndarray | None = None) -> l
         trials = [of_vector(angle * axis) @ first for angle in 2 * np.pi * np.arange(ROLLS) / ROLLS]
     found = []
     for Q in trials:
-        chain = replace(link.chain, points=points, turned=Q)
+        chain = replace(straight_link, points=points, rail=rail, turned=Q)
         start = np.concatenate([link.start[:1], link.start[1:4] - Q @ at_zero, np.zeros(3), link.start[7:]])
-        found.append(Link(link.arm, chain, names, start, free))
+        found.append(replace(link, chain=chain, names=names, start=start, free=free))
     return found
 
 
-def grouped(links: Sequence[Link]) -> list[Group]:
+def grouped(links: Sequence[ModelLink]) -> list[Group]:
     """Links that share names of identified numbers become one group, in the order of their first link."""
     left, groups = list(links), []
     while left:
@@ -217,12 +278,14 @@ def grouped(links: Sequence[Link]) -> list[Group]:
     return groups
 
 
-def _group(links: Sequence[Link]) -> Group:
-    values: dict[str, tuple[float, bool]] = {}
+def _group(links: Sequence[ModelLink]) -> Group:
+    values: dict[str, tuple[float, bool, float]] = {}
     for link in links:
-        for name, value, free in zip(link.names, link.start, link.free, strict=True):
-            values.setdefault(name, (float(value), bool(free)))
+        for name, *known in zip(link.names, link.start, link.free, link.scale, strict=True):
+            values.setdefault(name, (float(known[0]), bool(known[1]), float(known[2])))
     names = tuple(values)
     places = tuple(np.array([names.index(n) for n in link.names]) for link in links)
-    x, free = (np.array([values[n][k] for n in names]) for k in (0, 1))
-    return Group(tuple(link.chain for link in links), places, names, x, free.astype(bool))
+    x, free, scale = (np.array([values[n][k] for n in names]) for k in range(3))
+    # with turntables much is held hardly or not at all: what a laser tracker tells apart decides
+    noise = None if all(isinstance(link.chain, Chain) for link in links) else NOISE
+    return Group(tuple(link.chain for link in links), places, names, x, free.astype(bool), scale, noise=noise)

@@ -1,35 +1,42 @@
-"""Links that share numbers, as one problem of least squares."""
+"""Links that share numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum, gauss_newton
-from gantrytau_optimica.calibration.rods.closure import Chain, condense
+from gantrytau_optimica.calibration.rods.arm_links import ArmLink, ArmOverPoses
+from gantrytau_optimica.calibration.rods.closure import Chain
+
+TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
 
 
 @dataclass(frozen=True)
 class Group:
-    """Chains and where in the vector x of the group their numbers stand.
+    """Links and where in the vector x of the group their numbers stand.
 
-    x: start values (n,); names: of the numbers, (n,); free: which of them are identified; places: for each chain the
-    indices in x of its numbers; prior: deviation of a number about its start value, by index.
+    x: start values (n,); names: of the numbers, (n,); free: which of them are identified; scale: what of each number moves
+    a joint by a metre; places: for each link the indices in x of its numbers; prior: value and deviation of numbers, by
+    index; noise: deviation of a closure error that decides what data hold, None where it is to be found from what is left;
+    tape: that of start values, m.
     """
 
-    chains: tuple[Chain, ...]
+    chains: tuple[Chain | ArmLink, ...]
     places: tuple[np.ndarray, ...]
     names: tuple[str, ...]
     x: np.ndarray
     free: np.ndarray
+    scale: np.ndarray
     prior: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    noise: float | None = None
+    tape: float = TAPE
 
     def numbers(self, k: int, x: np.ndarray) -> np.ndarray:
         """The numbers of chain k."""
         return x[self.places[k]]
 
     def errors(self, x: np.ndarray) -> np.ndarray:
-        """Closure errors of all poses, (N, chains) in m2."""
+        """Closure errors of all poses, (N, links), in m2, or in m where there are turntables."""
         return np.column_stack([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
 
     def slopes(self, x: np.ndarray, k: int) -> np.ndarray:
@@ -42,65 +49,31 @@ class Group:
         """The same with other start values."""
         return replace(self, x=x.copy())
 
+    def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "Group":
+        """The same links over other poses, q (N, n), r (N, 3), R (N, 3, 3)."""
+        arms: dict[int, ArmOverPoses] = {}
+        links: list[Chain | ArmLink] = []
+        for link in self.chains:
+            if isinstance(link, ArmLink):
+                key = id(link.poses)
+                arms.setdefault(key, ArmOverPoses(link.poses.arm, q, r, R))
+                links.append(ArmLink(arms[key], link.j))
+            else:
+                links.append(link.over(q, r, R))
+        return replace(self, chains=tuple(links))
 
-@dataclass(frozen=True)
-class Problem:
-    """Squares to be minimised: a group whose chains are condensed and weighted, with its prior as further rows."""
+    def distances(self, x: np.ndarray) -> np.ndarray:
+        """Closure errors as differences of lengths, (N, links) in m."""
+        return np.column_stack([c.distance(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
 
-    group: Group
-    condensed: tuple
-    noise: float  # of a closure error, m2; scales the prior
+    @property
+    def arms(self) -> tuple[ArmOverPoses, ...]:
+        """The arms on turntables that these links hang on."""
+        found = {id(link.poses): link.poses for link in self.chains if isinstance(link, ArmLink)}
+        return tuple(found.values())
 
-    def errors(self, x: np.ndarray) -> np.ndarray:
-        """All rows."""
-        rows = [c.error(x[p]) for c, p in zip(self.condensed, self.group.places, strict=True)]
-        rows.append(np.array([self.noise * (x[i] - m) / d for i, (m, d) in self.group.prior.items()]))
-        return np.concatenate(rows)
-
-    def slopes(self, x: np.ndarray) -> np.ndarray:
-        """Their derivatives by all of x."""
-        blocks = []
-        for chain, places in zip(self.condensed, self.group.places, strict=True):
-            small = chain.slopes(x[places])
-            block = np.zeros((len(small), len(x)))
-            block[:, places] = small
-            blocks.append(block)
-        for i, (_, deviation) in self.group.prior.items():
-            row = np.zeros((1, len(x)))
-            row[0, i] = self.noise / deviation
-            blocks.append(row)
-        return np.vstack(blocks)
-
-
-def problem(group: Group, weights: Sequence[np.ndarray] | None = None, noise: float = 0.0) -> Problem:
-    """The least squares of a group; weights: (N,) for each chain; noise of a closure error in m2, for the prior."""
-    condensed = tuple(
-        condense(c, None if weights is None else weights[k]) for k, c in enumerate(group.chains)
-    )
-    return Problem(group, condensed, noise)
-
-
-def minimise(
-    found: Problem, x: np.ndarray, *, directions: np.ndarray | None = None, movable: int | None = None
-) -> Minimum:
-    """Gauss-Newton from x; directions, movable: along which it moves, as `gauss_newton` says."""
-    return gauss_newton(
-        found.errors, found.slopes, x, found.group.free, directions=directions, movable=movable
-    )
-
-
-@dataclass(frozen=True)
-class Taped:
-    """The squares of a problem, and those of all its free numbers about the start values, by a weight in m2 for each m."""
-
-    problem: Problem
-    weight: float
-
-    def errors(self, x: np.ndarray) -> np.ndarray:
-        """All rows."""
-        free = self.problem.group.free
-        return np.concatenate([self.problem.errors(x), self.weight * (x - self.problem.group.x)[free]])
-
-    def slopes(self, x: np.ndarray) -> np.ndarray:
-        """Their derivatives by all of x."""
-        return np.vstack([self.problem.slopes(x), self.weight * np.eye(len(x))[self.problem.group.free]])
+    def squares(self, x: np.ndarray) -> np.ndarray:
+        """Squares of |y|^2 - L^2 of all poses, (N, links) in m4."""
+        arms = {id(arm): 2 * arm.arm.lengths for arm in self.arms}
+        factors = [arms[id(k.poses)][k.j] if isinstance(k, ArmLink) else 1.0 for k in self.chains]
+        return (self.errors(x) * factors) ** 2

@@ -6,8 +6,8 @@ from gantrytau import GantryTauError
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.design.identifiability import Poses
-from gantrytau_optimica.calibration.fitting.arm_fit import TAPE
 from gantrytau_optimica.calibration.judging.tool_error import Loose, ToolError, tool_error
+from gantrytau_optimica.calibration.rods.groups import TAPE
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
 
 SHOWN = 3  # combinations that are named

@@ -181,5 +181,5 @@ def test_a_prior_speaks_of_nominal_values_in_any_frame(poses, start):
     found = calibrate(
         nominal(1e-3), Measurements(q, r @ turn.T + [1, 2, 3]), start=start, prior={"length": 1e-7}
     )
-    for i, arm in enumerate(found.geometry.arms):
-        assert found.parameters[f"arms[{i}].length"] == pytest.approx(arm.links[0].length, abs=1e-6)
+    for name in (f"arms[{i}].length" for i in range(3)):
+        assert found.parameters[name] == pytest.approx(found.nominal_rods.values[name], abs=1e-6)

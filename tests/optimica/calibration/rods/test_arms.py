@@ -8,12 +8,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import Array, Model, ModelError, Parameter, SolveError
-from gantrytau.kinematics.rotations import of_vectors
+from gantrytau.kinematics.rotations import of_vectors, rotation_vector
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.fitting.arm_fit import TAPE, fit_arm, scales
-from gantrytau_optimica.calibration.fitting.arm_ipopt import fit_arm_with_ipopt
+from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
+from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
+from gantrytau_optimica.calibration.fitting.rod_fit import fit_group
+from gantrytau_optimica.calibration.rods.arm_closure import read_arms, rotation
+from gantrytau_optimica.calibration.rods.arm_factors import scales
 from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, poses_of
-from gantrytau_optimica.calibration.rods.arms import read_arms, rotation
+from gantrytau_optimica.calibration.rods.error_models import grouped, links_of_arm
 from tests.optimica.calibration.f1_data import DEVICE, f1_arms, f1_poses, measured
 from tests.references import f1
 
@@ -113,6 +116,12 @@ def test_a_quaternion_of_any_length_is_a_matrix_as_the_thesis_has_it():
     )
 
 
+def test_rotation_vectors_come_back():
+    vectors = np.array([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.3, -0.2, 0.1], [2.0, 1.0, -1.5]])
+    np.testing.assert_allclose(rotation_vector(of_vectors(vectors)), vectors, atol=1e-14)
+    np.testing.assert_allclose(of_vectors(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-15)
+
+
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_fit_explains_measurements_to_their_noise(orientation, data, poses):
     for arm in f1_arms(orientation):
@@ -143,24 +152,26 @@ def test_covariance_of_a_fit_is_that_of_repeated_measurements(truth, poses):
     np.testing.assert_allclose(spread, said, rtol=0.4)  # four standard deviations of a spread of 60
 
 
+def fitted(arm, data):
+    (group,) = grouped(links_of_arm(arm, *data))
+    return fit_group(group)
+
+
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_ipopt_finds_the_same_arm(orientation, data):
-    arm = disturbed(f1_arms(orientation)[1], seed=7)
-    prior = dict(zip(arm.names, TAPE * scales(arm), strict=True))
-    found, other = fit_arm(arm, *data, prior=prior), fit_arm_with_ipopt(arm, *data)
-    difference = np.abs(found.arm.closure(*data)[0] - other.arm.closure(*data)[0]).max()
-    assert (
-        difference < {"unit": 1e-9, "free": 1e-9, "local": 1e-8}[orientation]
-    )  # m; local: turns do not just add
+    found = fitted(disturbed(f1_arms(orientation)[1], seed=7), data)
+    other = solve(found)
+    assert np.abs(found.group.errors(found.x) - found.group.errors(other.x)).max() < 1e-10  # m
+    assert other.x == pytest.approx(found.x, abs=1e-7)
 
 
 def test_ipopt_keeps_what_is_fixed_or_limited(truth, data):
     arm = truth[0]
     name = "arms[0].links[0].length"
     low, high = float(arm.values[name]) + 1e-4, float(arm.values[name]) + 2e-4
-    fit = fit_arm_with_ipopt(arm, *data, fixed=["arms[0].direction[2]"], limits={name: (low, high)})
-    assert fit.arm.values["arms[0].direction"][2] == pytest.approx(0.99, abs=1e-12)
-    assert low - 1e-9 < fit.arm.values[name] < high + 1e-9
+    (fit,) = solve_constrained([fitted(arm, data)], {"arms[0].direction[2]": 0.99, name: (low, high)})
+    assert fit.values["arms[0].direction[2]"] == pytest.approx(0.99, abs=1e-12)
+    assert low - 1e-9 < fit.values[name] < high + 1e-9
 
 
 def test_gains_of_turntables_are_found(truth, poses):
@@ -204,7 +215,7 @@ def test_what_cannot_be_an_arm_is_refused():
     ):
         read_arms(F1GantryTau(prototypes.F1), "euler")  # type: ignore
     with pytest.raises(
-        ModelError, match=r"FourBar: found 0 arms with a direction and 0 turntables, expected arms"
+        ModelError, match=r"found FourBar that does not say what its rods are, expected a robot such as"
     ):
         read_arms(FourBar())
     stretched = F1GantryTau(prototypes.F1, turntables=[dict(orientation=[1.0, 0.1, 0.0, 0.0]), {}, {}])
@@ -221,9 +232,9 @@ def test_what_cannot_be_an_arm_is_refused():
         (dict(loss="absolute"), "loss: found 'absolute', expected 'linear' or 'robust'"),
         (
             dict(prior={"arms[0].lenght": 1e-3}),
-            "prior: found 'arms[0].lenght' with 0.001, expected a standard",
+            "prior for 'arms[0].lenght', which is not identified; did you mean 'arms[0].links[0].length",
         ),
-        (dict(prior={"arms[0].offset": 0.0}), "prior: found 'arms[0].offset' with 0.0, expected a standard"),
+        (dict(prior={"arms[0].offset": 0.0}), "found the deviation 0 for 'arms[0].offset' in prior"),
     ],
     ids=["loss", "name", "deviation"],
 )
@@ -243,8 +254,8 @@ def test_arrays_that_do_not_fit_are_told(truth, data):
     r[[4, 7]] = np.nan
     with pytest.raises(ModelError, match=r"numbers that are not finite in rows 4, 7; leave those poses out"):
         fit_arm(truth[0], data.q, r, data.R)
-    with pytest.raises(ModelError, match=r"arms\[0\]: there is no unknown 'x', expected one of"):
-        fit_arm_with_ipopt(truth[0], *data, fixed=["x"])
+    with pytest.raises(ModelError, match="constraint on 'x', which is not identified"):
+        solve_constrained([fitted(truth[0], data)], {"x": 1.0})
 
 
 class Guideway(Model):
@@ -260,6 +271,8 @@ class AlikeRobot(Model):
 
     size = Parameter(2.1, unit="m", description="length of all links")
     arms = Array(Guideway, 3, length=2 * size)
+
+    rods = GantryTau.rods
 
 
 def test_parameters_that_follow_from_others_are_read():

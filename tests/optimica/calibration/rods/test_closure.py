@@ -18,7 +18,8 @@ def chain(kind):
     q, r = RNG.uniform(0, 1, N), RNG.uniform(-1, 1, (N, 3)) + np.array([2.0, 0.0, 1.0])
     R = TURNS if "plate" in kind else None
     points = RNG.uniform(-1, 1, (N, 3)) if "points" in kind else None
-    return Chain(kind, q, r, R, points, of_vector(np.array([0.3, -0.2, 0.9])) if "points" in kind else None)
+    turned = of_vector(np.array([0.3, -0.2, 0.9])) if "points" in kind else None
+    return Chain(kind, 0, q, r, R, points, turned=turned)
 
 
 KINDS = ["line", "line plate", "points", "points plate"]
@@ -59,7 +60,7 @@ def test_the_linear_start_is_exact_without_noise(kind):
     u *= true[0] / np.linalg.norm(u, axis=1, keepdims=True)
     r = true[1:4] + one.q[:, None] * true[4:7] + u
     r -= 0.0 if one.R is None else one.R @ true[7:10]
-    assert linear_start(Chain(kind, one.q, r, one.R)) == pytest.approx(true, abs=1e-9)
+    assert linear_start(Chain(kind, 0, one.q, r, one.R)) == pytest.approx(true, abs=1e-9)
 
 
 def test_directions_that_data_do_not_hold_are_left_alone():

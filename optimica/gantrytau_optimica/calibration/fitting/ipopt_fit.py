@@ -10,12 +10,13 @@ import numpy as np
 from gantrytau import SolveError
 from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
-from gantrytau_optimica.calibration.fitting.truncated_fit import TAPE, Fit, not_held
-from gantrytau_optimica.calibration.rods.closure import Chain
-from gantrytau_optimica.calibration.rods.groups import Group, problem
+from gantrytau_optimica.calibration.fitting.least_squares import problem
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit, noise_of, not_held
+from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
+from gantrytau_optimica.calibration.rods.groups import Group
 
 TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
-LEAST = 1e-9  # m2, of the noise: rounding of closure errors is far below it
+LEAST = 1e-9  # m2 or m, of the noise: rounding of closure errors is far below it
 AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
 # where rounding ends the descent before the gradient is that small
 AT_ROUNDING = ("Search_Direction_Becomes_Too_Small", "Solved_To_Acceptable_Level")
@@ -28,6 +29,7 @@ OPTIONS = {
     "ipopt.nlp_scaling_method": "none",
     "ipopt.max_iter": 200,
 }
+NEARLY = {"ipopt.nlp_scaling_method": "gradient-based", "ipopt.tol": 1e-4, "ipopt.acceptable_tol": 1e-4}
 
 
 def solve(fit: Fit) -> Fit:
@@ -41,13 +43,35 @@ def solve(fit: Fit) -> Fit:
     unknown = ca.MX.sym("x", len(free))
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
-    noise = float(np.sqrt(fit.minimum.cost / max(1, fit.count - fit.minimum.rank)))
-    cost = _cost(fit, x, noise)
+    noise = noise_of(fit.minimum, fit.group)
+    cost = _cost(fit, x, noise) / max(noise, LEAST) ** 2
+    # far from the minimum turntables curve the cost so much that a tape measure has to lead there
+    begin = _led_by_tape(fit, noise) if group.arms else group.x[free]
+    start = np.linalg.solve(steps, begin - fit.x[free])
     held = unknown[fit.minimum.rank :]
-    scaled = cost / max(noise, LEAST) ** 2
-    solver = ca.nlpsol("calibration", "ipopt", {"x": unknown, "f": scaled, "g": held}, OPTIONS)
-    start = np.linalg.solve(steps, group.x[free] - fit.x[free])
     start[fit.minimum.rank :] = 0.0
+    found, iterations = _minimised({"x": unknown, "f": cost, "g": held}, start)
+    numbers = group.x.copy()
+    numbers[free] = fit.x[free] + steps @ found
+    return replace(fit, minimum=_minimum(fit, numbers, iterations))
+
+
+def _led_by_tape(fit: Fit, noise: float) -> np.ndarray:
+    """The free numbers where a tape measure holds all about their start values."""
+    group, free = fit.group, np.flatnonzero(fit.group.free)
+    moved = ca.MX.sym("m", len(free))  # in m
+    x = ca.MX(ca.DM(group.x))
+    x[free.tolist()] = ca.DM(group.x[free]) + ca.DM(group.scale[free]) * moved
+    cost = _cost(fit, x, noise) / max(noise, LEAST) ** 2 + ca.sumsqr(moved / group.tape)
+    found, _ = _minimised({"x": moved, "f": cost}, np.zeros(len(free)), OPTIONS | NEARLY)
+    return group.x[free] + group.scale[free] * found
+
+
+def _minimised(
+    problem: dict[str, ca.MX], start: np.ndarray, options: dict[str, Any] = OPTIONS
+) -> tuple[np.ndarray, int]:
+    """Where Ipopt ends from start with g = 0, and its iterations; SolveError where it finds no minimum."""
+    solver = ca.nlpsol("calibration", "ipopt", problem, options)
     found = solver(x0=start, lbg=0.0, ubg=0.0)
     stats = solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
@@ -55,17 +79,14 @@ def solve(fit: Fit) -> Fit:
             f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a "
             "minimum; take method='gauss-newton', or start='linear'"
         )
-    numbers = group.x.copy()
-    numbers[free] = fit.x[free] + steps @ np.array(found["x"]).ravel()
-    return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
+    return np.array(found["x"]).ravel(), int(stats["iter_count"])
 
 
 def _cost(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
     """Squares of the weighted closure errors, and of deviations from the prior in units of the noise."""
     cost = ca.MX(0)
-    for chain, places in zip(fit.group.chains, fit.group.places, strict=True):
-        e = _errors(chain, x[places.tolist()])
-        cost += ca.sumsqr(e if fit.weights is None else ca.DM(fit.weights) * e)
+    for e in errors_of(fit.group, x):
+        cost += ca.sumsqr(e if fit.weights is None else ca.repmat(ca.DM(fit.weights), 1, e.shape[1]) * e)
     for i, (value, deviation) in fit.group.prior.items():
         cost += (noise / deviation * (x[i] - value)) ** 2
     return cost
@@ -80,7 +101,7 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     whole = _merged(fits)
     group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
     constraints = read_constraints(given, whole.free_names)
-    noise = not_held(whole) * TAPE
+    noise = noise_of(whole.minimum, group)
     steps = _steps(whole)
     unknown = ca.MX.sym("x", len(free))
     numbers_of = ca.DM(minimum.x[free]) + ca.DM(steps) @ unknown
@@ -105,26 +126,26 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     value = np.array(found["g"]).ravel()
     active = np.minimum(value - low, high - value) < AT_LIMIT
     slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))
-    slopes = slopes @ np.linalg.inv(steps)
+    slopes = slopes @ np.linalg.inv(steps) * group.scale[free]
     return [_constrained(whole, numbers, slopes[active], int(stats["iter_count"]))]
 
 
 def _steps(fit: Fit) -> np.ndarray:
-    """One deviation of the numbers along each direction, of those that data do not hold by TAPE, in columns, (n, n).
+    """One deviation of the numbers along each direction, of those that data do not hold by tape, in columns, (n, n).
 
     In these steps the curvature of the cost is the same along all directions.
     """
     minimum = fit.minimum
-    noise = max(not_held(fit) * TAPE, LEAST)
-    sizes = np.full(len(minimum.directions), TAPE)
+    noise = max(noise_of(minimum, fit.group), LEAST)
+    sizes = np.full(len(minimum.directions), fit.group.tape)
     sizes[: minimum.rank] = noise / minimum.singular[: minimum.rank]
-    return minimum.directions.T * sizes
+    return minimum.directions.T * sizes * fit.group.scale[fit.group.free][:, None]
 
 
 def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> Fit:
     """The fit at x, which moves only across the slopes of the constraints it keeps."""
     weights = None if fit.weights is None else [fit.weights] * len(fit.group.chains)
-    found = problem(fit.group, weights, not_held(fit) * TAPE)
+    found = problem(fit.group, weights, noise_of(fit.minimum, fit.group))
     J = found.slopes(x)[:, fit.group.free]
     _, sizes, rows = np.linalg.svd(kept, full_matrices=True)
     across = rows[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
@@ -147,11 +168,14 @@ def _merged(fits: Sequence[Fit]) -> Fit:
         tuple(name for fit in fits for name in fit.group.names),
         np.concatenate([fit.group.x for fit in fits]),
         np.concatenate([fit.group.free for fit in fits]),
+        np.concatenate([fit.group.scale for fit in fits]),
         {
             i + int(start): v
             for fit, start in zip(fits, starts[:-1], strict=True)
             for i, v in fit.group.prior.items()
         },
+        fits[0].group.noise,
+        fits[0].group.tape,
     )
     held, lost = [], []
     ends = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
@@ -175,39 +199,10 @@ def _merged(fits: Sequence[Fit]) -> Fit:
     return Fit(group, minimum, max(fit.smallest for fit in fits), fits[0].weights)
 
 
-def _errors(chain: Chain, p: ca.MX) -> ca.MX:
-    """Closure errors (N, 1), as `Chain.error` writes them, all poses by one function that is mapped."""
-    N = len(chain.q)
-    numbers, q, T, R = ca.SX.sym("p", chain.size), ca.SX.sym("q"), ca.SX.sym("T", 3), ca.SX.sym("R", 3, 3)
-    if chain.points is None:
-        along = q * numbers[4:7]
-        data = chain.q[None]
-    else:  # Q a with the rotation vector as exponential
-        a, w = ca.SX.sym("a", 3), numbers[4:7]
-        turned = ca.DM(np.eye(3) if chain.turned is None else chain.turned)
-        along = _turn(w) @ turned @ a
-        q, data = a, chain.points.T
-    y = T - numbers[1:4] - along
-    given, columns = [q, T], [data, chain.r.T]
-    if chain.R is not None:
-        y += R @ numbers[7:10]
-        given.append(ca.vec(R))
-        columns.append(chain.R.transpose(2, 1, 0).reshape(9, N))
-    one = ca.Function("closure", [numbers, *given], [ca.sumsqr(y) - numbers[0] ** 2])
-    return one.map(N)(ca.repmat(p, 1, N), *(ca.DM(c) for c in columns)).T
-
-
-def _turn(w: ca.SX) -> ca.SX:
-    """exp([w]x), smooth at 0."""
-    angle = ca.sqrt(ca.sumsqr(w) + 1e-20)
-    K = ca.skew(w)
-    return ca.SX.eye(3) + ca.sin(angle) / angle * K + (1 - ca.cos(angle)) / angle**2 * K @ K
-
-
 def _minimum(fit: Fit, x: np.ndarray, iterations: int) -> Minimum:
     """The record of the minimum at x, with slopes as Gauss-Newton keeps them."""
     group, old = fit.group, fit.minimum
-    noise = float(np.sqrt(old.cost / max(1, fit.count - old.rank)))
+    noise = noise_of(old, group)
     weights = None if fit.weights is None else [fit.weights] * len(group.chains)
     found = problem(group, weights, noise)
     J = found.slopes(x)[:, group.free]

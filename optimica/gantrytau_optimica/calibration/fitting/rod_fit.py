@@ -8,13 +8,13 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum, gauss_newton
-from gantrytau_optimica.calibration.rods.groups import Group, Problem, Taped, minimise, problem
+from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum
+from gantrytau_optimica.calibration.fitting.least_squares import Problem, Taped, minimise, problem
+from gantrytau_optimica.calibration.rods.groups import Group
 
-TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
-CLEARLY = 10.0  # times better than TAPE, from which on its pull would be negligible
 FAR = 0.5  # m, from the start values; fits that data do not hold may run off further
 NOISES, SETTLED = 10, 0.01  # rounds of estimating the noise with a tape measure, until it changes by less
+CLEARLY = 10.0  # times better than a tape measure, from which on its pull would be negligible
 ROUNDS = 60  # of reweighting
 HUBER, TUKEY = 1.345, 4.685  # of the standard deviation, 95 % efficient for normal noise (Huber, 1981)
 
@@ -50,8 +50,7 @@ class Fit:
 
     def distances(self) -> np.ndarray:
         """Closure errors as differences of lengths, about e / 2L, (N, chains) in m."""
-        lengths = np.array([self.x[places[0]] for places in self.group.places])
-        return self.group.errors(self.x) / (2 * lengths)
+        return self.group.distances(self.x)
 
 
 def fit_group(
@@ -61,28 +60,32 @@ def fit_group(
     begin: np.ndarray | None = None,
     smallest: float | None = None,
 ) -> Fit:
-    """The minimum of a group; what data hold worse than TAPE stays near the start values.
+    """The minimum of a group; what data hold worse than a tape measure stays near the start values.
 
     weights: of the poses, (N,), or None; begin: where the search begins, instead of the start values; smallest: singular
     value below which directions are known not to be held.
 
-    Where data do not hold everything, closure errors curve so much along what they do not hold that steps without it end
-    in wrong places. So all numbers are first held by a tape measure, which has one minimum; what is held is decided there,
-    and moves on without the tape.
+    Where noise is known, steps of least norm leave what data hold worse than a tape measure at the start values. Where it
+    has to be found and data do not hold everything, closure errors curve so much along what they do not hold that steps
+    without it end in wrong places. So all numbers are first held by a tape measure, which has one minimum; what is held is
+    decided there, and moves on without the tape.
     """
     x = group.x if begin is None else begin
     found = problem(group, None if weights is None else [weights] * len(group.chains))
+    if group.noise is not None and smallest is None:
+        limit = group.noise / group.tape * (1 - 1e-6)  # a prior as wide as a tape measure counts
+        return Fit(group, minimise(replace(found, noise=group.noise), x, limit), limit, weights)
     if smallest is None:
         minimum = minimise(found, x)
         for _ in range(2 if group.prior else 0):  # its weight follows from the noise that is left without it
-            found = replace(found, noise=_noise(minimum, group))
+            found = replace(found, noise=noise_of(minimum, group))
             minimum = minimise(found, x)
-        noise = _noise(minimum, group)
+        noise = noise_of(minimum, group)
         near = np.abs(minimum.x - x).max(initial=0.0) < FAR
-        if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * noise / TAPE:
+        if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * noise / group.tape:
             return Fit(group, minimum, 0.0, weights)
     else:
-        noise = smallest * TAPE
+        noise = smallest * group.tape
     found, x, limit = _by_tape(found, noise, smallest)
     _, singular, directions = np.linalg.svd(found.slopes(x)[:, group.free], full_matrices=False)
     held = int((singular > max(limit, RELATIVE * singular.max(initial=0.0))).sum())
@@ -96,9 +99,9 @@ def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Prob
     """
     group, rounds = found.group, 0
     while True:
-        limit = noise / TAPE if smallest is None else smallest
+        limit = noise / group.tape if smallest is None else smallest
         tape = Taped(replace(found, noise=noise), limit)
-        minimum = gauss_newton(tape.errors, tape.slopes, group.x, group.free)
+        minimum = minimise(tape, group.x)
         left, J = tape.problem.errors(minimum.x), tape.problem.slopes(minimum.x)[:, group.free]
         squares = np.linalg.svd(J, compute_uv=False) ** 2
         told = float(np.sum(squares / np.maximum(squares + limit**2, 1e-300)))  # how many numbers data tell
@@ -109,12 +112,14 @@ def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Prob
 
 
 def not_held(fit: Fit) -> float:
-    """The singular value below which directions of a like group are held worse than TAPE."""
-    return _noise(fit.minimum, fit.group) / TAPE
+    """The singular value below which directions of a like group are held worse than a tape measure."""
+    return noise_of(fit.minimum, fit.group) / fit.group.tape
 
 
-def _noise(minimum: Minimum, group: Group) -> float:
-    """Standard deviation of a closure error, m2."""
+def noise_of(minimum: Minimum, group: Group) -> float:
+    """Standard deviation of a closure error, as it is known or as it is left."""
+    if group.noise is not None:
+        return group.noise
     return float(np.sqrt(minimum.cost / max(1, _count(group) - minimum.rank)))
 
 
@@ -134,10 +139,15 @@ def fit_robust(groups: Sequence[Group]) -> list[Fit]:
             else:
                 square = np.minimum(1.0, HUBER / np.maximum(size, 1e-12))
             old, weights = weights, np.sqrt(square)
-            fits = [fit_group(g, weights, begin=f.x) for g, f in zip(groups, fits, strict=True)]
+            fits = [fit_group(fit.group, weights, begin=_onwards(fit)) for fit in fits]
             if np.abs(weights - old).max() < 1e-6:
                 break
     return fits
+
+
+def _onwards(fit: Fit) -> np.ndarray | None:
+    """Where a fit with other weights begins: where it ended, unless gross errors may have moved what data do not hold."""
+    return None if fit.group.noise is not None else fit.x
 
 
 def relative_size(fits: Sequence[Fit]) -> np.ndarray:

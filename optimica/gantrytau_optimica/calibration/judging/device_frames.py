@@ -10,9 +10,9 @@ import numpy as np
 
 from gantrytau import GantryTauError, Model
 from gantrytau.kinematics.rotations import rotation_vector
-from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, miss, thinned, trimmed_motion
-from gantrytau_optimica.calibration.rods.arms import Arm, exponential, product
+from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
+from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, miss, trimmed_motion
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, exponential, product
 
 FEWEST = 4  # poses that nominal kinematics must reach
 
@@ -33,23 +33,21 @@ def frame_of(robot: Model, misses: Misses, data: Measurements) -> Fitting | None
     return Fitting(miss(misses, data.q, data.r, data.R), off, turn, shift, off)
 
 
-def moved_arms(arms: Sequence[Arm], turn: np.ndarray, shift: np.ndarray) -> tuple[Arm, ...]:
+def moved_arms(arms: Sequence[ArmClosure], turn: np.ndarray, shift: np.ndarray) -> tuple[ArmClosure, ...]:
     """The same arms in another frame, turn (3, 3) and shift (3,) as above."""
     return tuple(_moved(arm, turn, shift) for arm in arms)
 
 
-def _moved(arm: Arm, turn: np.ndarray, shift: np.ndarray) -> Arm:
-    values = dict(arm.values)
-    values[f"{arm.name}.offset"] = turn @ values[f"{arm.name}.offset"] + shift
-    values[f"{arm.name}.direction"] = turn @ values[f"{arm.name}.direction"]
-    if arm.turntables:
-        first = arm.turntables[0].name
-        values[f"{first}.offset"] = turn @ values[f"{first}.offset"]
-        values[f"{first}.orientation"] = product(
-            exponential(rotation_vector(turn)), values[f"{first}.orientation"]
-        )
+def _moved(arm: ArmClosure, turn: np.ndarray, shift: np.ndarray) -> ArmClosure:
+    values, said = dict(arm.values), arm.said
+    if said.offset is not None:
+        values[said.offset] = turn @ values[said.offset] + shift
+    values[said.direction] = turn @ values[said.direction]
+    if said.turntables:
+        first = said.turntables[0]
+        values[first.offset] = turn @ values[first.offset]
+        values[first.orientation] = product(exponential(rotation_vector(turn)), values[first.orientation])
     else:
-        for link in arm.links:
-            if link != arm.name:
-                values[f"{link}.offset"] = turn @ values[f"{link}.offset"]
+        for name in (rod.offset for rod in said.rods if rod.offset is not None):
+            values[name] = turn @ values[name] + (shift if said.offset is None else 0.0)
     return replace(arm, values=values)

@@ -1,0 +1,82 @@
+"""The parameters of one arm from measured poses, as `calibrate` finds those of all arms."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau_optimica.calibration.fitting.covariance import joint_covariance
+from gantrytau_optimica.calibration.fitting.rod_fit import (
+    Fit,
+    Prior,
+    fit_group,
+    fit_robust,
+    with_prior,
+)
+from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
+from gantrytau_optimica.calibration.rods.error_models import grouped, links_of_arm
+from gantrytau_optimica.calibration.rods.groups import TAPE
+
+
+@dataclass(frozen=True, eq=False)
+class ArmFit:
+    """The arm as it was fitted.
+
+    arm: with its new values; iterations: steps taken; success: whether they converged; residuals: closure errors
+    (N, m) in m; rank: how many directions the data hold; deviation: of one closure error, in m;
+    covariance: (p, p) of the unknowns in the directions that are held, zero in others; links of one pose share the error
+    of its measurement, so it uses the covariance of their residuals and not their deviation alone.
+    """
+
+    arm: ArmClosure
+    iterations: int
+    success: bool
+    residuals: np.ndarray
+    rank: int
+    deviation: float
+    covariance: np.ndarray
+
+
+def fit_arm(
+    arm: ArmClosure,
+    q: np.ndarray,
+    r: np.ndarray,
+    R: np.ndarray | None,
+    *,
+    noise: float | None = None,
+    tape: float = TAPE,
+    prior: Mapping[str, Any] | None = None,
+    loss: str = "linear",
+) -> ArmFit:
+    """Fit the unknowns of an arm to measured poses.
+
+    q: (N, n); r: (N, 3) in m; R: (N, 3, 3) or None; noise: standard deviation of a measured closure error in m, by default
+    found from the data, or with turntables that of a laser tracker; tape: that of nominal values, in m: what data hold worse
+    stays near them; prior, loss: as of `calibrate`.
+    Raises ModelError for other words, unknown names, arrays whose shapes do not fit or numbers that are not finite.
+    """
+    if loss not in ("linear", "robust"):
+        raise ModelError(f"loss: found {loss!r}, expected 'linear' or 'robust'")
+    (group,) = with_prior(grouped(links_of_arm(arm, *checked_poses(arm, q, r, R))), Prior(prior, {}))
+    if noise is not None:
+        unit = 1.0 if group.arms else 2 * float(np.mean(arm.lengths))
+        group = replace(group, noise=noise * unit)
+    group = replace(group, tape=tape)
+    fit = fit_robust([group])[0] if loss == "robust" else fit_group(group)
+    return _as_arm(arm, fit, loss, checked_poses(arm, q, r, R))
+
+
+def _as_arm(arm: ArmClosure, fit: Fit, loss: str, data: tuple) -> ArmFit:
+    order = [fit.group.names.index(name) for name in arm.names]
+    found = arm.moved((fit.x - fit.group.x)[order])
+    residuals = found.closure(*data)[0]
+    degrees = max(
+        1.0, len(residuals) - arm.count / len(arm.lengths)
+    )  # each link has its share of the unknowns
+    deviation = float(np.sqrt((residuals**2).sum() / degrees / len(arm.lengths)))
+    covariance = joint_covariance([fit], loss)[np.ix_(order, order)]
+    minimum = fit.minimum
+    return ArmFit(found, minimum.iterations, minimum.success, residuals, minimum.rank, deviation, covariance)
