@@ -24,7 +24,8 @@ ORDER = {  # a room imports the rooms before it
     "gantrytau_models": "prototypes mechanisms control __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "
     "studies estimation paths calibration procedure __init__",
-    "gantrytau_optimica.calibration": "data rods fitting judging calibration calibrate design devices trust surveys report",
+    "gantrytau_optimica.calibration": "data rods fitting design judging report calibration calibrate "
+    "devices trust surveys __init__",
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies fleet workspace_resolution candidates pose_choice "
     "trials ways plan_verdict pose_plan documents calibration_plan plan_calibration cells measured_plan",
     "gantrytau_fmu": "description code describing building reading export systems __init__",

@@ -65,13 +65,8 @@ def calibrate(
             argument="constraints",
         )
     nominal_rods = read_nominal(robot)
-    _check_columns(nominal_rods, measurements)
+    _check_columns(nominal_rods, measurements, start)
     check_model(model, nominal_rods, measurements)
-    if nominal_rods.turntables and start == "linear":
-        raise ModelError(
-            f"calibrate: found start='linear' for {nominal_rods.name}, expected 'nominal'; closure is linear in the "
-            "parameters of linear guideways only"
-        )
     findings = list(measurements.findings)
     rows = usable_rows(findings, measurements)
     check_carts(nominal_rods, measurements, rows)
@@ -161,7 +156,7 @@ def _check_words(**words: str) -> None:
             )
 
 
-def _check_columns(robot: NominalRods, measurements: Measurements) -> None:
+def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:
     if not isinstance(measurements, Measurements):
         raise ModelError(
             f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
@@ -171,6 +166,11 @@ def _check_columns(robot: NominalRods, measurements: Measurements) -> None:
         raise ModelError(
             f"calibrate: found measurements of {measurements.q.shape[1]} actuators for {robot.name}, expected "
             f"{expected}, one for each guideway and turntable; check the columns q1, q2, ..."
+        )
+    if robot.turntables and start == "linear":
+        raise ModelError(
+            f"calibrate: found start='linear' for {robot.name}, expected 'nominal'; closure is linear in the parameters of "
+            "linear guideways only"
         )
 
 

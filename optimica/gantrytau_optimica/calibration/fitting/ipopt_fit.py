@@ -102,15 +102,19 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
     constraints = read_constraints(given, whole.free_names)
     noise = noise_of(whole.minimum, group)
-    steps = _steps(whole)
+    # one metre each where turntables curve the cost too much for steps of one deviation
+    steps = np.diag(group.scale[free]) if group.arms else _steps(whole)
     unknown = ca.MX.sym("x", len(free))
-    numbers_of = ca.DM(minimum.x[free]) + ca.DM(steps) @ unknown
+    moved = ca.DM(steps) @ unknown
+    numbers_of = ca.DM(minimum.x[free]) + moved
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = numbers_of
-    cost = max(noise, LEAST) ** 2 * ca.sumsqr(unknown[minimum.rank :]) + _cost(whole, x, noise)
+    lost = ca.DM(minimum.directions[minimum.rank :] / group.scale[free] / group.tape) @ moved
+    cost = max(noise, LEAST) ** 2 * ca.sumsqr(lost) + _cost(whole, x, noise)
     kept = ca.vertcat(*[each.expression(numbers_of) for each in constraints])
     low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
-    options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
+    scaling = {"ipopt.nlp_scaling_method": "gradient-based"} if group.arms else {}
+    options = OPTIONS | scaling | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
     solver = ca.nlpsol(
         "calibration", "ipopt", {"x": unknown, "f": cost / max(noise, LEAST) ** 2, "g": kept}, options
     )
