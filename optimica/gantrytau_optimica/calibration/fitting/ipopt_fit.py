@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
 from gantrytau_optimica.calibration.rods.groups import Group
 
 TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
+ROUNDED = 1e-6  # the same of closure errors of turntables, whose roundings leave 5e-7
 LEAST = 1e-9  # m2 or m, of the noise: rounding of closure errors is far below it
 AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
 # where rounding ends the descent before the gradient is that small
@@ -29,7 +30,6 @@ OPTIONS = {
     "ipopt.nlp_scaling_method": "none",
     "ipopt.max_iter": 200,
 }
-NEARLY = {"ipopt.nlp_scaling_method": "gradient-based", "ipopt.tol": 1e-4, "ipopt.acceptable_tol": 1e-4}
 
 
 def solve(fit: Fit) -> Fit:
@@ -44,52 +44,45 @@ def solve(fit: Fit) -> Fit:
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
     noise = noise_of(fit.minimum, fit.group)
-    cost = _cost(fit, x, noise) / max(noise, LEAST) ** 2
-    # far from the minimum turntables curve the cost so much that a tape measure has to lead there
-    begin = _led_by_tape(fit, noise) if group.arms else group.x[free]
-    start = np.linalg.solve(steps, begin - fit.x[free])
-    held = unknown[fit.minimum.rank :]
+    rows, held = _residuals(fit, x, noise), unknown[fit.minimum.rank :]
+    solver = _solver(rows, unknown, held, bool(group.arms), OPTIONS)
+    start = np.linalg.solve(steps, group.x[free] - fit.x[free])
     start[fit.minimum.rank :] = 0.0
-    found, iterations = _minimised({"x": unknown, "f": cost, "g": held}, start)
-    numbers = group.x.copy()
-    numbers[free] = fit.x[free] + steps @ found
-    return replace(fit, minimum=_minimum(fit, numbers, iterations))
-
-
-def _led_by_tape(fit: Fit, noise: float) -> np.ndarray:
-    """The free numbers where a tape measure holds all about their start values."""
-    group, free = fit.group, np.flatnonzero(fit.group.free)
-    moved = ca.MX.sym("m", len(free))  # in m
-    x = ca.MX(ca.DM(group.x))
-    x[free.tolist()] = ca.DM(group.x[free]) + ca.DM(group.scale[free]) * moved
-    cost = _cost(fit, x, noise) / max(noise, LEAST) ** 2 + ca.sumsqr(moved / group.tape)
-    found, _ = _minimised({"x": moved, "f": cost}, np.zeros(len(free)), OPTIONS | NEARLY)
-    return group.x[free] + group.scale[free] * found
-
-
-def _minimised(
-    problem: dict[str, ca.MX], start: np.ndarray, options: dict[str, Any] = OPTIONS
-) -> tuple[np.ndarray, int]:
-    """Where Ipopt ends from start with g = 0, and its iterations; SolveError where it finds no minimum."""
-    solver = ca.nlpsol("calibration", "ipopt", problem, options)
-    found = solver(x0=start, lbg=0.0, ubg=0.0)
+    found: Any = solver(x0=start, lbg=0.0, ubg=0.0)
     stats = solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
         raise SolveError(
             f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a "
             "minimum; take method='gauss-newton', or start='linear'"
         )
-    return np.array(found["x"]).ravel(), int(stats["iter_count"])
+    numbers = group.x.copy()
+    numbers[free] = fit.x[free] + steps @ np.array(found["x"]).ravel()
+    return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
 
 
-def _cost(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
-    """Squares of the weighted closure errors, and of deviations from the prior in units of the noise."""
-    cost = ca.MX(0)
+def _residuals(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
+    """Weighted closure errors, and deviations from the prior, in units of the noise."""
+    rows = []
     for e in errors_of(fit.group, x):
-        cost += ca.sumsqr(e if fit.weights is None else ca.repmat(ca.DM(fit.weights), 1, e.shape[1]) * e)
+        rows.append(ca.vec(e if fit.weights is None else ca.repmat(ca.DM(fit.weights), 1, e.shape[1]) * e))
     for i, (value, deviation) in fit.group.prior.items():
-        cost += (noise / deviation * (x[i] - value)) ** 2
-    return cost
+        rows.append(noise / deviation * (x[i] - value))
+    return ca.vertcat(*rows) / max(noise, LEAST)
+
+
+def _solver(rows: ca.MX, unknown: ca.MX, kept: ca.MX, arms: bool, options: dict[str, Any]) -> ca.Function:
+    """Ipopt for the sum of squares of rows, subject to limits of kept.
+
+    arms: with turntables, whose second derivatives turn the cost down far from the minimum: Gauss-Newton's take their place.
+    """
+    problem = {"x": unknown, "f": ca.sumsqr(rows), "g": kept}
+    if arms:
+        J, by_cost, by_kept = ca.jacobian(rows, unknown), ca.MX.sym("f"), ca.MX.sym("g", kept.numel())
+        curved = 2 * by_cost * (J.T @ J) + ca.hessian(ca.dot(by_kept, kept), unknown)[0]
+        arguments = [unknown, ca.MX.sym("p", 0, 0), by_cost, by_kept]
+        options = options | dict.fromkeys(("ipopt.tol", "ipopt.acceptable_tol"), ROUNDED)
+        options |= {"hess_lag": ca.Function("hess_lag", arguments, [ca.triu(ca.densify(curved))])}
+    return ca.nlpsol("calibration", "ipopt", problem, options)
 
 
 def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
@@ -102,22 +95,16 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
     constraints = read_constraints(given, whole.free_names)
     noise = noise_of(whole.minimum, group)
-    # one metre each where turntables curve the cost too much for steps of one deviation
-    steps = np.diag(group.scale[free]) if group.arms else _steps(whole)
     unknown = ca.MX.sym("x", len(free))
-    moved = ca.DM(steps) @ unknown
-    numbers_of = ca.DM(minimum.x[free]) + moved
+    steps, begin = _steps(whole), minimum.x[free]
+    numbers_of = ca.DM(begin) + ca.DM(steps) @ unknown
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = numbers_of
-    lost = ca.DM(minimum.directions[minimum.rank :] / group.scale[free] / group.tape) @ moved
-    cost = max(noise, LEAST) ** 2 * ca.sumsqr(lost) + _cost(whole, x, noise)
+    rows = ca.vertcat(unknown[minimum.rank :], _residuals(whole, x, noise))
     kept = ca.vertcat(*[each.expression(numbers_of) for each in constraints])
     low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
-    scaling = {"ipopt.nlp_scaling_method": "gradient-based"} if group.arms else {}
-    options = OPTIONS | scaling | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
-    solver = ca.nlpsol(
-        "calibration", "ipopt", {"x": unknown, "f": cost / max(noise, LEAST) ** 2, "g": kept}, options
-    )
+    options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
+    solver = _solver(rows, unknown, kept, bool(group.arms), options)
     found: Any = solver(x0=0.0, lbg=low, ubg=high)
     stats = solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
@@ -126,7 +113,7 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
             "minimum that keeps the constraints; look whether they contradict each other"
         )
     numbers = group.x.copy()
-    numbers[free] = minimum.x[free] + steps @ np.array(found["x"]).ravel()
+    numbers[free] = begin + steps @ np.array(found["x"]).ravel()
     value = np.array(found["g"]).ravel()
     active = np.minimum(value - low, high - value) < AT_LIMIT
     slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))
