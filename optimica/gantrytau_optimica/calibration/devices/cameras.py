@@ -14,7 +14,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.devices.devices import Array, Device, Measured, _rotation, numbers
+from gantrytau_optimica.calibration.devices.devices import Array, Device, Measured, checked_rotation, numbers
 from gantrytau_optimica.calibration.devices.sight import Bars, clear
 
 ROUNDS = 20  # steps from the true pose; three or four are enough where the pattern is seen well
@@ -62,7 +62,7 @@ class Camera:
             object.__setattr__(self, name, found)
         if not np.all(self.focal > 0):
             raise ModelError(f"Camera: found focal={self.focal!r}, expected pixels above 0")
-        object.__setattr__(self, "R", _rotation("Camera", self.R))
+        object.__setattr__(self, "R", checked_rotation("Camera", self.R))
 
     @property
     def border(self) -> float:

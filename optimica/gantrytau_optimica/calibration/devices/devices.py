@@ -58,7 +58,7 @@ class Device:
     def __post_init__(self):
         self._vector("r", self.r)
         self._vector("target", self.target)
-        object.__setattr__(self, "R", _rotation(type(self).__name__, self.R))
+        object.__setattr__(self, "R", checked_rotation(type(self).__name__, self.R))
         if not isinstance(self.obstacles, Sequence) or not all(
             hasattr(o, "distance") for o in self.obstacles
         ):
@@ -304,7 +304,8 @@ def _like(seen: Array, values: Array) -> Array:
     return seen.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def _rotation(what: str, R: Any) -> Array:
+def checked_rotation(what: str, R: Any) -> Array:
+    """An orientation, (3, 3); ModelError if it is none."""
     found = numbers(R)
     if (
         found.shape != (3, 3)

@@ -117,13 +117,13 @@ class ErrorMap:
         """Lengths in colour and vectors as arrows on the plane of two axes, in layers along the third one."""
         from gantrytau_optimica.calibration.surveys.map_figures import draw_map
 
-        return draw_map(self, axes, layers, file)
+        return draw_map(self.r, self.errors, axes, layers, file)
 
     def plot_sizes(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Histogram of the lengths, and of the components along the principal axes."""
         from gantrytau_optimica.calibration.surveys.map_figures import draw_sizes
 
-        return draw_sizes(self, file)
+        return draw_sizes(self.errors, self.axes, file)
 
     def __str__(self) -> str:
         parts = ", ".join(

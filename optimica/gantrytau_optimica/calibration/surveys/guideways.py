@@ -134,19 +134,31 @@ class Linearity:
         """Errors along and across the axis over q with the fit, as Figures 4.4 and 4.5; saved to `file` if it is named."""
         from gantrytau_optimica.calibration.surveys.guideway_figures import draw_errors
 
-        return draw_errors(self, file)
+        return draw_errors(self.q, self.error, self.profile, self.noise, file)
 
     def plot_backlash(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Errors along the axis for both directions of motion, as Figure 4.3. Raises ModelError if there is only one."""
         from gantrytau_optimica.calibration.surveys.guideway_figures import draw_backlash
 
-        return draw_backlash(self, file)
+        if self.backlash is None:
+            raise ModelError(
+                "plot_backlash: found points from one direction of motion only, expected both; measure forth and back"
+            )
+        sides = {}
+        for side, name in ((1, "with rising q"), (-1, "with falling q")):
+            rows = np.flatnonzero(self.rising == side)
+            rows = rows[np.argsort(self.q[rows])]
+            smooth = self.profile(self.q[rows])[0][:, 0] - side * self.backlash / 2
+            sides[name] = self.q[rows], self.along[rows], smooth
+        return draw_backlash(sides, self.backlash, self.backlash_error or 0.0, file)
 
     def plot_spectrum(self, periods: Any, *, file: str | os.PathLike[str] | None = None) -> "Figure":
         """The least-squares spectrum over periods (F,) in m."""
         from gantrytau_optimica.calibration.surveys.guideway_figures import draw_spectrum
 
-        return draw_spectrum(self, np.asarray(periods, dtype=float), file)
+        periods = np.asarray(periods, dtype=float)
+        pitch = self.cyclic.pitch if self.cyclic is not None else None
+        return draw_spectrum(periods, self.spectrum(periods), pitch, file)
 
     def __str__(self) -> str:
         micro = 1e6

@@ -1,6 +1,7 @@
 """Figures of errors over the workspace: Dressler (2012), Figure 4.7, and maps of error vectors."""
 
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,22 +13,20 @@ from gantrytau_optimica.calibration.surveys.guideway_figures import MICRO, panel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gantrytau_optimica.calibration.surveys.error_maps import ErrorMap
-    from gantrytau_optimica.calibration.surveys.orientation_errors import Causes, OrientationErrors
-
 ARROW = 0.15  # the longest arrow by the width of what is drawn
 MOST_LAYERS = 12
 
 
 def draw_orientation(
-    found: "OrientationErrors", causes: "Causes | None", file: str | os.PathLike[str] | None
+    places: np.ndarray,
+    turns: np.ndarray,
+    causes: Mapping[str, np.ndarray],
+    file: str | os.PathLike[str] | None,
 ) -> "Figure":
-    """Turns about x, y and z in 0.001 deg over the poses, sorted along the guideways."""
+    """Turns (N, 3) about x, y and z in 0.001 deg over the poses, sorted by their places along the guideways."""
     figure, panels = panels_of(3, file)
-    order = np.argsort(found.r @ found.along, kind="stable")
-    parts = {"measured": found.turns - found.turns.mean(axis=0)}
-    if causes is not None:
-        parts |= {"by links and joints": causes.links, "by guideways": causes.guideways}
+    order = np.argsort(places, kind="stable")
+    parts = {"measured": turns - turns.mean(axis=0), **causes}
     for axis, name, k in zip(panels, "xyz", range(3), strict=True):
         for label, part in parts.items():
             style = "." if label == "measured" else "-"
@@ -38,7 +37,9 @@ def draw_orientation(
     return finished(figure, file)
 
 
-def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[str] | None) -> "Figure":
+def draw_map(
+    r: np.ndarray, errors: np.ndarray, axes: str, layers: int, file: str | os.PathLike[str] | None
+) -> "Figure":
     """Errors as coloured arrows on a plane; each panel holds the poses of one layer along the third axis."""
     if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set("xyz"):
         raise ModelError(f"plot: found axes={axes!r}, expected two of x, y and z, such as 'yz'")
@@ -47,23 +48,24 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
     first, second = ("xyz".index(a) for a in axes)
     third = 3 - first - second
     figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.6 + 3.8 * layers, 4.4))
-    borders = np.linspace(found.r[:, third].min(), found.r[:, third].max(), layers + 1)
-    layer = np.clip(np.searchsorted(borders, found.r[:, third], side="right") - 1, 0, layers - 1)
-    width = max(np.ptp(found.r[:, first]), np.ptp(found.r[:, second]), 1e-9)
-    scale = found.size.max() / (ARROW * width) or 1.0
+    borders = np.linspace(r[:, third].min(), r[:, third].max(), layers + 1)
+    layer = np.clip(np.searchsorted(borders, r[:, third], side="right") - 1, 0, layers - 1)
+    size = np.linalg.norm(errors, axis=1)
+    width = max(np.ptp(r[:, first]), np.ptp(r[:, second]), 1e-9)
+    scale = size.max() / (ARROW * width) or 1.0
     drawn = []
     for k, axis in enumerate(panels):
         rows = layer == k
         arrows = axis.quiver(
-            found.r[rows, first], found.r[rows, second], found.errors[rows, first], found.errors[rows, second],
-            MICRO * found.size[rows], angles="xy", scale_units="xy", scale=scale, width=0.005,
-            clim=(0.0, MICRO * found.size.max()),
+            r[rows, first], r[rows, second], errors[rows, first], errors[rows, second],
+            MICRO * size[rows], angles="xy", scale_units="xy", scale=scale, width=0.005,
+            clim=(0.0, MICRO * size.max()),
         )  # fmt: skip
         drawn.append(arrows)
         axis.set_aspect("equal")
         # one window for all, which leaves room for arrows
-        axis.set_xlim(found.r[:, first].min() - ARROW * width, found.r[:, first].max() + ARROW * width)
-        axis.set_ylim(found.r[:, second].min() - ARROW * width, found.r[:, second].max() + ARROW * width)
+        axis.set_xlim(r[:, first].min() - ARROW * width, r[:, first].max() + ARROW * width)
+        axis.set_ylim(r[:, second].min() - ARROW * width, r[:, second].max() + ARROW * width)
         axis.set_xlabel(f"{axes[0]} [m]")
         if layers > 1:
             axis.set_title(
@@ -74,15 +76,16 @@ def draw_map(found: "ErrorMap", axes: str, layers: int, file: str | os.PathLike[
     return finished(figure, file)
 
 
-def draw_sizes(found: "ErrorMap", file: str | os.PathLike[str] | None) -> "Figure":
-    """Histograms of lengths and of components along the principal axes."""
+def draw_sizes(errors: np.ndarray, principal: np.ndarray, file: str | os.PathLike[str] | None) -> "Figure":
+    """Histograms of lengths and of components along the principal axes, the columns of `principal`."""
     figure, (left, right) = panels_of(1, file, 2)
-    left.hist(MICRO * found.size, bins="auto")
-    left.axvline(MICRO * found.mean, color="k", linewidth=0.8, label=f"mean {MICRO * found.mean:.0f} µm")
+    size = np.linalg.norm(errors, axis=1)
+    left.hist(MICRO * size, bins="auto")
+    left.axvline(MICRO * size.mean(), color="k", linewidth=0.8, label=f"mean {MICRO * size.mean():.0f} µm")
     left.set_xlabel("length of the error [µm]")
     left.set_ylabel("poses")
     left.legend(fontsize="small")
-    for k, components in enumerate((found.errors @ found.axes).T):
+    for k, components in enumerate((errors @ principal).T):
         right.hist(MICRO * components, bins="auto", histtype="step", label=f"axis {k + 1}")
     right.set_xlabel("component along a principal axis [µm]")
     right.legend(fontsize="small")

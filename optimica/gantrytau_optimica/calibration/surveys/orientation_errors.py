@@ -153,7 +153,10 @@ class OrientationErrors:
         """Turns about x, y, z over the poses in the order of their layers, as Figure 4.7, with causes if given."""
         from gantrytau_optimica.calibration.surveys.map_figures import draw_orientation
 
-        return draw_orientation(self, causes, file)
+        parts = (
+            {} if causes is None else {"by links and joints": causes.links, "by guideways": causes.guideways}
+        )
+        return draw_orientation(self.r @ self.along, self.turns, parts, file)
 
 
 def orientation_errors(
