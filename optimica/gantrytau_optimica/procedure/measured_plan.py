@@ -12,7 +12,7 @@ from gantrytau import ModelError
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.tool_error import ToolError, tool_error
 from gantrytau_optimica.calibration.report.report import Motion
 from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
@@ -58,10 +58,10 @@ class MeasuredPlan:
         plan, cell = self.planned.plan, self.planned.cell
         where = np.flatnonzero(plan.measured)
         turns = plan.kind != "three links"
-        every = Poses(plan.q[where], plan.r[where], plan.R[where] if turns else None)
+        every = PoseArrays(plan.q[where], plan.r[where], plan.R[where] if turns else None)
         rows = self.rows[np.setdiff1d(found.rows, found.left_out)]
         rows = rows[rows >= 0]
-        fitted = Poses(every.q[rows], every.r[rows], None if every.R is None else every.R[rows])
+        fitted = PoseArrays(every.q[rows], every.r[rows], None if every.R is None else every.R[rows])
         return tool_error(
             cell.robot,
             fitted,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.rods.arm_factors import scales
@@ -71,14 +71,16 @@ def expected_error(
     fleet: Fleet, candidates: Candidates, rows: np.ndarray, *, noise: tuple[float, float], tape: float
 ) -> Prediction:
     """Predicted covariance of the tool over the workspace after measuring some candidates."""
-    at = Poses(candidates.at_q, candidates.at_r, candidates.at_R if fleet.nominal.turns else None)
+    at = PoseArrays(candidates.at_q, candidates.at_r, candidates.at_R if fleet.nominal.turns else None)
     data = poses_of(fleet, candidates, rows)
     return predict(fleet.robot, data, at=at, noise=max(noise[0], 1e-9), angle=noise[1], tape=tape)
 
 
-def poses_of(fleet: Fleet, candidates: Candidates, rows: np.ndarray) -> Poses:
+def poses_of(fleet: Fleet, candidates: Candidates, rows: np.ndarray) -> PoseArrays:
     """Some candidates as poses, without R where the plate cannot turn."""
-    return Poses(candidates.q[rows], candidates.r[rows], candidates.R[rows] if fleet.nominal.turns else None)
+    return PoseArrays(
+        candidates.q[rows], candidates.r[rows], candidates.R[rows] if fleet.nominal.turns else None
+    )
 
 
 def device_noise(device: Device, r: np.ndarray, R: np.ndarray) -> tuple[float, float]:
@@ -91,7 +93,7 @@ def device_noise(device: Device, r: np.ndarray, R: np.ndarray) -> tuple[float, f
     return float(np.sqrt(np.nanmean(np.nanvar(readings, axis=0, ddof=1)))), 0.0
 
 
-def observability(fleet: Fleet, data: Poses, held: float) -> tuple[float, float]:
+def observability(fleet: Fleet, data: PoseArrays, held: float) -> tuple[float, float]:
     """Condition number and Nahvi and Hollerbach's index of the identification Jacobian of all arms.
 
     held: noise by tape error, the least singular value of what is known better from poses than from the tape measure.

@@ -1,9 +1,9 @@
-"""Poses of robots with linear guideways, their carts by the quadratic equation of each arm; SI units."""
+"""PoseArrays of robots with linear guideways, their carts by the quadratic equation of each arm; SI units."""
 
 import numpy as np
 
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, read_arms
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of
 
@@ -20,16 +20,18 @@ def carts(arms: tuple[ArmClosure, ...], r: np.ndarray, R: np.ndarray) -> np.ndar
     return q
 
 
-def three_link_poses(count: int, *, seed: int = 0) -> Poses:
+def three_link_poses(count: int, *, seed: int = 0) -> PoseArrays:
     """In a box of 1.6 x 0.8 x 0.6 m before an L1."""
     r = np.array([0.5, 2.8, -0.8]) + np.random.default_rng(seed).uniform(-1, 1, (count, 3)) * [0.8, 0.4, 0.3]
-    return Poses(carts(read_arms(GantryTau(prototypes.L1)), r, np.tile(np.eye(3), (count, 1, 1))), r, None)
+    return PoseArrays(
+        carts(read_arms(GantryTau(prototypes.L1)), r, np.tile(np.eye(3), (count, 1, 1))), r, None
+    )
 
 
-def six_link_poses(count: int, *, seed: int = 0) -> Poses:
+def six_link_poses(count: int, *, seed: int = 0) -> PoseArrays:
     """In a box of 1.2 x 0.8 x 0.8 m before a D1, in its nominal orientation but for what its links add."""
     arms = read_arms(SixLinkGantryTau(prototypes.D1))
     r = np.array([-0.4, -4.5, 0.1]) + np.random.default_rng(seed).uniform(-1, 1, (count, 3)) * [0.6, 0.4, 0.4]
     R = np.tile(np.array(prototypes.D1.plate_rotation), (count, 1, 1))
     q = carts(arms, r, R)
-    return Poses(q, *poses_of(arms, q, r, R))
+    return PoseArrays(q, *poses_of(arms, q, r, R))

@@ -30,7 +30,7 @@ NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weak
 TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out
 
 
-class Poses(NamedTuple):
+class PoseArrays(NamedTuple):
     """What was measured: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
 
     q: np.ndarray
@@ -141,18 +141,20 @@ def identifiability(
     )
 
 
-def measured_poses(measurements: Any) -> Poses:
+def measured_poses(measurements: Any) -> PoseArrays:
     """The arrays of measurements, a record with q, r and R, or a tuple of them; ModelError for anything else."""
     if hasattr(measurements, "q") and hasattr(measurements, "r"):
-        return Poses(np.asarray(measurements.q), np.asarray(measurements.r), getattr(measurements, "R", None))
+        return PoseArrays(
+            np.asarray(measurements.q), np.asarray(measurements.r), getattr(measurements, "R", None)
+        )
     if isinstance(measurements, Iterable) and len(items := list(measurements)) in (2, 3):
-        return Poses(np.asarray(items[0]), np.asarray(items[1]), items[2] if len(items) == 3 else None)
+        return PoseArrays(np.asarray(items[0]), np.asarray(items[1]), items[2] if len(items) == 3 else None)
     raise ModelError(
         f"measurements: found {type(measurements).__name__}, expected Measurements, or (q, r, R)"
     )
 
 
-def finite_poses(measurements: Any) -> tuple[Poses, np.ndarray]:
+def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
     """The poses of measurements whose numbers are finite, and their rows; ModelError if there are none."""
     found = measured_poses(measurements)
     try:
@@ -175,7 +177,7 @@ def finite_poses(measurements: Any) -> tuple[Poses, np.ndarray]:
         raise ModelError(
             f"measurements: found no finite numbers in any of {len(q)} rows, expected poses; give some that were seen"
         )
-    return Poses(q[rows], r[rows], None if R is None else R[rows]), rows
+    return PoseArrays(q[rows], r[rows], None if R is None else R[rows]), rows
 
 
 def check_deviations(noise: float, angle: float, tape: float) -> None:
@@ -190,7 +192,9 @@ def check_deviations(noise: float, angle: float, tape: float) -> None:
             raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
 
 
-def _of_arm(arm: ArmClosure, poses: Poses, noise: tuple[float, float], tape: float) -> ArmIdentifiability:
+def _of_arm(
+    arm: ArmClosure, poses: PoseArrays, noise: tuple[float, float], tape: float
+) -> ArmIdentifiability:
     scale, data = scales(arm), checked_poses(arm, *poses)
     factor = triangle(arm, *data, scale)[:, :-1]
     _, s, directions = np.linalg.svd(factor, full_matrices=True)

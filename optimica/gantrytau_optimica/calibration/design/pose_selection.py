@@ -20,7 +20,7 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.design.identifiability import (
     NOTHING,
-    Poses,
+    PoseArrays,
     check_deviations,
     deviations,
     finite_poses,
@@ -163,7 +163,7 @@ def enough_poses(
     return np.sort(finite[chosen])
 
 
-def _gains(arms: Sequence[ArmClosure], poses: Poses) -> np.ndarray:
+def _gains(arms: Sequence[ArmClosure], poses: PoseArrays) -> np.ndarray:
     """dx/dp of all unknowns, arms one after another, (N, 6 or 3, p)."""
     return np.concatenate([gain for gain, _ in tool_gain(arms, *poses)], axis=2)
 
@@ -176,17 +176,17 @@ def _predicted(gains: np.ndarray, covariance: np.ndarray) -> Prediction:
 
 def _candidates(
     robot: Model, measurements: Any, orientation: Orientation
-) -> tuple[tuple[ArmClosure, ...], Poses, np.ndarray]:
+) -> tuple[tuple[ArmClosure, ...], PoseArrays, np.ndarray]:
     """The arms, the candidates whose numbers are finite, and their rows."""
     arms, (poses, rows) = read_arms(robot, orientation), finite_poses(measurements)
-    return arms, Poses(*[checked_poses(arm, *poses) for arm in arms][-1]), rows
+    return arms, PoseArrays(*[checked_poses(arm, *poses) for arm in arms][-1]), rows
 
 
-def _rows_of(poses: Poses, rows: np.ndarray) -> Poses:
-    return Poses(poses.q[rows], poses.r[rows], None if poses.R is None else np.asarray(poses.R)[rows])
+def _rows_of(poses: PoseArrays, rows: np.ndarray) -> PoseArrays:
+    return PoseArrays(poses.q[rows], poses.r[rows], None if poses.R is None else np.asarray(poses.R)[rows])
 
 
-def _blocks(arms: Sequence[ArmClosure], poses: Poses) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _blocks(arms: Sequence[ArmClosure], poses: PoseArrays) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """J S of each arm, (N, m, rank), and W, (rank, rank), in the directions that all candidates together determine."""
     blocks, weights = [], []
     for arm, (gain, J) in zip(arms, tool_gain(arms, *poses), strict=True):
@@ -215,7 +215,7 @@ def _well_conditioned(blocks: Sequence[np.ndarray], n: int) -> np.ndarray:
 
 
 def _parameter_covariance(
-    arms: Sequence[ArmClosure], poses: Poses, noise: tuple[float, float], tape: float
+    arms: Sequence[ArmClosure], poses: PoseArrays, noise: tuple[float, float], tape: float
 ) -> np.ndarray:
     """Covariance of all unknowns after a fit, arms one after another, (p, p).
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics.rotations import rotation_vector
-from gantrytau_optimica.calibration.design.identifiability import Poses, finite_poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
 from gantrytau_optimica.calibration.rods.arm_poses import poses_of
@@ -72,7 +72,7 @@ def sensitivity_table(
         raise ModelError(f"step: found {step!r}, expected a length above 0 in m")
     arms, (poses, _) = read_arms(robot, orientation), finite_poses(measurements)
     q, r, R = [checked_poses(arm, *poses) for arm in arms][-1]
-    here = Poses(q, *poses_of(arms, q, r, R))
+    here = PoseArrays(q, *poses_of(arms, q, r, R))
     names, rows = [], []
     for i, arm in enumerate(arms):
         names += arm.names
@@ -82,7 +82,7 @@ def sensitivity_table(
 
 
 def _of_parameter(
-    arms: Sequence[ArmClosure], i: int, step: np.ndarray, here: Poses
+    arms: Sequence[ArmClosure], i: int, step: np.ndarray, here: PoseArrays
 ) -> tuple[float, float, float]:
     position = angle = cost = 0.0
     for sign in (1.0, -1.0):

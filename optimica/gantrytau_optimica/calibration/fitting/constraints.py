@@ -18,7 +18,7 @@ from gantrytau.errors import did_you_mean
 
 
 @dataclass(frozen=True)
-class Constraint:
+class ParameterConstraint:
     """low <= sum of squares, or value less other value, of numbers <= high. places: of the numbers; others: of those that
     are taken from them, or none; squared: whether of squares.
     """
@@ -37,7 +37,7 @@ class Constraint:
         return here - ca.vertcat(*[x[k] for k in self.others]) if self.others else here
 
 
-def read_constraints(given: Any, names: Sequence[str]) -> list[Constraint]:
+def read_constraints(given: Any, names: Sequence[str]) -> list[ParameterConstraint]:
     """The constraints on numbers of these names. ModelError for names that are not identified and what is no constraint."""
     if not isinstance(given, Mapping):
         raise ModelError(
@@ -47,7 +47,7 @@ def read_constraints(given: Any, names: Sequence[str]) -> list[Constraint]:
     return [_read(key, value, names) for key, value in given.items()]
 
 
-def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
+def _read(key: str, value: Any, names: Sequence[str]) -> ParameterConstraint:
     squared = key.startswith("|") and key.endswith("|")
     places = _places(key.strip("|") if squared else key, names)
     if isinstance(value, str):
@@ -57,7 +57,7 @@ def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
                 f"calibrate: constraints: '{key}': '{value}', expected two names of numbers or of vectors",
                 argument="constraints",
             )
-        return Constraint(places, others, np.zeros(len(places)), np.zeros(len(places)))
+        return ParameterConstraint(places, others, np.zeros(len(places)), np.zeros(len(places)))
     try:
         low, high = value if isinstance(value, tuple) else (value, value)
         shape = () if squared else (len(places),)
@@ -72,7 +72,7 @@ def _read(key: str, value: Any, names: Sequence[str]) -> Constraint:
         )
     if squared:
         low, high = np.array([low**2]), np.array([high**2])
-    return Constraint(places, (), np.array(low), np.array(high), squared)
+    return ParameterConstraint(places, (), np.array(low), np.array(high), squared)
 
 
 def _places(name: str, names: Sequence[str]) -> tuple[int, ...]:

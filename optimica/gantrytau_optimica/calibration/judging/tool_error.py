@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import Model
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_selection import predict
 from gantrytau_optimica.calibration.rods.arm_closure import Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_factors import scales
@@ -45,8 +45,8 @@ class ToolError:
 
 def tool_error(
     robot: Model,
-    fitted: Poses,
-    at: Poses,
+    fitted: PoseArrays,
+    at: PoseArrays,
     *,
     noise: float,
     angle: float = 0.0,

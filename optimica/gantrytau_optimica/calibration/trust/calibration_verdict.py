@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from gantrytau import GantryTauError
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import Finding
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.tool_error import Loose, ToolError, tool_error
 from gantrytau_optimica.calibration.rods.groups import TAPE
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
@@ -69,7 +69,7 @@ def judge(
 def expected_error(found: Calibration, *, tape: float = TAPE) -> ToolError:
     """The error of the tool to be expected at the poses that were fitted; tape: deviation of nominal values, m."""
     data = found.measurements.select(found.rows)
-    poses = Poses(data.q, data.r, data.R if found.plate_turns else None)
+    poses = PoseArrays(data.q, data.r, data.R if found.plate_turns else None)
     return tool_error(found.robot, poses, poses, noise=float(found.noise), tape=tape)
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, StructureError
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.design.identifiability import Poses, identifiability
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays, identifiability
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.rods.arm_closure import read_arms
 from tests.optimica.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
@@ -57,12 +57,12 @@ def poses():
     return f1_poses(f1_arms(), 185)
 
 
-def linear_poses(count: int, *, turn: float, seed: int = 0) -> Poses:
+def linear_poses(count: int, *, turn: float, seed: int = 0) -> PoseArrays:
     """Anywhere near a D1, whether its links close there or not, which ranks do not ask for."""
     rng = np.random.default_rng(seed)
     r = np.array([-0.4, -4.5, 0.1]) + rng.uniform(-0.6, 0.6, (count, 3))
     R = Rotation.from_rotvec(turn * rng.standard_normal((count, 3))).as_matrix()
-    return Poses(r[:, :1] + 1.0 + rng.uniform(-0.4, 0.4, (count, 3)), r, R)
+    return PoseArrays(r[:, :1] + 1.0 + rng.uniform(-0.4, 0.4, (count, 3)), r, R)
 
 
 @pytest.mark.parametrize(

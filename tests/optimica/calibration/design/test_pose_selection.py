@@ -7,7 +7,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, GantryTau, prototypes
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_exchange import _Choice
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
@@ -80,7 +80,7 @@ def test_40_d_optimal_poses_of_three_links_beat_40_random_ones(robot, seed):
 
 
 def test_40_d_optimal_poses_of_a_grid_beat_40_random_ones(robot):
-    whole = Poses(*grid(prototypes.L1), None)  # the 779 poses of section 5.2
+    whole = PoseArrays(*grid(prototypes.L1), None)  # the 779 poses of section 5.2
     drawn, chosen = (
         expected_error(robot, whole, method, range(10 if method == "random" else 1))
         for method in ("random", "d-optimal")
@@ -145,7 +145,7 @@ def test_one_all_and_alike(robot, method):
     few = three_link_poses(30)
     for n in (1, 29, 30):
         assert len(set(select_poses(robot, few, n, method=method))) == n
-    alike = Poses(np.tile(few.q[:1], (30, 1)), np.tile(few.r[:1], (30, 1)), None)
+    alike = PoseArrays(np.tile(few.q[:1], (30, 1)), np.tile(few.r[:1], (30, 1)), None)
     assert len(set(select_poses(robot, alike, 5, method=method))) == 5
 
 
@@ -189,7 +189,7 @@ def test_predicted_error_is_that_of_calibrations(robot, candidates):
 def test_predicted_error_of_the_f1_is_that_of_calibrations(f1_robot, f1_candidates):
     arms = f1_arms()
     some, elsewhere = (
-        Poses(*(each[part] for each in f1_candidates)) for part in (slice(100), slice(500, 600))
+        PoseArrays(*(each[part] for each in f1_candidates)) for part in (slice(100), slice(500, 600))
     )
     tape = 1e-3  # m; of a centimetre the turntables no longer answer linearly
     predicted = predict(f1_robot, f1_candidates, range(100), at=elsewhere, noise=1e-5, tape=tape)
@@ -208,7 +208,7 @@ def test_predicted_error_of_the_f1_is_that_of_calibrations(f1_robot, f1_candidat
 
 
 def test_more_poses_predict_less_error_by_the_square_root(robot, candidates):
-    twice = Poses(np.tile(candidates.q, (2, 1)), np.tile(candidates.r, (2, 1)), None)
+    twice = PoseArrays(np.tile(candidates.q, (2, 1)), np.tile(candidates.r, (2, 1)), None)
     once, both = (predict(robot, poses, at=candidates).error for poses in (candidates, twice))
     assert both == pytest.approx(once / np.sqrt(2), rel=1e-3)  # what a tape measure adds
 
