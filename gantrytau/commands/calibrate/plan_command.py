@@ -12,7 +12,15 @@ import typer
 from gantrytau import Model, ModelError
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.calibrate.calibration_files import rehearse
-from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, fail, note, refusing
+from gantrytau.commands.printing.reporting import (
+    FAULT,
+    INTERRUPTED,
+    CommandError,
+    as_json,
+    fail,
+    note,
+    refusing,
+)
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
@@ -90,6 +98,8 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
     except ModelError as error:
         with suppress(OSError):  # a folder that was made for nothing
             folder.rmdir()
+        if error.argument == "folder":
+            raise CommandError(SPELLING.of(error)) from error
         raise ModelError(f"{file}: {SPELLING.of(error)}") from error
     found, files = planned.plan, [str(path) for path in planned.files]
     good, reasons = found.verdict.good, "\n".join(found.verdict.reasons)
