@@ -11,7 +11,7 @@ from gantrytau.commands.app import app
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate, told_by_tool
-from gantrytau_optimica.calibration.design.identifiability import Poses
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.tool_error import tool_error
 from tests.commands.calibrate import cells
 
@@ -165,7 +165,7 @@ def test_only_what_moves_the_tool_is_told():
     r, R = kinematics.fk(q)
     good = np.isfinite(r).all(axis=1)
     q, r, R = q[good], r[good], R[good]
-    every = Poses(q, r, R)
+    every = PoseArrays(q, r, R)
     expected = tool_error(robot, every, every, noise=1e-5, tape=0.002)
     assert len(expected.loose) > 3
     assert expected.loose[0].moves < 50e-6
@@ -176,7 +176,7 @@ def test_only_what_moves_the_tool_is_told():
     message = next(f.message for f in told.findings if f.kind == "undetermined")
     assert "do not move the tool: this is harmless" in message
     assert "arms" not in message
-    few = tool_error(robot, Poses(q[:6], r[:6], R[:6]), every, noise=1e-5, tape=0.002)
+    few = tool_error(robot, PoseArrays(q[:6], r[:6], R[:6]), every, noise=1e-5, tape=0.002)
     moving = told_by_tool(found, few, least=20e-6, tape=0.002)
     message = next(f.message for f in moving.findings if f.kind == "undetermined")
     assert (

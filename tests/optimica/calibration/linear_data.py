@@ -1,4 +1,4 @@
-"""PoseArrays of robots with linear guideways, their carts by the quadratic equation of each arm; SI units."""
+"""Poses of robots with linear guideways, their carts by the quadratic equation of each arm; SI units."""
 
 import numpy as np
 
