@@ -243,12 +243,15 @@ class FittedRods:
         data = self.measurements.select(self.rows[few])
         for fit in self.fits:
             weights = np.ones(len(few)) if fit.weights is None else fit.weights[few]
-            here = fit.group.over(data.q, data.r, data.R)
+            # what is known of all fitted poses is not worked out anew
+            here = fit.group if len(few) == len(self.rows) else fit.group.over(data.q, data.r, data.R)
             every = replace(here, free=np.ones_like(here.free))
-            held = np.zeros((fit.minimum.rank, len(fit.x)))
-            held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
-            known = np.vstack([held, np.eye(len(fit.x))[~here.free]]).T
-            jacobian = [every.slopes(fit.x, k) @ known for k in range(len(here.chains))]
+            jacobian = [every.slopes(fit.x, k) for k in range(len(here.chains))]
+            if fit.minimum.rank < here.free.sum():  # what data do not hold explains nothing
+                held = np.zeros((fit.minimum.rank, len(fit.x)))
+                held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
+                known = np.vstack([held, np.eye(len(fit.x))[~here.free]]).T
+                jacobian = [one @ known for one in jacobian]
             slopes = [link.by_actuator(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
             errors = weights[:, None] * here.errors(fit.x)
             jacobian = weights[:, None, None] * np.stack(jacobian, axis=1)

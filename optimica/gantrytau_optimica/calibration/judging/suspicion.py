@@ -143,7 +143,7 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
     found = []
     for fit in fits:
         minimum, scale = fit.minimum, fit.group.scale[fit.group.free]
-        here = fit.group.over(data.q, data.r, data.R)
+        here = fit.group if fitted.all() else fit.group.over(data.q, data.r, data.R)
         used = fitted.copy()
         if fit.weights is not None:
             used[fitted] = fit.weights > 0

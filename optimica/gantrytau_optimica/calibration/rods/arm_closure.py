@@ -10,6 +10,7 @@ An arm without turntables is one of (4.14), or of (4.13) where the plate cannot 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -31,7 +32,7 @@ class ArmClosure:
     orientation: how a quaternion u = (w, r) is unknown. "free": R = I + 2 w [r]x + 2 [r]x^2 with any length of u;
     "unit": the same of u / |u|; "local": R(u) exp([d]x) with three unknowns d, zero here, named `.rotation`.
     values: all vectors by name, m, 1 and scalar-first quaternions; free: names of the unknown ones, in order;
-    lengths: L_j^0 of the weights.
+    lengths: L_j^0 of the weights; layout: places of the unknowns, and which are local, worked out.
     """
 
     said: RodArm
@@ -41,6 +42,16 @@ class ArmClosure:
     values: Mapping[str, np.ndarray]
     free: tuple[str, ...]
     lengths: np.ndarray = field(repr=False)
+    layout: Mapping[str, tuple[slice, bool]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self):
+        if not self.layout:  # else that of the arm which was moved
+            places, start = {}, 0
+            for name in self.free:
+                size = len(self._elements(name))
+                places[name] = slice(start, start + size), self.is_local(name)
+                start += size
+            object.__setattr__(self, "layout", places)
 
     @property
     def name(self) -> str:
@@ -66,7 +77,7 @@ class ArmClosure:
         """A vector by name, zero where there is none."""
         return np.zeros(3) if name is None else self.values[name]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the unknown scalars, the columns of the Jacobian."""
         return tuple(element for name in self.free for element in self._elements(name))
@@ -94,11 +105,10 @@ class ArmClosure:
 
     def moved(self, step: np.ndarray) -> "ArmClosure":
         """The arm with its unknowns changed by step, (p,)."""
-        values, start = dict(self.values), 0
-        for name in self.free:
-            size = len(self._elements(name))
-            change, start = step[start : start + size], start + size
-            if self.is_local(name):
+        values = dict(self.values)
+        for name, (place, local) in self.layout.items():
+            change = step[place]
+            if local:
                 values[name] = product(values[name], exponential(change))
             else:
                 values[name] = values[name] + change.reshape(values[name].shape)
@@ -111,8 +121,8 @@ class ArmClosure:
         """
         frames = _Frames(self, q)
         errors = np.empty((len(q), len(self.lengths)))
-        jacobian = np.zeros((len(q), len(self.lengths), self.count))
-        places = self._places()
+        places = {name: place for name, (place, _) in self.layout.items()}
+        jacobian = np.zeros((len(q), len(self.lengths), max(place.stop for place in places.values())))
         for j, rod in enumerate(self.said.rods):
             on_plate = self.vector_of(rod.plate_offset)
             places_of = frames.places(rod)
@@ -140,13 +150,6 @@ class ArmClosure:
             d = r + (on_plate if R is None else R @ on_plate) - frames.places(rod)[0]
             found.append(d / self.lengths[j])
         return np.stack(found, axis=1)
-
-    def _places(self) -> dict[str, slice]:
-        places, start = {}, 0
-        for name in self.free:
-            size = len(self._elements(name))
-            places[name], start = slice(start, start + size), start + size
-        return places
 
 
 class _Frames:
@@ -235,7 +238,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Of two scalar-first quaternions."""
     return np.concatenate([
         [a[0] * b[0] - a[1:] @ b[1:]],
-        a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]),
+        a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:]),
     ])  # fmt: skip
 
 

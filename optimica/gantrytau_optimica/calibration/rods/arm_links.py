@@ -32,8 +32,9 @@ class ArmOverPoses:
         key = p.tobytes()
         if self._known[0] != key:
             e, J = self.moved(p).closure(self.q, self.r, self.R)
-            told = self.told(p)
-            self._known = key, e, J if told is None else J @ told
+            for k in self.turns:
+                J[:, :, k : k + 3] = J[:, :, k : k + 3] @ left_jacobian(p[k : k + 3]).T
+            self._known = key, e, J
         return self._known[1:]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:

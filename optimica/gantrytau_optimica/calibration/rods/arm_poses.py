@@ -47,7 +47,7 @@ def poses_of(
     """
     r, R = np.array(r, dtype=float), None if R is None else np.array(R, dtype=float)
     for _ in range(STEPS):
-        errors = np.concatenate([arm.closure(q, r, R)[0] for arm in arms], axis=1)
+        errors = np.concatenate([arm.errors(q, r, R) for arm in arms], axis=1)
         open_rows = np.flatnonzero(np.abs(errors).max(axis=1) > CLOSED)
         if len(open_rows) == 0:
             break
@@ -57,7 +57,7 @@ def poses_of(
         r[open_rows] += step[:, :3]
         if R is not None and there is not None:
             R[open_rows] = turned(there, step[:, 3:])
-    bad = ~(np.abs(np.concatenate([arm.closure(q, r, R)[0] for arm in arms], axis=1)).max(axis=1) < GOOD)
+    bad = ~(np.abs(np.concatenate([arm.errors(q, r, R) for arm in arms], axis=1)).max(axis=1) < GOOD)
     if bad.any() and all_of_them:
         raise SolveError(
             f"poses: the links of {bad.sum()} poses, the first in row {np.flatnonzero(bad)[0]}, cannot be closed in {STEPS} "

@@ -160,8 +160,8 @@ def links_of_arm(arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | 
 
 
 def _carried(arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> list[ModelLink]:
-    free, scale = np.ones(arm.count, dtype=bool), scales(arm)
-    return [ModelLink(arm.name, link, arm.names, arm.vector, free, scale) for link in links_of(arm, q, r, R)]
+    names, start, free, scale = arm.names, arm.vector, np.ones(arm.count, dtype=bool), scales(arm)
+    return [ModelLink(arm.name, link, names, start, free, scale) for link in links_of(arm, q, r, R)]
 
 
 def _numbers(arm: ArmClosure) -> Iterator[str | None]:
