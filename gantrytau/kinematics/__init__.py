@@ -7,6 +7,7 @@ from gantrytau.kinematics.rods.configurations import Configuration
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
 from gantrytau.kinematics.workspace.pose_limits import Limits, examine
 from gantrytau.kinematics.workspace.workspace import Workspace, workspace
+from gantrytau.language.rods import RodArm, Rods, RodTurntable, SingleRod
 
 __all__ = [
     "Accuracy",
@@ -17,6 +18,10 @@ __all__ = [
     "Cylinder",
     "Kinematics",
     "Limits",
+    "RodArm",
+    "RodTurntable",
+    "Rods",
+    "SingleRod",
     "Workspace",
     "accuracy",
     "assembly_modes",

@@ -253,3 +253,18 @@ def test_robots_and_names_that_are_none(found, poses):
     parallel = calibrate(nominal(), measured(poses), model="parallel")
     with pytest.raises(ModelError, match="held at its value"):
         parallel.covariance(["arms[0].direction"])
+
+
+def test_a_robot_of_ones_own_is_calibrated_under_its_own_names(poses):
+    from tests.kinematics.test_rods import Tripod
+
+    robot = Tripod(low=dict(length=TRUTH.arms[0].length + 0.002))
+    found, other = calibrate(robot, measured(poses)), calibrate(nominal(), measured(poses))
+    for name, known in (("low", "arms[0]"), ("high", "arms[1]"), ("far", "arms[2]")):
+        for part in ("length", "offset", "direction"):
+            assert found.parameters[f"{name}.{part}"] == pytest.approx(
+                other.parameters[f"{known}.{part}"], abs=1e-9
+            )
+    q, r = poses
+    assert found.kinematics.joints == ("low_cart.s", "high_cart.s", "far_cart.s")
+    assert found.kinematics.ik(r[:5]) == pytest.approx(q[:5], abs=2e-4)
