@@ -257,7 +257,7 @@ def test_models_that_lack_something_say_so_in_options(fails, measured, poses):
     assert "give --rails rail1.csv,rail2.csv,rail3.csv, or take --model 1" in without
     assert "take SixLinkGantryTau, or --model 1" in fails(MISUSE, "calibrate", file, *ROBOT, "--model", "3")
     assert "prior for 'mass'" in fails(MISUSE, "calibrate", file, *ROBOT, "--prior", "mass=0.1")
-    assert "expected a Gantry-Tau" in fails(FAULT, "calibrate", file, "--robot", "Pendulum")
+    assert "expected a robot such as GantryTau" in fails(FAULT, "calibrate", file, "--robot", "Pendulum")
 
 
 def test_what_is_no_table_of_poses(fails, measured, poses, tmp_path):
