@@ -109,7 +109,7 @@ def _step(J: np.ndarray, e: np.ndarray, smallest: float, inside: np.ndarray):
         return np.full(J.shape[1], np.nan), 0.0, np.zeros(len(inside)), inside, J
     rows, right_side = J @ inside.T, e
     if len(rows) > TALL * rows.shape[1]:  # the triangle first: the values of a tall matrix take longer
-        triangle = np.linalg.qr(np.column_stack([rows, e]), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.column_stack([rows, e]), mode="r"))
         rows, right_side = triangle[:, :-1], triangle[:, -1]
     left, singular, right = np.linalg.svd(rows, full_matrices=False)
     right = right @ inside

@@ -14,6 +14,7 @@ from gantrytau_optimica.calibration.fitting.rod_fit import (
     not_held,
     with_prior,
 )
+from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.error_models import (
     COMMON,
     ModelLink,
@@ -84,7 +85,9 @@ def _fit_rails(
         own = own_directions(link)
         if model == 4 or link.cart == 1:
             fit = placed[link.cart]
-            turned = fit.group.chains[0].frame(fit.x[fit.group.places[0]])
+            guideway = fit.group.chains[0]
+            assert isinstance(guideway, Chain)  # models with measured guideways have no turntables
+            turned = guideway.frame(fit.x[fit.group.places[0]])
             started = _at(own, fit_group(grouped([own])[0]))
             whole += on_rail(started, data.rails[link.cart], turned)
         else:

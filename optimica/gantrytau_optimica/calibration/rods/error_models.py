@@ -185,13 +185,14 @@ def started_linear(links: Sequence[ModelLink]) -> list[ModelLink]:
     """
     starts = []
     for link in links:
-        R = link.chain.R
+        chain, R = link.chain, link.chain.R
+        assert isinstance(chain, Chain)  # closure is linear in the numbers of linear guideways only
         if R is not None and _turn(R) < TURNS:
-            start = linear_start(replace(link.chain, R=None))
+            start = linear_start(replace(chain, R=None))
             start[1:4] += mean_rotation(R) @ link.start[7:10]
             starts.append(np.concatenate([start, link.start[7:10]]))
         else:
-            starts.append(linear_start(link.chain))
+            starts.append(linear_start(chain))
     found = []
     for link, start in zip(links, starts, strict=True):
         same = [other for k, other in zip(links, starts, strict=True) if k.names[4:7] == link.names[4:7]]
