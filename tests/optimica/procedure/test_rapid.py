@@ -134,15 +134,18 @@ def test_lines_and_names_are_those_that_rapid_takes(plan):
 @pytest.mark.parametrize(
     ("policy", "message"),
     [
-        (dict(name="1st"), r"name='1st', expected a name of RAPID: a letter, .* 32 characters"),
+        (
+            dict(name="1st"),
+            r"program\.name: found '1st', expected a name of RAPID: a letter, .* 32 characters",
+        ),
         (dict(name="B" * 33), r"expected a name of RAPID"),
         (dict(name="Module"), r"no reserved word"),
-        (dict(trigger="do measure"), r"trigger='do measure'"),
-        (dict(tool=""), r"tool=''"),
-        (dict(carts="axes"), r"carts='axes', expected 'robax' or 'extax'"),
-        (dict(speed=0.0), r"speed=0.0, expected a number in m/s above 0"),
-        (dict(settle=-1.0), r"settle=-1.0, expected a number in s, not negative"),
-        (dict(measure=float("nan")), r"measure=nan"),
+        (dict(trigger="do measure"), r"program\.trigger: found 'do measure'"),
+        (dict(tool=""), r"program\.tool: found ''"),
+        (dict(carts="axes"), r"program\.carts: found 'axes', expected 'robax' or 'extax'"),
+        (dict(speed=0.0), r"program\.speed: found 0.0, expected a number in m/s above 0"),
+        (dict(settle=-1.0), r"program\.settle: found -1.0, expected a number in s, not negative"),
+        (dict(measure=float("nan")), r"program\.measure: found nan"),
     ],
 )
 def test_what_rapid_does_not_take_is_refused(plan, policy, message):
