@@ -1,5 +1,6 @@
 """The order of files: the longest first, so that no worker is left with one of them when the others have ended."""
 
+import signal
 from pathlib import Path
 
 import hypothesis
@@ -36,6 +37,10 @@ LONGEST = (  # fifteen seconds of one processor and more; test_compiling.py take
     "optimica/known_answers/test_mechanisms.py",
     "models/mechanisms/test_delta.py",
 )
+
+# a shell starts what runs in its background deaf to Ctrl-C, which some tests press
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # nothing may depend on how busy the machine is
 hypothesis.settings.register_profile(

@@ -8,6 +8,8 @@ from gantrytau.kinematics.rotations import of_vector, told_vector
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate
 from gantrytau_optimica.calibration.fitting.covariance import as_told
+from gantrytau_optimica.calibration.rods.closure import Chain
+from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
 from tests.optimica.calibration import synthetic_d1
 
 MODELS = (1, 2, 3, 4, 5)
@@ -92,8 +94,11 @@ def test_measured_guideways_are_placed_where_they_are(d1):
     found = calibrate(ROBOT, d1[0], model=2)
     linear = calibrate(ROBOT, d1[0], model=1)
     q = d1[0].q[:5]
+    measured, nominal = found.chains, linear.chains
+    assert isinstance(measured, CalibratedKinematics)
+    assert isinstance(nominal, CalibratedKinematics)
     for i in range(3):
-        link, straight = found.chains.links[i], linear.chains.links[i]
+        link, straight = measured.links[i], nominal.links[i]
         # the same carts, up to bends of the guideways and what is hardly held across them
         distance = link.guideway.at(q[:, i]) - straight.guideway.at(q[:, i])
         assert np.linalg.norm(distance, axis=1).max() < 5e-3
@@ -104,6 +109,7 @@ def test_measured_guideways_are_placed_where_they_are(d1):
 def test_deviations_of_a_turn_are_those_of_what_is_reported(d1):
     fit = calibrate(ROBOT, d1[0], model=2).fits[0]
     chain, p = fit.group.chains[0], fit.x
+    assert isinstance(chain, Chain)
     assert np.linalg.norm(told_vector(chain.frame(p)) - p[4:7]) > 0.1  # it is not the turn that was moved
     step = 1e-4
     after, before = (
