@@ -69,10 +69,13 @@ def halves(build):
 
 
 @pytest.fixture(autouse=True)
-def _nothing_stays_behind():
+def _nothing_stays_behind(tmp_path, monkeypatch):
     """No folder of an unpacked FMU survives, however a simulation ends."""
+    place = tmp_path / "unpacked here"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
     yield
-    assert not list(Path(tempfile.gettempdir()).glob("cosimulation-*"))
+    assert not list(place.glob("cosimulation-*"))
 
 
 def error(files, step, **policy):
