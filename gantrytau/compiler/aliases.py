@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 
@@ -12,7 +13,7 @@ from gantrytau.compiler.definitions import Definitions
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
-from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative
 
 ZERO = ca.SX(0)
 LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
@@ -61,6 +62,11 @@ class Reduced:
     chains: "Chains"
     redundant: tuple[Equation, ...] = ()
     rates: Mapping[int, ca.SX] = field(default_factory=dict)
+
+    @cached_property
+    def incidence(self) -> tuple[tuple[Derivative, ...], ...]:
+        """Which derivatives of which variables stand in each equation."""
+        return tuple(derivatives_in(residual) for residual in self.residuals)
 
     def root(self, name: str) -> Alias | None:
         """What a variable or a derivative is of its root; None for what is no variable."""

@@ -17,7 +17,7 @@ from gantrytau.compiler.dulmage_mendelsohn import largest_sum
 from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.consistency import Level
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative
 
 Key = tuple[int, int]  # equation, times differentiated
 
@@ -36,15 +36,15 @@ class Indexed:
     orders: Mapping[str, int]
 
     @cached_property
-    def incidence(self) -> Mapping[Key, tuple[str, ...]]:
-        """Names of the symbols in each equation."""
-        return {k: tuple(leaf.name() for leaf in ca.symvar(r)) for k, r in self.residuals.items()}
+    def incidence(self) -> Mapping[Key, tuple[Derivative, ...]]:
+        """Which derivatives of which variables stand in each equation."""
+        return {k: derivatives_in(r) for k, r in self.residuals.items()}
 
     def symbols(self, known: Collection[str]) -> list[str]:
         """Unknowns with their derivatives, and the known variables with the derivatives that occur."""
         names = dict.fromkeys((*self.unknown_symbols(), *known))
-        leaves = dict.fromkeys(n for row in self.incidence.values() for n in row)
-        names.update(dict.fromkeys(n for n in leaves if split_derivative(n)[0] in known))
+        leaves = dict.fromkeys(x for row in self.incidence.values() for x in row)
+        names.update(dict.fromkeys(x.name for x in leaves if x.root in known))
         return list(names)
 
     @property
@@ -97,10 +97,9 @@ def _signature(reduced: Reduced) -> list[dict[int, int]]:
     """For each equation the highest derivative of each unknown in it."""
     place = {name: j for j, name in enumerate(reduced.unknowns)}
     rows: list[dict[int, int]] = []
-    for residual in reduced.residuals:
+    for occurring in reduced.incidence:
         row: dict[int, int] = {}
-        for leaf in ca.symvar(residual):
-            name, order = split_derivative(leaf.name())
+        for name, order in occurring:
             if name in place:
                 row[place[name]] = max(order, row.get(place[name], 0))
         rows.append(row)

@@ -170,7 +170,7 @@ def _refuse_differentiated(
     where = [(a.root, a.order, n) for n, a in reduced.aliases.items()]
     where += [(*split_derivative(n), f"wanted {n}") for n in wanted]
     for (i, _), row in indexed.incidence.items():
-        where += [(*split_derivative(n), reduced.equations[i].name) for n in row]
+        where += [(*occurring, reduced.equations[i].name) for occurring in row]
     for name, order, place in where:
         if name in events and order:
             what = "sampled" if any(s.name == name for s in flat.sampled) else "friction that sticks"

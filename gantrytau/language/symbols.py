@@ -4,13 +4,26 @@ from collections.abc import Iterable
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import casadi as ca
 
 from gantrytau.errors import ModelError
 
 time = ca.SX.sym("time")  # the independent variable of every model, in s
+
+
+class Derivative(NamedTuple):
+    """The order-th time derivative of a variable, 0 for the variable itself: how structural passes know a symbol."""
+
+    root: str
+    order: int
+
+    @property
+    def name(self) -> str:
+        """`der(der(x))` of ("x", 2)."""
+        return derivative_name(self.root, self.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +79,18 @@ def derivative_name(base: str, order: int) -> str:
     return "der(" * order + base + ")" * order
 
 
-def split_derivative(name: str) -> tuple[str, int]:
+@lru_cache(maxsize=100_000)  # the same few names, again and again
+def split_derivative(name: str) -> Derivative:
     """("x", 2) for `der(der(x))`."""
     order = 0
     while name.startswith("der(") and name.endswith(")"):
         name, order = name[4:-1], order + 1
-    return name, order
+    return Derivative(name, order)
+
+
+def derivatives_in(expression: ca.SX) -> tuple[Derivative, ...]:
+    """The symbols of an expression as variables and orders: a row of the structural incidence."""
+    return tuple(split_derivative(leaf.name()) for leaf in ca.symvar(expression))
 
 
 def element_names(name: str, shape: tuple[int, ...]) -> list[str]:

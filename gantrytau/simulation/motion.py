@@ -144,7 +144,7 @@ def _known_symbols(
     """Inputs and those of their derivatives that occur, as expressions of time and samples."""
     sampled_at = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
     occurring = {leaf.name() for leaf in ca.symvar(sampled_at)}
-    occurring |= {n for row in dae.indexed.incidence.values() for n in row}
+    occurring |= {x.name for row in dae.indexed.incidence.values() for x in row}
     for asked in (*dae.variables, *(n for name in outputs for n in dae.expand(name))):
         alias = dae.root(asked)
         if alias is not None and alias.root in dae.known:

@@ -159,7 +159,7 @@ class Strata:
         incidence, counts = dae.indexed.incidence, dae.indexed.counts
         motion = {k: row for k, row in incidence.items() if counts[k[0]] and k not in left}
         found = {n for _, names in block_pattern(motion, unknowns).blocks for n in names}
-        forces = {n for k, row in incidence.items() if not counts[k[0]] for n in row}
+        forces = {x.name for k, row in incidence.items() if not counts[k[0]] for x in row}
         needed = forces - set(self._known(EVERYTHING)[0])
         return tuple(sorted(n for n in found & needed if split_derivative(n)[1]))
 
@@ -208,7 +208,8 @@ class Strata:
         known, _ = self._known(EVERYTHING)
         forces = {s for s in self._known(["f"])[0] if split_derivative(s)[0] not in self.dae.known}
         found: dict[Key, int] = {}
-        rows = {k: set(row) - (known.keys() - forces) for k, row in self.dae.indexed.incidence.items()}
+        occurring = {k: {x.name for x in row} for k, row in self.dae.indexed.incidence.items()}
+        rows = {k: row - (known.keys() - forces) for k, row in occurring.items()}
         reached, level = set(forces), 0
         while front := [k for k, row in rows.items() if k not in found and row & reached]:
             found.update(dict.fromkeys(front, level))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from gantrytau.compiler.dulmage_mendelsohn import decompose
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.language.symbols import Derivative, split_derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,15 +21,18 @@ class Pattern:
 
 
 def block_pattern(
-    incidence: Mapping[Key, Collection[str]], unknowns: Iterable[str], wanted: Iterable[str] | None = None
+    incidence: Mapping[Key, Collection[Derivative]],
+    unknowns: Iterable[str],
+    wanted: Iterable[str] | None = None,
 ) -> Pattern:
     """The blocks that determine `wanted` (None: all unknowns), as small as possible, in the order of their solution.
 
-    incidence: names of the symbols in each equation.
+    incidence: which derivatives stand in each equation; unknowns and wanted by name.
     """
     keys, names = list(incidence), list(unknowns)
     place = {name: j for j, name in enumerate(names)}
-    rows = [[place[n] for n in incidence[k] if n in place] for k in keys]
+    columns_of = {split_derivative(name): j for name, j in place.items()}
+    rows = [[columns_of[x] for x in incidence[k] if x in columns_of] for k in keys]
     found = decompose(rows, len(names))
     block_of = {j: k for k, (_, columns) in enumerate(found.blocks) for j in columns}
     needs = [[block_of[j] for i in own for j in rows[i] if j in block_of] for own, _ in found.blocks]
