@@ -1,7 +1,6 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and picture_output."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,7 +20,7 @@ from gantrytau.commands.arguments.options import (
 )
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing import picture_output, result_output
-from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, as_json, busy, fail, reporting
+from gantrytau.commands.printing.reporting import as_json, busy, reporting
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def simulate(
         try:
             result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
         except SolveError as error:
-            _stop(error, output, json)
+            result_output.stop(error, SPELLING, output, json)
         files = result_output.save(result, output)
         if place:
             files += picture_output.draw(result, drawn, place)
@@ -88,20 +87,6 @@ def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
     import gantrytau
 
     return gantrytau.simulate(dae, inputs=signals, **policy)
-
-
-def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
-    """Save what a simulation found until it stopped, say so, and leave."""
-    pressed = isinstance(error.__context__, KeyboardInterrupt)
-    message = str(error).partition(";")[0] if pressed else str(error)
-    files: list[str] = []
-    if output is not None and error.result is not None:
-        files = result_output.save(error.result, output)
-        message += f"\nWhat was computed until then is in {output}"
-    elif pressed:
-        message += "; with --output its result would have been saved"
-    code = INTERRUPTED if pressed else FAULT
-    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
 
 
 def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> dict[str, Any]:

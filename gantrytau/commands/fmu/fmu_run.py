@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,11 +14,8 @@ from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import (
-    FAULT,
-    INTERRUPTED,
     CommandError,
     as_json,
-    fail,
     note,
     reporting,
 )
@@ -94,7 +91,7 @@ def run(
             with _noted(told, json):
                 result = _result(file, policy, order=order or DEFAULT_ORDER, me=me, isolate=isolate)
         except SolveError as error:
-            _stop(error, output, json)
+            result_output.stop(error, SPELLING, output, json)
         files = result_output.save(result, output)
         if place:
             files += picture_output.draw(result, drawn, place)
@@ -165,20 +162,6 @@ def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isol
 
     chosen: Any = order
     return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)
-
-
-def _stop(error: SolveError, output: Path | None, json: bool) -> NoReturn:
-    """Save what was found until it stopped, say so, and leave."""
-    pressed = isinstance(error.__context__, KeyboardInterrupt)
-    message = str(error).partition(";")[0] if pressed else SPELLING.of(error)
-    files: list[str] = []
-    if output is not None and error.result is not None:
-        files = result_output.save(error.result, output)
-        message += f"\nWhat was computed until then is in {output}"
-    elif pressed:
-        message += "; with --output its result would have been saved"
-    code = INTERRUPTED if pressed else FAULT
-    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
 
 
 def _show(summary: Mapping[str, Any], result: "Result") -> None:

@@ -1,10 +1,11 @@
 """Saving a result to the file that the command line names."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from gantrytau import GantryTauError
-from gantrytau.commands.printing.reporting import writable
+from gantrytau import GantryTauError, SolveError
+from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, fail, writable
+from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import Result
@@ -33,3 +34,17 @@ def save(result: "Result", file: Path | None) -> list[str]:
         return []
     with writable(file):
         return [str(result.save(file))]
+
+
+def stop(error: SolveError, spelling: Spelling, output: Path | None, json: bool) -> NoReturn:
+    """Save what a simulation found until it stopped, say so, and leave."""
+    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    message = str(error).partition(";")[0] if pressed else spelling.of(error)
+    files: list[str] = []
+    if output is not None and error.result is not None:
+        files = save(error.result, output)
+        message += f"\nWhat was computed until then is in {output}"
+    elif pressed:
+        message += "; with --output its result would have been saved"
+    code = INTERRUPTED if pressed else FAULT
+    fail(message, code, json, kind=type(error).__name__, time=error.time, files=files)
