@@ -37,7 +37,7 @@ def controlled(control):
 
 def largest_error(control, parameters):
     """Largest distance of the tool from its filtered reference, m."""
-    motion = simulate(controlled(control), stop=0.8, inputs=REFERENCE, parameters=parameters)
+    motion = simulate(controlled(control), stop=2.0, inputs=REFERENCE, parameters=parameters)
     return np.linalg.norm(motion["error"], axis=1).max()
 
 

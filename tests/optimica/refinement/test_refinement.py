@@ -277,7 +277,7 @@ def test_an_accuracy_that_is_not_reached_is_told():
             yield final(self.plant.x) == 0
 
     # what is lost in rounding grows by exp(32) without feedback
-    optimum = optimize(Held, elements=10, refine=ACCURACY)
+    optimum = optimize(Held, elements=20, refine=ACCURACY)
     assert not optimum.refinement.reached
     assert "NOT refined to 1e-06" in optimum.report()
     assert "`final(plant.x) == 0` is missed by" in optimum.report()

@@ -19,7 +19,7 @@ ROBOT = SixLinkGantryTau(prototypes.D1)
 
 @pytest.fixture(scope="module")
 def d1():
-    return [Measurements(*synthetic_d1.measure(seed)) for seed in range(5)]
+    return [Measurements(*synthetic_d1.measure(seed)) for seed in range(10)]
 
 
 def test_models_fall_in_the_order_of_table_5_3(d1):
