@@ -76,7 +76,7 @@ def test_ways_to_poses_of_another_branch_are_refused(monkeypatch):
     kinematics, home = fleet.nominal.kinematics, fleet.nominal.linked.home
     q = home.q + np.random.default_rng(1).uniform(-0.6, 0.6, (500, 6))
     r, R = np.tile(home.r, (500, 1)), np.tile(home.R, (500, 1, 1))
-    for share in np.linspace(0.0, 1.0, 101)[1:]:
+    for share in np.linspace(0.0, 1.0, 401)[1:]:
         r, R = kinematics.fk(home.q + share * (q - home.q), near=(r, R))
     found = kinematics.fk(q)[0]
     with np.errstate(invalid="ignore"):
