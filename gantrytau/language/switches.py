@@ -1,0 +1,148 @@
+"""What switches in expressions: conditions, absolute values, smallest and largest, signs, steps, each with a mode of its own.
+
+Between two switches an expression is smooth, but CasADi's derivatives do not say so: that of fabs(x) is sign(x), which looks as if it
+were the same everywhere. Written with modes, every piece is an expression that derivatives can be trusted on.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.language.instructions import computed
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """What jumps: `mode` is 1 where margin > 0 (or = 0, if `closed`), else 0; floor(margin) if it `counts`.
+
+    mode: a symbol; margin: an expression that may hold modes of switches before.
+    """
+
+    mode: ca.SX
+    margin: ca.SX
+    closed: bool = False
+    counts: bool = False
+
+    @property
+    def value(self) -> ca.SX:
+        """The mode that belongs to the margin."""
+        if self.counts:
+            return ca.floor(self.margin)
+        return self.margin >= 0 if self.closed else self.margin > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Switched:
+    """Expressions with modes in them, and what these modes are; a switch comes after those in its margin."""
+
+    expressions: tuple[ca.SX, ...]
+    switches: tuple[Switch, ...]
+
+
+def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None) -> Switched:
+    """Expressions with a mode for everything in them that switches on symbols of these names (None: on any symbol).
+
+    With the value of each mode in its place they are what they were.
+    """
+    dense = [ca.densify(e) for e in expressions]
+    whole = ca.vertcat(*(ca.vec(e) for e in dense)) if dense else ca.SX(0, 1)
+    leaves = ca.symvar(whole)
+    moving = [names is None or leaf.name() in names for leaf in leaves]
+    if not any(moving):
+        return Switched(tuple(expressions), ())
+    reader = _Reader([])
+    (found,) = computed(
+        ca.Function("switched", [ca.vertcat(*leaves)], [whole], {"cse": True}),
+        lambda _, i: (leaves[i], moving[i]),
+        lambda value: (ca.SX(value), False),
+        reader.operation,
+    )
+    if not reader.switches:
+        return Switched(tuple(expressions), ())
+    pieces = ca.vertsplit(
+        ca.vertcat(*(e for e, _ in found)), np.cumsum([0, *(e.numel() for e in dense)]).tolist()
+    )
+    shaped = (ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True))
+    return Switched(tuple(shaped), tuple(reader.switches))
+
+
+_Value = tuple[ca.SX, bool]  # an expression, and whether it moves with the symbols asked for
+
+
+@dataclass(frozen=True, eq=False)
+class _Reader:
+    """Computes with expressions, and notes what switches."""
+
+    switches: list[Switch]
+
+    def operation(self, operator: int, operands: list[_Value]) -> _Value:
+        a = operands[0][0]
+        b = operands[1][0] if len(operands) > 1 else a
+        if any(moves for _, moves in operands):
+            found = self._switching(operator, a, b)
+            if found is not None:
+                return found, True
+        apply = ca.SX.unary if len(operands) == 1 else ca.SX.binary
+        return apply(operator, *(e for e, _ in operands)), any(moves for _, moves in operands)
+
+    def _switching(self, operator: int, a: ca.SX, b: ca.SX) -> ca.SX | None:
+        """What an operator is, written with modes; None for one that does not switch."""
+        if operator == ca.OP_LT:
+            return self._mode(b - a)
+        if operator == ca.OP_LE:
+            return self._mode(b - a, closed=True)
+        if operator == ca.OP_EQ:
+            return self._mode(b - a, closed=True) * self._mode(a - b, closed=True)
+        if operator == ca.OP_NE:
+            return 1 - self._mode(b - a, closed=True) * self._mode(a - b, closed=True)
+        if operator == ca.OP_IF_ELSE_ZERO and not self._of_modes(a):
+            return ca.if_else(self._mode(a) + self._mode(-a), b, 0)
+        if operator == ca.OP_FABS:
+            return ca.if_else(self._mode(a, closed=True), a, -a)
+        if operator == ca.OP_FMIN:
+            return ca.if_else(self._mode(b - a, closed=True), a, b)
+        if operator == ca.OP_FMAX:
+            return ca.if_else(self._mode(a - b, closed=True), a, b)
+        if operator == ca.OP_SIGN:
+            return self._mode(a) - self._mode(-a)
+        if operator == ca.OP_COPYSIGN:
+            size = ca.if_else(self._mode(a, closed=True), a, -a)
+            return ca.if_else(self._mode(b, closed=True), size, -size)
+        if operator == ca.OP_FLOOR:
+            return self._mode(a, counts=True)
+        if operator == ca.OP_CEIL:
+            return -self._mode(-a, counts=True)
+        if operator == ca.OP_FMOD:  # rounds towards zero
+            ratio = a / b
+            forward = self._mode(ratio, closed=True)
+            size = self._mode(ca.if_else(forward, ratio, -ratio), counts=True)
+            return a - b * ca.if_else(forward, size, -size)
+        if operator == ca.OP_REMAINDER:
+            return a - b * self._mode(a / b + 0.5, counts=True)
+        return None
+
+    def _of_modes(self, condition: ca.SX) -> bool:
+        """Whether a condition is made of modes, which jump where they are noted already."""
+        noted = {s.mode.name() for s in self.switches}
+        return all(leaf.name() in noted for leaf in ca.symvar(condition))
+
+    def _mode(self, margin: ca.SX, *, closed: bool = False, counts: bool = False) -> ca.SX:
+        if margin.is_constant():
+            return Switch(margin, margin, closed, counts).value
+        for old in self.switches:
+            if old.closed == closed and old.counts == counts and ca.is_equal(old.margin, margin, 3):
+                return old.mode
+        new = Switch(ca.SX.sym(f"mode[{len(self.switches)}]"), margin, closed, counts)
+        self.switches.append(new)
+        return new.mode
+
+
+def with_modes(found: Switched, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+    """Expressions that hold modes, with the values that belong to the margins in their place."""
+    symbols, values = [s.mode for s in found.switches], [s.value for s in found.switches]
+    if not symbols:
+        return list(expressions)
+    _, given = ca.substitute_inplace(symbols, values, list(expressions), False)
+    return list(given)

@@ -1,0 +1,55 @@
+"""What switches, written with modes, is what it was, and smooth between its switches."""
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.language.switches import switched, with_modes
+
+x, y, u = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("u")
+EXPRESSIONS = [
+    x + ca.if_else(x > 0, 1.0, -1.0) - u,
+    ca.fabs(x) + ca.fmin(x, y) - ca.fmax(2 * x, u),
+    ca.sign(x) * y,
+    ca.floor(x) + ca.ceil(y),
+    ca.fmod(x, y),
+    ca.copysign(x, y),
+    ca.if_else(ca.logic_and(x > 1, y <= 2), 3, 4),
+    ca.if_else(x, 1, 2),
+    ca.if_else(x == y, 1, 2),
+    ca.if_else(x != y, 1, 2),
+    ca.if_else(u > 0, x, y),
+    ca.if_else(ca.fabs(x) - 1 > ca.fmin(y, 0), x, 2 * x),
+]
+
+
+def test_the_values_of_the_modes_give_the_expressions_back():
+    found = switched(EXPRESSIONS)
+    before = ca.Function("before", [x, y, u], [ca.vertcat(*EXPRESSIONS)])
+    after = ca.Function("after", [x, y, u], [ca.vertcat(*with_modes(found, found.expressions))])
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        point = rng.choice([0.0, 1.0, -1.0, 2.0, 2.5, -3.0, *rng.normal(size=6)], 3)
+        np.testing.assert_allclose(after(*point), before(*point), rtol=1e-14, atol=1e-15)
+
+
+def test_with_modes_no_derivative_depends_on_where_a_switch_stands():
+    found = switched([ca.fabs(x) + x * ca.sign(x - 1)])
+    slope = ca.jacobian(found.expressions[0], x)
+    assert {s.name() for s in ca.symvar(slope)} == {s.mode.name() for s in found.switches}
+
+
+def test_only_what_moves_with_the_names_asked_for_has_a_mode():
+    assert len(switched(EXPRESSIONS, {"u"}).switches) == 2  # fmax(2 x, u) and u > 0
+    assert switched([x * y + u]).switches == ()
+    assert switched([ca.sign(ca.SX(3.0)) * x]).switches == ()
+
+
+def test_equal_conditions_have_one_mode():
+    assert len(switched([ca.if_else(x > u, 1, 2), ca.if_else(x > u, y, -y)]).switches) == 1
+
+
+def test_the_shape_of_a_matrix_stays():
+    matrix = ca.vertcat(ca.horzcat(ca.fabs(x), y), ca.horzcat(0, u))
+    (same,) = switched([matrix]).expressions
+    assert same.shape == (2, 2)
+    assert ca.is_equal(same[0, 1], y) and ca.is_equal(same[1, 1], u)
