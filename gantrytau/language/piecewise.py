@@ -1,7 +1,7 @@
-"""What switches in expressions: conditions, absolute values, smallest and largest, signs, steps, each with a mode of its own.
+"""What switches in expressions: conditions, absolute values, signs, steps, each with a mode of its own.
 
-Between two switches an expression is smooth, but CasADi's derivatives do not say so: that of fabs(x) is sign(x), which looks as if it
-were the same everywhere. Written with modes, every piece is an expression that derivatives can be trusted on.
+Between two switches an expression is smooth, but CasADi's derivatives do not say so: that of fabs(x) is sign(x), which
+looks as if it were the same everywhere. Written with modes, every piece has derivatives that can be trusted.
 """
 
 from collections.abc import Collection, Sequence
@@ -14,7 +14,7 @@ from gantrytau.language.instructions import computed
 
 
 @dataclass(frozen=True, eq=False)
-class Switch:
+class Turn:
     """What jumps: `mode` is 1 where margin > 0 (or = 0, if `closed`), else 0; floor(margin) if it `counts`.
 
     mode: a symbol; margin: an expression that may hold modes of switches before.
@@ -38,7 +38,7 @@ class Switched:
     """Expressions with modes in them, and what these modes are; a switch comes after those in its margin."""
 
     expressions: tuple[ca.SX, ...]
-    switches: tuple[Switch, ...]
+    switches: tuple[Turn, ...]
 
 
 def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None) -> Switched:
@@ -52,7 +52,7 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     moving = [names is None or leaf.name() in names for leaf in leaves]
     if not any(moving):
         return Switched(tuple(expressions), ())
-    reader = _Reader([])
+    reader = _Walk([])
     (found,) = computed(
         ca.Function("switched", [ca.vertcat(*leaves)], [whole], {"cse": True}),
         lambda _, i: (leaves[i], moving[i]),
@@ -72,10 +72,10 @@ _Value = tuple[ca.SX, bool]  # an expression, and whether it moves with the symb
 
 
 @dataclass(frozen=True, eq=False)
-class _Reader:
+class _Walk:
     """Computes with expressions, and notes what switches."""
 
-    switches: list[Switch]
+    switches: list[Turn]
 
     def operation(self, operator: int, operands: list[_Value]) -> _Value:
         a = operands[0][0]
@@ -130,11 +130,11 @@ class _Reader:
 
     def _mode(self, margin: ca.SX, *, closed: bool = False, counts: bool = False) -> ca.SX:
         if margin.is_constant():
-            return Switch(margin, margin, closed, counts).value
+            return Turn(margin, margin, closed, counts).value
         for old in self.switches:
             if old.closed == closed and old.counts == counts and ca.is_equal(old.margin, margin, 3):
                 return old.mode
-        new = Switch(ca.SX.sym(f"mode[{len(self.switches)}]"), margin, closed, counts)
+        new = Turn(ca.SX.sym(f"mode[{len(self.switches)}]"), margin, closed, counts)
         self.switches.append(new)
         return new.mode
 
