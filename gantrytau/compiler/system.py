@@ -94,13 +94,10 @@ def _left_implicit(
         solution: Sequence[ca.SX | None] = block.solution or [None] * count
         several = count > 1 and block.kind in ("linear", "spheres")
         if form == "lifted" and block.root is not None:
-            # s = middle + side * w with w^2 = radicand, w >= 0: no square root to differentiate at zero
-            name, root = f"sqrt({block.tears[0].name()})", block.root
-            w = ca.SX.sym(name)
-            algebraics.append(
-                Algebraic(name, w, w**2 - root.radicand, ca.sqrt(ca.fmax(root.radicand, 0)), 0.0)
-            )
-            definitions.append((block.tears[0], root.middle + root.side * w))
+            # no square root to differentiate at zero
+            w, radicand = block.root.root, block.root.radicand
+            algebraics.append(Algebraic(w.name(), w, w**2 - radicand, ca.sqrt(ca.fmax(radicand, 0)), 0.0))
+            definitions.append((block.tears[0], block.root.value))
         elif block.solution is None or (form == "lifted" and several):
             rows = zip(block.tears, block.residuals, solution, strict=True)
             algebraics += [Algebraic(y.name(), y, residual, closed) for y, residual, closed in rows]

@@ -14,20 +14,12 @@ import numpy as np
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pivots import Guide, reliable
+from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
 from gantrytau.compiler.blocks.tearing import tear
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.language.symbols import split_derivative
 
 LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by unrolled elimination
-
-
-@dataclass(frozen=True, eq=False)
-class QuadraticRoot:
-    """tear = middle + side * sqrt(radicand): a quadratic whose branch is the sign `side`."""
-
-    middle: ca.SX
-    side: float
-    radicand: ca.SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,19 +158,10 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block
         return block("linear", None if found is None else tuple(found))
     curvature = ca.jacobian(ca.vec(ca.densify(jacobian)), y)
     if len(tears) == 1 and not ca.depends_on(curvature, y):
-        root = quadratic_root(f, tears[0], jacobian, curvature, guide)
-        return block("quadratic", (root.middle + root.side * ca.sqrt(root.radicand),), root)
+        root = quadratic_root(f, tears[0], guide)
+        return block("quadratic", (root.closed,), root)
     found = intersection(f, y, guide)
     return block("nonlinear") if found is None else block("spheres", tuple(found))
-
-
-def quadratic_root(f: ca.SX, x: ca.SX, slope: ca.SX, curvature: ca.SX, guide: Guide) -> QuadraticRoot:
-    """The root of a quadratic on the branch where the sample lies, by completing the square."""
-    middle = -_at_zero(slope, x) / curvature
-    # f = f(middle) + curvature / 2 * (x - middle)^2
-    value = ca.substitute(f, x, middle)
-    side = float(guide.at_start(slope / curvature)[0, 0])
-    return QuadraticRoot(middle, 1.0 if side >= 0 else -1.0, -2 * value / curvature)
 
 
 def eliminate(matrix: ca.SX, right: ca.SX, guide: Guide) -> list[ca.SX] | None:
