@@ -63,9 +63,7 @@ def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: i
         return tried[0]
     branches: list[SolutionBranch] = []
     for optimum in found:
-        if branches and optimum.objective - branches[-1].objective <= SAME * max(
-            abs(optimum.objective), 1e-9
-        ):
+        if branches and optimum.objective - branches[-1].objective <= SAME * abs(optimum.objective):
             branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
         else:
             branches.append(SolutionBranch(optimum.objective, 1, optimum))

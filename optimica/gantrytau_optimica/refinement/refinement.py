@@ -32,6 +32,7 @@ class Round:
     defect: float
     iterations: int
     error: float  # of the objective as played back
+    size: float  # of the objective
 
 
 @dataclass(frozen=True)
@@ -143,12 +144,9 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
 def _round(optimum: Optimum) -> Round:
     played = optimum.playback
     elements = sum(layout.mesh.elements for layout in optimum.program.places.layouts)
-    defect = max((abs(d.amount) / d.size for d in played.defects), default=0.0)
-    if not played.complete:
-        defect = np.inf
-    return Round(
-        elements, optimum.objective, played.violation, defect, optimum.iterations, played.objective_error
-    )
+    defect = max((d.relative for d in played.defects), default=0.0) if played.complete else np.inf
+    error, size = played.objective_error, played.objective_size
+    return Round(elements, optimum.objective, played.violation, defect, optimum.iterations, error, size)
 
 
 def _holds(rounds: list[Round], accuracy: float) -> bool:
@@ -156,9 +154,8 @@ def _holds(rounds: list[Round], accuracy: float) -> bool:
     last = rounds[-1]
     if len(rounds) < 2 or max(last.violation, last.defect) > accuracy:
         return False
-    size = max(abs(last.objective), 1e-6)
-    unmoved = abs(last.objective - rounds[-2].objective) <= accuracy * size
-    return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * size
+    unmoved = abs(last.objective - rounds[-2].objective) <= accuracy * last.size
+    return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * last.size
 
 
 def _movable(phase: Phase) -> bool:

@@ -1,11 +1,10 @@
 """A better mesh from a solution: borders at the switches, which the optimiser may move, and finer where it errs."""
 
-import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.answers.playback.playback import limits_of, range_of
+from gantrytau_optimica.answers.playback.ranges import measured
 from gantrytau_optimica.answers.playback.replay import PLACES, Replayed
-from gantrytau_optimica.answers.playback.switches import sides, switches
+from gantrytau_optimica.answers.playback.switches import input_range, sides, switches
 from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.trajectory import Trajectory
@@ -74,7 +73,8 @@ def _open(trajectory: Trajectory) -> np.ndarray:
     first = len(phase.states) + len(phase.algebraics)
     for number, signal in enumerate(phase.inputs, first):
         ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
-        found |= np.any(sides(ends, *limits[signal.name]) == 0, axis=1)
+        low, high = limits[signal.name]
+        found |= np.any(sides(ends, low, high, input_range(ends, low, high)) == 0, axis=1)
     return found
 
 
@@ -110,13 +110,9 @@ def _parts(played: Replayed, accuracy: float) -> np.ndarray:
 
 def _passed(played: Replayed) -> np.ndarray:
     """By how much limits are passed in every piece, relative to their range."""
-    limits = limits_of(played.trajectory.phase)
-    if not limits:
-        return np.zeros(len(played.pieces))
-    rows = played.values(ca.vertcat(*(limit.expression for limit in limits)))
-    worst = np.zeros(rows.shape[1])
-    for limit, row in zip(limits, rows, strict=True):
-        amount = np.maximum(limit.lower - row, row - limit.upper) / range_of(limit, row)
+    worst = np.zeros(played.times.size)
+    for limit, row, size in measured(played.trajectory.phase, played.values):
+        amount = np.maximum(limit.lower - row, row - limit.upper) / size
         worst = np.maximum(worst, np.nan_to_num(amount, nan=0.0))
     return worst.reshape(-1, PLACES.size).max(axis=1)
 
@@ -131,7 +127,7 @@ def _rough(trajectory: Trajectory) -> np.ndarray:
         if signal.pieces.kind != "ramps":
             continue
         ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
-        jump = np.abs(ends[1:, 0] - ends[:-1, 1]) / max(float(np.ptp(ends)), 1e-12)
+        jump = np.abs(ends[1:, 0] - ends[:-1, 1]) / (float(np.ptp(ends)) or 1.0)
         jump = np.where(moving[1:-1], 0.0, jump)
         found[1:] = np.maximum(found[1:], jump)
         found[:-1] = np.maximum(found[:-1], jump)

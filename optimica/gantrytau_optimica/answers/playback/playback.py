@@ -8,14 +8,15 @@ import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.simulation.to_result import labels
+from gantrytau_optimica.answers.playback.ranges import FLAT, condition_sizes, magnitude, measured
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
-from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
+from gantrytau_optimica.control.control_problem import ControlProblem, PointValue
 
 
 @dataclass(frozen=True)
 class Violation:
-    """By how much a limit is passed at worst, in its unit, when in s, and its range (upper - lower, or its size)."""
+    """By how much a limit is passed at worst, in its unit, when in s, and its range (upper - lower, or what it compares)."""
 
     name: str
     phase: str
@@ -37,13 +38,18 @@ class Defect:
     amount: float
     size: float
 
+    @property
+    def relative(self) -> float:
+        """The amount, signs aside, over the size."""
+        return abs(self.amount) / self.size
+
 
 @dataclass(frozen=True, eq=False)
 class Playback:
     """What happens if the inputs of an optimum drive the model.
 
     phases: states and algebraics integrated anew, by name; violations: all limits along the motion, the worst first;
-    defects: all conditions at single times; objective: of the motion as played; multipliers: of the conditions.
+    defects: all conditions at single times; objective: of the motion as played; objective_size: what is small for it.
     """
 
     optimum: ProgramAnswer
@@ -52,6 +58,7 @@ class Playback:
     defects: tuple[Defect, ...]
     objective: float
     objective_error: float
+    objective_size: float
 
     @property
     def complete(self) -> bool:
@@ -103,8 +110,8 @@ class Playback:
             )
         if not lines:
             lines.append("all limits hold between the nodes as well")
-        worst = sorted(self.defects, key=lambda d: -abs(d.amount))
-        lines += [f"`{d.name}` is missed by {abs(d.amount):.3g}" for d in worst[:4] if abs(d.amount) > 1e-12]
+        worst = sorted(self.defects, key=lambda d: -d.relative)
+        lines += [f"`{d.name}` is missed by {abs(d.amount):.3g}" for d in worst[:4] if d.relative > 1e-12]
         lines.append(
             f"the objective becomes {self.objective:.8g}; its estimated error is {self.objective_error:.2g}"
         )
@@ -122,100 +129,88 @@ class Playback:
 
 def play_back(optimum: ProgramAnswer) -> Playback:
     """Integrate the model with the inputs of an optimum, and look at all limits and conditions."""
-    problem = optimum.built.problem
     phases = {name: replay(optimum.built, t) for name, t in optimum.phases.items()}
-    violations = [v for played in phases.values() for v in _violations(problem, played)]
-    objective, defects, error = _at_points(optimum, list(phases.values()))
+    violations = [v for played in phases.values() for v in _violations(played)]
+    objective, summed, defects, error = _at_points(optimum, list(phases.values()))
     ranked = tuple(sorted(violations, key=lambda v: -v.relative))
-    return Playback(optimum, phases, ranked, tuple(defects), objective, error)
+    size = max(abs(objective), FLAT * summed)
+    return Playback(optimum, phases, ranked, tuple(defects), objective, error, size)
 
 
-def limits_of(phase: Phase) -> list[Limit]:
-    """All limits along a phase: those of the user and of the model, and those of algebraics by themselves."""
-    own = [
-        Limit(s.symbol, s.min, s.max, s.words or s.name)
-        for s in phase.algebraics
-        if np.isfinite(s.min) or np.isfinite(s.max)
-    ]
-    return [*phase.path_limits, *own]
-
-
-def range_of(limit: Limit, values: np.ndarray) -> float:
-    """The range of a limit: between its two sides, else the size of what it limits."""
-    if np.isfinite(limit.lower) and np.isfinite(limit.upper) and limit.upper > limit.lower:
-        return limit.upper - limit.lower
-    bound = limit.lower if np.isfinite(limit.lower) else limit.upper
-    sizes = [abs(bound), float(np.max(np.abs(values), initial=0.0))]
-    return max(*sizes, 1e-12) if np.all(np.isfinite(sizes)) else max(abs(bound), 1.0)
-
-
-def _violations(problem: ControlProblem, played: Replayed) -> list[Violation]:
+def _violations(played: Replayed) -> list[Violation]:
     phase, found = played.trajectory.phase, []
-    limits = limits_of(phase)
-    if not limits:
-        return []
-    rows = played.values(ca.vertcat(*(limit.expression for limit in limits)))
-    for limit, row in zip(limits, rows, strict=True):
+    for limit, row, size in measured(phase, played.values):
         amount = np.maximum(limit.lower - row, row - limit.upper)
         amount = np.where(np.isfinite(amount), amount, -np.inf)
         worst = int(np.argmax(amount))
-        size = max(float(amount[worst]), 0.0)
-        found.append(
-            Violation(limit.name, phase.name, size, float(played.times[worst]), range_of(limit, row))
-        )
+        passed = max(float(amount[worst]), 0.0)
+        found.append(Violation(limit.name, phase.name, passed, float(played.times[worst]), size))
     return found
 
 
-def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, list[Defect], float]:
-    """Objective as played, defects of the conditions, and the error of the objective that follows from both."""
+def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, float, list[Defect], float]:
+    """Objective as played, that with all its terms positive, defects of the conditions, and the error of the objective
+    that follows from both.
+    """
     problem, program, solution = optimum.built.problem, optimum.program, optimum.solution
-    symbols, values = [problem.numbers], [ca.DM(phases[0].trajectory.numbers)]
-    running = 0.0
+    symbols, values, sizes = [problem.numbers], [ca.DM(phases[0].trajectory.numbers)], []
+    sizes.append(ca.fabs(values[0]))
+    running = np.zeros(2)
     for phase, played in zip(problem.phases, phases, strict=True):
         for point in phase.points:
-            symbols.append(point.symbol)
             when = np.array([played.trajectory.moment(point.time)])
-            values.append(ca.DM(played.at(point.expression, when)[:, 0]))
-        sums: dict[int, float] = {}
-        for one in phase.sums:
-            error = (played.at(one.expression, one.times, after=True)[0] - one.values) / one.deviations
-            key = one.symbol.element_hash()
-            sums[key] = sums.get(key, 0.0) + float(error @ error)
-        for key, one in {s.symbol.element_hash(): s for s in phase.sums}.items():
-            symbols.append(one.symbol)
-            values.append(ca.DM(sums[key]))
+            both = [point.expression, *(magnitude(e) for e in point.expression.elements())]
+            found = played.at(ca.vertcat(*both), when)[:, 0]
+            symbols.append(point.symbol)
+            values.append(ca.DM(found[: point.symbol.numel()]))
+            sizes.append(ca.DM(found[point.symbol.numel() :]))
+        for symbol, total in _sums(played):
+            symbols.append(symbol)
+            values.append(ca.DM(total[0]))
+            sizes.append(ca.DM(total[1]))
         running += _running(played)
     rows = ca.vertcat(problem.objective, *(limit.expression for limit in problem.boundary))
     found = np.array(ca.Function("points", symbols, [ca.densify(rows)])(*values)).ravel()
+    summed = float(ca.Function("sizes", symbols, [magnitude(problem.objective)])(*sizes)) + running[1]
     defects = []
-    error = found[0] + running - solution.objective
+    error = found[0] + running[0] - solution.objective
     count = len(problem.boundary)
     multipliers = solution.multipliers[program.assembled.rows - count :]
-    for limit, value, multiplier in zip(problem.boundary, found[1:], multipliers, strict=True):
+    small = _condition_sizes(problem, phases)
+    for limit, value, multiplier, size in zip(problem.boundary, found[1:], multipliers, small, strict=True):
         amount = value - limit.upper if value > limit.upper else min(value - limit.lower, 0.0)
-        defects.append(Defect(limit.name, float(amount), _size(problem, limit)))
+        defects.append(Defect(limit.name, float(amount), float(size)))
         error += multiplier * amount
-    return float(found[0] + running), defects, float(error)
+    return float(found[0] + running[0]), float(summed), defects, float(error)
 
 
-def _size(problem: ControlProblem, limit: Limit) -> float:
-    """The typical size of what a condition compares: of the signals in it, or its bounds."""
-    leaves = {leaf.element_hash() for leaf in ca.symvar(limit.expression)}
-    inside = [
-        p.expression for p in problem.points if any(e.element_hash() in leaves for e in p.symbol.elements())
-    ]
-    names = {leaf.element_hash() for e in inside for leaf in ca.symvar(e)}
-    sizes = [s.nominal for s in problem.signals if s.symbol.element_hash() in names]
-    sizes += [abs(b) for b in (limit.lower, limit.upper) if np.isfinite(b) and b != 0.0]
-    return max(sizes, default=1.0)
+def _sums(played: Replayed) -> list[tuple[ca.SX, np.ndarray]]:
+    """Sums of squares over samples as played, and what they would be if nothing in them cancelled, by their symbols."""
+    totals: dict[int, tuple[ca.SX, np.ndarray]] = {}
+    for one in played.trajectory.phase.sums:
+        found = played.at(ca.vertcat(one.expression, magnitude(one.expression)), one.times, after=True)
+        rows = np.array([found[0] - one.values, found[1] + np.abs(one.values)]) / one.deviations
+        symbol, total = totals.get(one.symbol.element_hash(), (one.symbol, np.zeros(2)))
+        totals[one.symbol.element_hash()] = (symbol, total + np.sum(rows**2, axis=1))
+    return list(totals.values())
 
 
-def _running(played: Replayed) -> float:
-    """The integral of the integrand and the penalties on steps, as played."""
+def _condition_sizes(problem: ControlProblem, phases: list[Replayed]) -> np.ndarray:
+    """What is small for the conditions at single times, (k,), as played."""
+
+    def values(number: int, point: PointValue, expressions: ca.SX) -> np.ndarray:
+        played = phases[number]
+        return played.at(expressions, np.array([played.trajectory.moment(point.time)]))[:, 0]
+
+    return condition_sizes(problem, phases[0].trajectory.numbers, values)
+
+
+def _running(played: Replayed) -> np.ndarray:
+    """The integral of the integrand and the penalties on steps, as played; and with all their terms positive, (2,)."""
     layout, w = played.trajectory.layout, played.trajectory.w
-    cost = 0.0
-    if not layout.phase.integrand.is_zero():
-        cost = float(played.integral(layout.phase.integrand)[0])
+    integrand, cost = layout.phase.integrand, np.zeros(2)
+    if not integrand.is_zero():
+        cost += played.integral(ca.vertcat(integrand, magnitude(integrand)))
     for signal, chain in layout.chains.items():
         penalty = layout.phase.signals[signal].pieces.step_penalty
         cost += penalty * float(np.sum(np.diff(w[chain]) ** 2))

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.answers.playback.playback import limits_of, range_of
+from gantrytau_optimica.answers.playback.ranges import measured
 from gantrytau_optimica.control.limits import bare_limit, signal_limits
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -43,14 +42,18 @@ def _of_inputs(trajectory: Trajectory) -> list[Switch]:
         if signal.pieces.kind != "ramps" or not (np.isfinite(low) or np.isfinite(high)):
             continue
         ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
-        side = sides(ends, low, high)
+        side = sides(ends, low, high, input_range(ends, low, high))
         found += _changes(signal.name, side, ends, (low, high), borders)
     return found
 
 
-def sides(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """-1, 0 or 1: at the lower limit, between, at the upper limit."""
-    width = high - low if np.isfinite(low) and np.isfinite(high) else max(np.max(np.abs(values)), 1e-9)
+def input_range(values: np.ndarray, low: float, high: float) -> float:
+    """The range of an input: between its limits, else the size of its values."""
+    return high - low if np.isfinite(low) and np.isfinite(high) else float(np.max(np.abs(values)))
+
+
+def sides(values: np.ndarray, low: float, high: float, width: float) -> np.ndarray:
+    """-1, 0 or 1: at the lower limit, between, at the upper limit, to a share of its range `width`."""
     side = np.zeros(values.shape, int)
     if np.isfinite(low):
         side[values <= low + AT_LIMIT * width] = -1
@@ -92,22 +95,15 @@ def _changes(
 
 
 def _of_limits(trajectory: Trajectory) -> list[Switch]:
-    """Limits on states and expressions: stretches of collocation points at which they are reached."""
+    """Limits on states and expressions: stretches of collocation points at which they are reached; an equality always is."""
     phase = trajectory.phase
     inputs = {s.name for s in phase.inputs}
-    limits = [
-        limit
-        for limit in limits_of(phase)
-        if (bare := bare_limit(limit, phase)) is None or bare[0] not in inputs
-    ]
-    if not limits:
-        return []
-    shares = trajectory.fractions
-    rows = trajectory.values(ca.vertcat(*(limit.expression for limit in limits)), trajectory.time)
-    found = []
-    for limit, row in zip(limits, rows, strict=True):
-        width = range_of(limit, row)
-        side = sides(row / width, limit.lower / width, limit.upper / width)
+    shares, found = trajectory.fractions, []
+    for limit, row, size in measured(phase, lambda e: trajectory.values(e, trajectory.time)):
+        bare = bare_limit(limit, phase)
+        if limit.lower == limit.upper or (bare is not None and bare[0] in inputs):
+            continue
+        side = sides(row, limit.lower, limit.upper, size)
         for k in np.flatnonzero(np.diff(side)):
             share = 0.5 * (shares[k] + shares[k + 1])
             found.append(Switch(float(share), limit.name, SIDES[int(side[k])], SIDES[int(side[k + 1])]))
