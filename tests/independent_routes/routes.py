@@ -25,24 +25,24 @@ def answers(
     """What `find` is at points that name all inputs, one below the other; fmu: compile one, too."""
     size = sum(len(dae.expand(n)) for n in find)
     given = list(points[0])
-    function = _or_none(lambda: dae.function(given, list(find)))
+    function = or_none(dae.function, given, list(find))
     found = {
-        "function": _each(points, size, lambda p: _called(function, given, p)),
-        "evaluate": _each(points, size, lambda p: _flat([dae.evaluate(p)[n] for n in find])),
+        "function": _each(points, size, lambda p: called(function, given, p)),
+        "evaluate": _each(points, size, lambda p: flat([dae.evaluate(p)[n] for n in find])),
         "simulate": _each(points, size, lambda p: _simulated(dae, p, find)),
     }
     if COMPILER is not None and function is not None:
-        compiled = _compiled(function, folder)
-        found["C"] = _each(points, size, lambda p: _called(compiled, given, p))
+        binary = compiled(function, folder)
+        found["C"] = _each(points, size, lambda p: called(binary, given, p))
     if COMPILER is not None and fmu:
-        exported = _or_none(lambda: export(dae, folder / "model.fmu"))
-        found["FMU"] = _each(points, size, lambda p: _initialised(exported, dae, p, find))
+        exported = or_none(export, dae, folder / "model.fmu")
+        found["FMU"] = _each(points, size, lambda p: initialised(exported, dae, p, find))
     return found
 
 
-def _or_none(make: Callable[[], Any]) -> Any:
+def or_none(make: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
     try:
-        return make()
+        return make(*arguments, **more)
     except GantryTauError:
         return None
 
@@ -57,18 +57,18 @@ def _each(points: Sequence[Point], size: int, answer: Callable[[Point], np.ndarr
     return found
 
 
-def _flat(values: Sequence[object]) -> np.ndarray:
+def flat(values: Sequence[object]) -> np.ndarray:
     return np.concatenate([np.asarray(v, dtype=float).ravel(order="F") for v in values])
 
 
-def _called(function: ca.Function | None, given: Sequence[str], point: Point) -> np.ndarray:
+def called(function: ca.Function | None, given: Sequence[str], point: Point) -> np.ndarray:
     if function is None:
         return np.array(np.nan)
     results = function.call([ca.DM(np.asarray(point[n], dtype=float).ravel(order="F")) for n in given])
-    return _flat([np.array(r) for r in results])
+    return flat([np.array(r) for r in results])
 
 
-def _compiled(function: ca.Function, folder: Path) -> ca.Function:
+def compiled(function: ca.Function, folder: Path) -> ca.Function:
     assert COMPILER is not None
     path, library = folder / "routes.c", folder / "routes.so"
     path.write_text(c_source(function, name="routes"))
@@ -84,10 +84,10 @@ def _simulated(dae: Dae, point: Point, find: Sequence[str]) -> np.ndarray:
         here = np.atleast_1d(np.array([dae.start[n] for n in dae.expand(name)]))
         ways[name] = ([0.0, 1.0], np.stack([here, np.ravel(there, order="F")]))
     result = simulate(dae, stop=1.0, inputs=ways, points=11)
-    return _flat([result.final(n) for n in find])
+    return flat([result.final(n) for n in find])
 
 
-def _initialised(exported: Exported | None, dae: Dae, point: Point, find: Sequence[str]) -> np.ndarray:
+def initialised(exported: Exported | None, dae: Dae, point: Point, find: Sequence[str]) -> np.ndarray:
     """What an FMU computes when its inputs are set before it starts."""
     size = sum(len(dae.expand(n)) for n in find)
     if exported is None:
