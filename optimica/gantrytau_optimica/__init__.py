@@ -17,7 +17,8 @@ from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
-from gantrytau_optimica.calibration.report.report import About, frame_motion, report_numbers, write_report
+from gantrytau_optimica.calibration.judging.device_frames import frame_words
+from gantrytau_optimica.calibration.report.report import About, report_numbers, write_report
 from gantrytau_optimica.calibration.rods.arm_closure import read_arms
 from gantrytau_optimica.calibration.surveys.error_maps import error_map
 from gantrytau_optimica.calibration.surveys.guideways import linearity
@@ -108,7 +109,7 @@ __all__ = [
     "estimate",
     "final",
     "fit_arm",
-    "frame_motion",
+    "frame_words",
     "held_out",
     "identifiability",
     "in_lines",

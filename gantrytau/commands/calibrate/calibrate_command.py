@@ -97,6 +97,14 @@ def calibrate(
             show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
         ),
     ] = None,
+    frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="fitted|base",
+            help="base: poses were measured in the base of the robot, where it is commanded; fitted: in any frame.",
+            show_default="as the plan says, else fitted",
+        ),
+    ] = None,
     output: Output = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
@@ -130,13 +138,14 @@ def calibrate(
                 "gantrytau calibrate --example > cell.toml"
             )
         if file.suffix.lower() == ".toml":
-            others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior)
+            others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior, frame=frame)
             _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
             plan(file, output, json)
             return
         if not file.is_file():
             raise CommandError(f"{file}: there is no such file{_kinds(file)}")
-        how = policy(model, method, start, orientation, holdout or "second", prior, constraint or (), robust)
+        words = dict(method=method, start=start, orientation=orientation, frame=frame)
+        how = policy(words, model, holdout or "second", prior, constraint or (), robust)
         folder = output or calibration_files.folder_beside(file)
         calibration_files.rehearse(folder)
         nominal = _robot(file, robot, prototype, set_ or ())

@@ -70,10 +70,22 @@ def write(found: "Calibration", folder: Path, robot: str, source: Path, about: "
 
 
 def _heading(found: "Calibration", robot: str, source: Path, file: Path, verdict: str) -> str:
-    said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses"
+    from gantrytau_optimica import frame_words
+
+    said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses."
     return (
         f"Calibrated with {source.name}: lengths and offsets in m.\n"
-        f"{said}.\n"
+        f"{said}\n"
+        f"Frame: {frame_words(found.frame, found.motion)}.\n"
+        f"{_frame_table(found)}"
         f"On the command line: gantrytau simulate '{robot}' --set {file.name}\n"
         f'In Python: robot.modified(tomllib.loads(Path("{file.name}").read_text()))'
     )
+
+
+def _frame_table(found: "Calibration") -> str:
+    """R and t as a table of TOML, which stays a comment, as no robot has such parameters; nothing where there are none."""
+    if "frame.R" not in found.parameters:
+        return ""
+    R, t = (found.parameters[name].tolist() for name in ("frame.R", "frame.t"))
+    return f"[frame]\nR = {R}\nt = {t}\n"

@@ -1,6 +1,6 @@
 """How `gantrytau calibrate measurements.csv` is to calibrate: its options as arguments of `calibrate`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from gantrytau.commands.printing.spelling import Spelling
 
 SPELLING = Spelling(
     ("calibrate", "Measurements"),
-    {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior")}
+    {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior", "frame")}
     | {"constraints": "--constraint", "rails": "--rails", "robot": "--robot", "loss": "--robust"}
     | {"kind": "--example"},
     flags=("loss",),
@@ -25,23 +25,21 @@ SPELLING = Spelling(
 
 
 def policy(
+    words: Mapping[str, str | None],
     model: str | None,
-    method: str,
-    start: str,
-    orientation: str,
     holdout: str,
     prior: str | None,
     constraints: Sequence[str],
     robust: bool,
 ) -> dict[str, Any]:
-    """Keywords of `calibrate`; CommandError for what cannot be read."""
+    """Keywords of `calibrate`; words: those that it takes as they are. CommandError for what cannot be read."""
+    if words["frame"] not in (None, "fitted", "base"):
+        raise CommandError(f"--frame {words['frame']}: expected fitted or base")
     if holdout not in ("second", "none"):
         raise CommandError(f"--holdout {holdout}: expected second or none")
     return dict(
+        **words,
         model=int(model) if model is not None and model.isdigit() else model,
-        method=method,
-        start=start,
-        orientation=orientation,
         holdout=None if holdout == "none" else holdout,
         prior=_prior(prior),
         constraints=_constraints(constraints),

@@ -7,6 +7,7 @@ import numpy as np
 import typer
 
 from gantrytau.commands.calibrate.calibration_files import PARAMETERS
+from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
 
 if TYPE_CHECKING:
@@ -23,21 +24,21 @@ def about(
     checked: "CrossValidation | None",
 ) -> "About":
     """What a report says besides the calibration. robot: its name; checked: fits without each part of the poses in turn."""
-    from gantrytau_optimica import About, frame_motion
+    from gantrytau_optimica import About
 
     turned = found.nominal_rods.turns or measured.data.R is not None
+    of_tool = turned or (plan is not None and np.any(plan.target))  # laid over the plan t holds the target
     target = "the target that was measured, in the place of the tool; t of a frame holds its offset"
     facts = {"measurements": str(measured.path), **(plan.facts if plan else {})}
     return About(
         robot=robot,
-        facts=facts | {"x, y, z": "the tool" if turned else target},
+        facts=facts | {"x, y, z": "the tool" if of_tool else target},
         good=verdict.good if verdict else None,
-        verdict=" ".join(verdict.reasons) if verdict else "",
+        verdict=SPELLING.words(" ".join(verdict.reasons)) if verdict else "",
         notes=list(notes),
         lines=measured.lines,
         numbers=measured.data.numbers,
         validation=checked.errors if checked and checked.good.size else None,
-        motion=(plan.motion if plan else None) or frame_motion(found),
     )
 
 
@@ -60,7 +61,7 @@ def summary(
 
 def judgement(verdict: "CalibrationVerdict") -> dict[str, Any]:
     """A verdict as a record for programs."""
-    words = " ".join(verdict.reasons)
+    words = SPELLING.words(" ".join(verdict.reasons))
     record: dict[str, Any] = {
         "good": verdict.good,
         "validation_error_m": verdict.validation_error,
@@ -92,7 +93,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
     _show_validation(found, about)
     for note in about.notes:
         typer.echo(note)
-    _show_motion(about)
+    _show_motion(found)
     if not found.findings:
         typer.echo("Nothing doubtful was found in the measurements")
     for finding in found.findings:
@@ -118,8 +119,8 @@ def _show_validation(found: "Calibration", about: "About") -> None:
     )
 
 
-def _show_motion(about: "About") -> None:
-    motion = about.motion
+def _show_motion(found: "Calibration") -> None:
+    motion = found.motion
     if motion is None:
         return
     rows = "; ".join(" ".join(f"{x:+.7f}" for x in row) for row in motion.rotation)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import typer
 
 from gantrytau import Model, ModelError
@@ -19,6 +20,8 @@ FEW = 60  # poses, fewer than which are all fitted, and left out in turn
 LAID_OVER = (
     "frame: positions are in another frame than the plan; they were laid over the poses that it expects"
 )
+
+TARGET = "target: positions in the base of the robot are those of {}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,8 @@ def finish(
     """
     from gantrytau_optimica import told_by_tool
 
-    plan, notes = _laid_over(robot.planned, measured), []
+    plan, notes = _laid_over(robot.planned, measured, policy["frame"]), []
+    policy = dict(policy, frame=policy["frame"] or "fitted")
     if plan is not None:
         measured = replace(measured, data=plan.measurements)
         policy, notes = _as_planned(plan, policy)
@@ -79,14 +83,14 @@ def finish(
         raise typer.Exit(FAULT)
 
 
-def _laid_over(planned: "PlannedCell | None", measured: MeasurementFile) -> "MeasuredPlan | None":
+def _laid_over(planned: "PlannedCell | None", measured: MeasurementFile, frame: Any) -> "MeasuredPlan | None":
     """The measurements as those of the plan; its complaints with the file."""
     from gantrytau_optimica import measured_plan
 
     if planned is None:
         return None
     try:
-        return measured_plan(planned, measured.data)
+        return measured_plan(planned, measured.data, frame)
     except ModelError as error:
         raise ModelError(f"{measured.path}: {SPELLING.words(str(error))}. Nothing was written") from error
 
@@ -94,6 +98,11 @@ def _laid_over(planned: "PlannedCell | None", measured: MeasurementFile) -> "Mea
 def _as_planned(plan: "MeasuredPlan", policy: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Keywords of `calibrate` with the prior of the plan's own simulations, unless another was given; words on it."""
     notes = [] if plan.motion is None else [LAID_OVER]
+    policy, off = dict(policy, frame=plan.frame), f"{np.linalg.norm(plan.target) * 1e3:.4g} mm"
+    if plan.taken_off:
+        notes = [TARGET.format(f"the target, {off} from the tool, which were taken off")]
+    elif np.any(plan.target):
+        notes = [TARGET.format(f"the tool itself, not of the target {off} from it")]
     if policy["prior"] is not None or not plan.prior or policy["model"] is not None:
         return policy, notes
     told = ", ".join(f"{name}={value:g}" for name, value in plan.prior.items())

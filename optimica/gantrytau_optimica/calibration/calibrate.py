@@ -12,13 +12,17 @@ from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
-from gantrytau_optimica.calibration.judging.plausibility import Misses, check_robot, misses_of
+from gantrytau_optimica.calibration.judging.device_frames import Motion
+from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, check_robot, misses_of
 from gantrytau_optimica.calibration.judging.verdicts import (
     arms_in_frame,
     check_carts,
     check_count,
+    frame_seen,
     in_frame,
+    in_words,
     judged,
+    not_in_base,
     usable_rows,
 )
 from gantrytau_optimica.calibration.rods.arm_closure import Orientation, arms_of
@@ -44,6 +48,7 @@ def calibrate(
     loss: Literal["linear", "robust"] = "linear",
     holdout: Any = "second",
     constraints: Mapping[str, Any] | None = None,
+    frame: Literal["fitted", "base"] = "fitted",
 ) -> Calibration:
     """Identify the kinematic parameters of a robot from measured poses by the closure of its links.
 
@@ -56,14 +61,11 @@ def calibrate(
     "second" validates with every second usable pose, None with the poses of the fit, else rows or a mask.
     constraints: equations and limits that numbers keep, by Ipopt, such as {"|arms[0].direction|": 1.0,
     "arms[0].length": (2.0, 2.1), "arms[1].links[0].length": "arms[1].links[1].length"} (see `constraints.py`).
+    frame: "base" says that poses were measured in the base of the robot, where it is commanded; "fitted" takes them in any
+    frame: numbers are identified there, and nominal values say where the base is, `.parameters["frame.R"]`, `["frame.t"]`.
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
-    _check_words(method=method, start=start, orientation=orientation, loss=loss)
-    if constraints and method != "ipopt":
-        raise ModelError(
-            "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
-            argument="constraints",
-        )
+    _check_words(constraints, method=method, start=start, orientation=orientation, loss=loss, frame=frame)
     nominal_rods = read_nominal(robot)
     _check_columns(nominal_rods, measurements, start)
     check_model(model, nominal_rods, measurements)
@@ -72,12 +74,9 @@ def calibrate(
     check_carts(nominal_rods, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
     data = measurements.select(fitted)
-    asked = _Asked(model, start, prior, loss, orientation)
-    fits, known, more = _fitted(nominal_rods, data, asked, (rows, fitted, findings))
-    if method == "ipopt":
-        from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
-
-        fits = solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
+    asked = _Asked(model, start, prior, loss, orientation, frame)
+    fits, known, there = _fitted(nominal_rods, data, asked, (rows, fitted, findings))
+    fits = fits if method == "gauss-newton" else _by_ipopt(fits, constraints)
     found = Calibration(
         nominal_rods,
         measurements,
@@ -89,8 +88,17 @@ def calibrate(
         loss,
         orientation,
         nominal=known,
+        frame=frame,
+        motion=None if there is None else Motion.of(there),
     )
-    return found.with_findings([*findings, *more, *judged(found)])
+    told = [] if there is None or start == "linear" else [in_words(there, rows)]
+    return found.with_findings([*findings, *told, *judged(found)])
+
+
+def _by_ipopt(fits: list[Fit], constraints: Mapping[str, Any] | None) -> list[Fit]:
+    from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
+
+    return solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,7 @@ class _Asked:
     prior: Mapping[str, Any] | None
     loss: str
     orientation: Orientation
+    frame: str
 
 
 def _fitted(
@@ -109,8 +118,8 @@ def _fitted(
     data: Measurements,
     asked: _Asked,
     where: tuple[np.ndarray, np.ndarray, list[Finding]],
-) -> tuple[list[Fit], Misses | None, list[Finding]]:
-    """The fits, how nominal values miss the measurements if they were used, and what was noticed.
+) -> tuple[list[Fit], Misses | None, Fitting | None]:
+    """The fits, how nominal values miss the measurements if they were used, and their frame if it is another.
 
     where: rows of the measurements that are usable and those that are fitted, and what is known of them.
     """
@@ -120,20 +129,23 @@ def _fitted(
         check_count(max(arm.count for arm in arms) // 3, fitted, findings)
         links = links_of_arms(arms, data)
         check_robot(robot, misses_of(links), data.q, data.r, data.R, rows)
-        there, more = arms_in_frame(robot, arms, data, rows)
-        nominal = links = links if there is arms else links_of_arms(there, data)
+        moved, there = arms_in_frame(robot, arms, data, rows)
+        nominal = links = links if moved is arms else links_of_arms(moved, data)
     else:
         links = nominal_links(robot, data, six_links(asked.model, robot))
         check_count(max(len(link.start) for link in links), fitted, findings)
         check_robot(robot, misses_of(links), data.q, data.r, data.R, rows)
-        nominal, more = links, []
         if asked.start == "nominal" or _needs_values(asked.prior):
-            nominal, more = in_frame(robot, links, data, rows)
+            nominal, there = in_frame(robot, links, data, rows)
+        else:
+            nominal, there = links, frame_seen(links, data)
         links = started_linear(links) if asked.start == "linear" else nominal
-    directions = "linear" if more else asked.start
+    if asked.frame == "base" and there is not None:
+        raise not_in_base(robot, there, rows)
+    directions = asked.start if there is None else "linear"
     values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
     fits = fit_model(asked.model, links, data, directions, Prior(asked.prior, values), asked.loss)
-    return fits, misses_of(nominal) if asked.start == "nominal" else None, more
+    return fits, misses_of(nominal) if asked.start == "nominal" else None, there
 
 
 def _needs_values(prior: Mapping[str, Any] | None) -> bool:
@@ -141,12 +153,13 @@ def _needs_values(prior: Mapping[str, Any] | None) -> bool:
     return isinstance(prior, Mapping) and any(not isinstance(given, tuple) for given in prior.values())
 
 
-def _check_words(**words: str) -> None:
+def _check_words(constraints: Mapping[str, Any] | None, **words: str) -> None:
     known = dict(
         method=("gauss-newton", "ipopt"),
         start=("nominal", "linear"),
         orientation=("local", "unit", "free"),
         loss=("linear", "robust"),
+        frame=("fitted", "base"),
     )
     for name, word in words.items():
         if word not in known[name]:
@@ -154,6 +167,11 @@ def _check_words(**words: str) -> None:
                 f"calibrate: found {name}={word!r}, expected {' or '.join(map(repr, known[name]))}",
                 argument=name,
             )
+    if constraints and words["method"] != "ipopt":
+        raise ModelError(
+            "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
+            argument="constraints",
+        )
 
 
 def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:

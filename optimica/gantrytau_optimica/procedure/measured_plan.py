@@ -1,10 +1,10 @@
 """Measurements of a plan: laid over the poses it expects, told what is missing, judged by what was wanted."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
+from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.tool_error import ToolError, tool_error
-from gantrytau_optimica.calibration.report.report import Motion
 from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation
 from gantrytau_optimica.procedure.calibration_plan import load_plan
@@ -28,19 +28,26 @@ OF_TAPE = 5  # deviations of the tape measure by which a tool may be off its nom
 MATTERS = 0.1  # of the error that is wanted, by which a number that is not held may move the tool
 REST = "Rest"
 
+Frame = Literal["fitted", "base"]
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPlan:
     """Measurements of a plan, made ready for `calibrate`.
 
     measurements: in the frame of the plan, without rows that were left empty; rows: the measured poses of the plan that they
-    are, (N,) from 0, -1 for none; motion: which laid measurements over the plan, None if they were in its frame.
+    are, (N,) from 0, -1 for none; motion: which laid measurements over the plan, None if they were in its frame; frame: of
+    `calibrate`; target: where it is seen from the tool, in the base, (3,) in m; taken_off: whether positions were those of
+    the target, in the base, and are the tool's now.
     """
 
     planned: PlannedCell
     measurements: Measurements
     rows: np.ndarray
     motion: Motion | None
+    frame: Frame = "fitted"
+    target: Any = (0.0, 0.0, 0.0)
+    taken_off: bool = False
 
     @property
     def missing(self) -> list[int]:
@@ -77,6 +84,8 @@ class MeasuredPlan:
     ) -> tuple[Calibration, CalibrationVerdict]:
         """The calibration, whose findings say what moves the tool, and whether it is good enough for the cell."""
         cell, expected = self.planned.cell, self.expected(checked.calibration, orientation)
+        if self.motion is not None:
+            checked = replace(checked, calibration=checked.calibration.measured_by(self.motion))
         found = told_by_tool(checked.calibration, expected, least=MATTERS * cell.wanted, tape=cell.tape)
         return found, judge(checked, cell.wanted, expected=expected, tape=cell.tape)
 
@@ -110,33 +119,60 @@ class MeasuredPlan:
         }
 
 
-def measured_plan(planned: PlannedCell, measurements: Measurements) -> MeasuredPlan:
-    """Lay measurements over the plan that asked for them.
+def measured_plan(
+    planned: PlannedCell, measurements: Measurements, frame: Frame | None = None
+) -> MeasuredPlan:
+    """Measurements of a plan, in its frame.
 
         planned = load_planned_cell("cell-plan")
         measured = measured_plan(planned, Measurements.read("cell-plan/measurements.csv"))
-        checked = cross_validate(planned.cell.robot, measured.measurements, prior=measured.prior)
+        checked = cross_validate(planned.cell.robot, measured.measurements, prior=measured.prior, frame=measured.frame)
         found, verdict = measured.judged(checked)
 
-    Rows whose positions were left empty are not there; positions in another frame are laid over the poses that the plan
-    expects; those in the world, and those that fit the plan in no frame, stay as they are. Raises ModelError where
-    actuators are not those of planned poses, positions are mirrored, or those of the plan itself.
+    frame: that of the measurements, as of `calibrate`, by default what the cell says. Rows whose positions were left empty
+    are not there. Positions in the base stay where they are; those of the target of a plate that cannot turn become those of
+    the tool, unless they lie where the plan expects the tool itself. A "fitted" frame that is another is laid over the poses
+    that the plan expects; positions that fit it in no frame stay as they are. Raises ModelError where actuators are not
+    those of planned poses, positions are mirrored, those of the plan itself, or not in the base where they are said to be.
     """
+    if frame not in (None, *get_args(Frame)):
+        raise ModelError(
+            f"measured_plan: found frame={frame!r}, expected 'fitted' or 'base'", argument="frame"
+        )
+    chosen: Frame = frame or planned.cell.frame
     data = measurements.select(np.flatnonzero(~np.isnan(measurements.r).all(axis=1)))
     plan, rows = planned.plan, _rows(planned, data)
     if any(f.kind in ("millimetres", "guideway") for f in data.findings):
-        return MeasuredPlan(planned, data, rows, None)
+        return MeasuredPlan(planned, data, rows, None, chosen)
     known = rows >= 0
     expected, near = plan.r[plan.measured][rows[known]], OF_TAPE * planned.cell.tape
     _check_measured(data.r[known], expected)
-    if _apart(data.r[known], expected) < near:
-        return MeasuredPlan(planned, data, rows, None)
+    target = _target(planned)
+    as_tool, as_target = (_apart(data.r[known] - off, expected) for off in (0.0, target))
+    if as_target < near:
+        return MeasuredPlan(planned, data.shifted(-target), rows, None, chosen, target, bool(target.any()))
+    if as_tool < near:
+        return MeasuredPlan(planned, data, rows, None, chosen, target)
+    if chosen == "base":
+        raise ModelError(
+            f"found positions {min(as_tool, as_target):.3g} m off the poses of the plan beside it in the median, expected "
+            f"{near:.3g} m at most where frame='base'; take frame='fitted' for another frame",
+            argument="frame",
+        )
     placed = plan.placed(data)
     if not _apart(placed.r[known], expected) < near:
         _check_axes(planned, data, expected, known)
         return MeasuredPlan(planned, data, rows, None)
     good = np.isfinite(data.r).all(axis=1)
-    return MeasuredPlan(planned, placed, rows, Motion(*motion(data.r[good], placed.r[good])))
+    return MeasuredPlan(planned, placed, rows, Motion(*motion(data.r[good], placed.r[good]), placed=True))
+
+
+def _target(planned: PlannedCell) -> np.ndarray:
+    """From the tool to what the device measures, in the base, (3,) in m; zero of plates that turn, whose tool it finds."""
+    plan = planned.plan
+    if plan.kind != "three links":
+        return np.zeros(3)
+    return plan.R[0] @ np.asarray(planned.cell.device.target, dtype=float)
 
 
 def _check_measured(r: np.ndarray, expected: np.ndarray) -> None:

@@ -2,6 +2,9 @@
 
 import csv
 import json
+import re
+import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,8 +41,6 @@ def folder(planned, tmp_path):
 
 def true_error(found, folder):
     """Mean distance of the calibrated robot from the true one over planned poses, m, laid over each other best."""
-    import tomllib
-
     text = (folder / "measurements-calibrated" / "calibrated.toml").read_text()
     _, q = cells.read_poses(folder)
     a = Kinematics(GantryTau(prototypes.L1, **tomllib.loads(text))).fk(q)[0]
@@ -118,6 +119,91 @@ def test_the_frame_is_printed(folder, run):
     spoken = run("calibrate", cells.measure(folder)).stdout
     assert "base = R measured + t:" in spoken
     assert "R = [-0.80" in spoken
+
+
+STRETCHED = (4e-3, -3e-3, 2e-3)  # m, of the links
+BASE_NOISE = 20e-6  # m
+
+
+def stretched():
+    """An L1 with longer and shorter links, all else as it is nominally."""
+    arms = [replace(arm, length=arm.length + d) for arm, d in zip(prototypes.L1.arms, STRETCHED, strict=True)]
+    return Kinematics(GantryTau(replace(prototypes.L1, arms=tuple(arms))))
+
+
+def measured_in_base(folder, off=(0.0, 0.0, 0.0), turn=None):
+    """What is read in the base of the robot, of a point `off` the tool; or in axes turned from it. File, q and tool."""
+    _, q = cells.read_poses(folder)
+    r = stretched().fk(q)[0]
+    read = r + off + BASE_NOISE * np.random.default_rng(0).standard_normal(r.shape)
+    file = folder / "measurements.csv"
+    with file.open("w", newline="") as opened:
+        rows = np.hstack([q, read if turn is None else read @ turn.T]).tolist()
+        csv.writer(opened).writerows([["q1", "q2", "q3", "x", "y", "z"], *rows])
+    return file, q, r
+
+
+def off_in_base(folder, q, r):
+    """How far the calibrated robot is from where it was measured, in the mean of poses, without laying it over them."""
+    text = (folder / "measurements-calibrated" / "calibrated.toml").read_text()
+    return float(
+        np.linalg.norm(
+            Kinematics(GantryTau(prototypes.L1, **tomllib.loads(text))).fk(q)[0] - r, axis=1
+        ).mean()
+    )
+
+
+@pytest.mark.parametrize(("off", "words"), [(0.05, "the target, 50 mm from"), (0.0, "the tool itself, not")])
+@pytest.mark.parametrize("said", [(), ("--frame", "base")])
+def test_what_was_measured_in_the_base_is_right_there(folder, answer, off, words, said):
+    file, q, r = measured_in_base(folder, (off, 0.0, 0.0))
+    found = answer("calibrate", file, *said)
+    nominal = np.linalg.norm(Kinematics(GantryTau(prototypes.L1)).fk(q)[0] - r, axis=1).mean()
+    # 21 numbers from 20 poses know the mean of them to about the noise
+    assert off_in_base(folder, q, r) < 3 * BASE_NOISE < nominal / 100
+    assert found["notes"] == [found["notes"][0]]
+    assert found["notes"][0].startswith(f"target: positions in the base of the robot are those of {words}")
+    assert found["transformation"] is None
+    ends = "its coordinates are as good as this." if said else "--frame base says that it is."
+    assert found["verdict"].endswith(ends)
+    assert ("good up to a frame" in found["verdict"]) != bool(said)
+
+
+def test_a_fitted_frame_says_what_it_means_for_the_base(folder, answer, run):
+    c, s = np.cos(0.02), np.sin(0.02)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    file, q, r = measured_in_base(folder, turn=turn)
+    found = answer("calibrate", file)
+    assert "This is good up to a frame: R and t follow from nominal values" in found["verdict"]
+    (told,) = re.findall(r"may be off by ([\d.]+) mm, as before, where these are 5 mm off", found["verdict"])
+    off = off_in_base(folder, q, r)
+    assert 1e-3 < off < 3e-3 * float(told)  # links are off by less than tape, one draw of three
+    text = (folder / "measurements-calibrated" / "calibrated.toml").read_text()
+    table = "\n".join(line.removeprefix("# ") for line in text.splitlines() if line.startswith("# [frame]"))
+    lines = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(("# R =", "# t ="))]
+    frame = tomllib.loads("\n".join([table, *lines]))["frame"]
+    assert np.array(frame["R"]) == pytest.approx(np.array(found["transformation"]["rotation"]))
+    assert np.array(frame["R"]) == pytest.approx(turn.T, abs=0.02)
+    calibrated = Kinematics(GantryTau(prototypes.L1, **tomllib.loads(text))).fk(q)[0]
+    measured = Measurements.read(file).r
+    assert calibrated == pytest.approx(measured @ np.array(frame["R"]).T + frame["t"], abs=5 * BASE_NOISE)
+    values = folder / "measurements-calibrated" / "calibrated.toml"
+    assert run("check", "GantryTau(L1)", "--set", values).exit_code == 0
+    refused = run("calibrate", file, "--frame", "base")
+    assert refused.exit_code == FAULT
+    assert "m off the poses of the plan beside it in the median, expected 0.025 m at most" in refused.stderr
+    assert "take --frame fitted for another frame" in refused.stderr
+
+
+def test_a_cell_says_in_which_frame_its_device_measures(folder, answer, fails):
+    cell = folder / "plan.toml"
+    cell.write_text(cell.read_text().replace('frame = "fitted"', 'frame = "base"'))
+    file, *_ = measured_in_base(folder)
+    assert "Poses were measured in the base of the robot" in answer("calibrate", file)["verdict"]
+    assert "good up to a frame" in answer("calibrate", file, "--frame", "fitted")["verdict"]
+    assert "--frame middle: expected" in fails(2, "calibrate", file, "--frame", "middle")
+    cell.write_text(cell.read_text().replace('frame = "base"', 'frame = "bass"'))
+    assert "device.frame: found \"bass\"; did you mean 'base'?" in fails(2, "calibrate", cell)
 
 
 def test_the_template_is_filled_in(folder, answer, fails):

@@ -99,6 +99,13 @@ class Measurements:
         """
         return check_data(self.q, self.r, self.R, self.finite, self.rails)
 
+    def shifted(self, offset: np.ndarray) -> "Measurements":
+        """The measurements with positions moved by an offset, (3,) in m."""
+        found = self.select(slice(None))
+        found.r = self.r + offset
+        found.r.flags.writeable = False
+        return found
+
     def select(self, rows: Any) -> "Measurements":
         """The measurements of some rows (indices, a slice or a mask), with all guideways."""
         if isinstance(rows, np.ndarray) and rows.dtype != bool and is_all(rows, len(self)):

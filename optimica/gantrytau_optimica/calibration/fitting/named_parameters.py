@@ -18,11 +18,11 @@ from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
 
 class Named(Mapping[str, Any]):
-    """Values by name; of a vector `v` also the elements `v[0]`, `v[1]` and so on, which are not listed."""
+    """Values by name; of a vector `v` also the elements `v[0]`, `v[1]` and so on, which are not listed, nor are others."""
 
-    def __init__(self, values: Mapping[str, Any]):
-        self._values = dict(values)
-        self._elements = {
+    def __init__(self, values: Mapping[str, Any], others: Mapping[str, Any] | None = None):
+        self._values, self._others = dict(values), dict(others or {})
+        self._elements = self._others | {
             f"{name}[{k}]": float(x)
             for name, value in self._values.items()
             if np.ndim(value)
@@ -46,7 +46,7 @@ class Named(Mapping[str, Any]):
         return len(self._values)
 
     def __repr__(self) -> str:
-        return "\n".join(f"{name} = {value}" for name, value in self._values.items())
+        return "\n".join(f"{name} = {value}" for name, value in (self._values | self._others).items())
 
 
 def named_parameters(robot: NominalRods, fits: Sequence[Fit]) -> dict[str, Any]:

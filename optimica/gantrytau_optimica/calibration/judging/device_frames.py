@@ -4,7 +4,7 @@ T' = S T + t        A' = S A + t,   v' = S v,   R(u)' = S R(u),   what is in the
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,24 @@ from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses,
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, exponential, product
 
 FEWEST = 4  # poses that nominal kinematics must reach
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """From the frame of measurements to the base of the robot: base = rotation @ measured + translation, m.
+
+    placed: whether measurements were moved so before they were fitted: then identified numbers are in the base, else in the
+    frame of the measurements.
+    """
+
+    rotation: np.ndarray
+    translation: np.ndarray
+    placed: bool = False
+
+    @classmethod
+    def of(cls, fitting: Fitting) -> "Motion":
+        """The way back to nominal values that were moved into the frame of the measurements."""
+        return cls(fitting.turn.T, -fitting.turn.T @ fitting.shift)
 
 
 def frame_of(robot: Model, misses: Misses, data: Measurements) -> Fitting | None:
@@ -51,3 +69,14 @@ def _moved(arm: ArmClosure, turn: np.ndarray, shift: np.ndarray) -> ArmClosure:
         for name in (rod.offset for rod in said.rods if rod.offset is not None):
             values[name] = turn @ values[name] + (shift if said.offset is None else 0.0)
     return replace(arm, values=values)
+
+
+def frame_words(frame: str, motion: Motion | None) -> str:
+    """In which frame identified numbers are; frame: as of `calibrate`."""
+    if frame == "base":
+        return "the base of the robot, in which poses were measured"
+    if motion is None:
+        return "that of the measurements, taken for the base of the robot"
+    if motion.placed:
+        return "the base of the robot as nominal values know it, where base = R measured + t lays the measurements"
+    return "that of the measurements; base = R measured + t, as nominal values know the base of the robot"

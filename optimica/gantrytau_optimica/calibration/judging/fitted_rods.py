@@ -20,6 +20,7 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
     rod_links,
 )
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
+from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.plausibility import Misses
 from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
@@ -36,7 +37,8 @@ class FittedRods:
     nominal_rods: the robot as it was given; model, method, loss, orientation: as they were asked for; fits: links that share
     numbers, at their minima; rows: those of the measurements that were fitted; held_out: those that validate; findings:
     what was noticed on the way; nominal: how nominal values in the frame of the measurements miss them, None if they were
-    not used.
+    not used; frame: as it was asked for; motion: from the frame of the measurements to the base of the robot, None where
+    they are the same or nothing is known of it.
     """
 
     nominal_rods: NominalRods
@@ -50,6 +52,8 @@ class FittedRods:
     orientation: str = "local"
     findings: tuple[Finding, ...] = ()
     nominal: Misses | None = None
+    frame: str = "fitted"
+    motion: Motion | None = None
 
     def __repr__(self) -> str:
         return (
@@ -59,8 +63,15 @@ class FittedRods:
 
     def with_findings(self, findings: Sequence[Finding]) -> Self:
         """The same with other findings, without working anything out anew."""
-        found = replace(self, findings=tuple(findings))
-        found.__dict__.update({name: value for name, value in self.__dict__.items() if name != "findings"})
+        return self._kept(replace(self, findings=tuple(findings)), "findings")
+
+    def measured_by(self, motion: Motion) -> Self:
+        """The same of measurements that a motion laid into their frame."""
+        return self._kept(replace(self, motion=motion), "motion", "parameters")
+
+    def _kept(self, found: Self, *others: str) -> Self:
+        """What was worked out already, but for some names, is that of another record too."""
+        found.__dict__.update({name: value for name, value in self.__dict__.items() if name not in others})
         return found
 
     @cached_property
@@ -68,8 +79,17 @@ class FittedRods:
         """Values by name: `arms[i].length`, `.offset`, `.direction`; of six links `arms[i].links[j].length`, `.offset`,
         `.plate_offset`; of measured guideways `.frame_offset` and `.frame_rotation` (a rotation vector); of turntables
         `turntables[k].orientation`, a quaternion, scalar first, whose rotation has the deviations.
+
+        Of a fitted frame also `frame.R`, (3, 3), and `frame.t`, (3,) in m, base = R measured + t, 1 and 0 where poses lie as
+        nominal values say; they are no parameters of the robot, and not listed.
         """
-        return Named(named_parameters(self.nominal_rods, self.fits))
+        return Named(named_parameters(self.nominal_rods, self.fits), self._frame())
+
+    def _frame(self) -> dict[str, np.ndarray]:
+        if self.frame == "base":
+            return {}
+        motion = self.motion or Motion(np.eye(3), np.zeros(3))
+        return {"frame.R": motion.rotation, "frame.t": motion.translation}
 
     @property
     def arms(self) -> tuple[ArmClosure, ...]:
@@ -143,6 +163,8 @@ class FittedRods:
                         "more between poses, or give a prior"
                     )
                 return [self.names.index(n) for n in wanted]
+        if name in self._frame():
+            raise ModelError(f"covariance: {name} follows from nominal values alone; leave it out")
         if name in self.parameters:
             raise ModelError(f"covariance: {name} was not identified but held at its value; leave it out")
         raise ModelError(f"covariance: there is no parameter '{name}'{did_you_mean(name, self.parameters)}")

@@ -72,10 +72,12 @@ def check_count(parameters: int, rows: np.ndarray, findings: Sequence[Finding]) 
 
 def in_frame(
     robot: NominalRods, links: list[ModelLink], data: Measurements, rows: np.ndarray
-) -> tuple[list[ModelLink], list[Finding]]:
-    """Links whose start fits the frame of the measurements; CalibrationError for another robot."""
+) -> tuple[list[ModelLink], Fitting | None]:
+    """Links whose start fits the frame of the measurements, and that frame if it is another; CalibrationError for another
+    robot.
+    """
     if miss(misses_of(links), data.q, data.r, data.R) < NEAR:
-        return links, []
+        return links, None
     fitting = compare(links, data.q, data.r, data.R)
     if fitting.left > NEAR / 10:
         raise CalibrationError(
@@ -102,23 +104,31 @@ def in_frame(
             kind="another robot",
             rows=rows,
         )
-    return moved(links, fitting.turn, fitting.shift), [in_words(fitting, rows)]
+    return moved(links, fitting.turn, fitting.shift), fitting
+
+
+def frame_seen(links: list[ModelLink], data: Measurements) -> Fitting | None:
+    """The frame of the measurements if it is another than that of nominal values, None where these tell nothing."""
+    if miss(misses_of(links), data.q, data.r, data.R) < NEAR:
+        return None
+    fitting = compare(links, data.q, data.r, data.R)
+    return fitting if fitting.off <= NEAR else None
 
 
 def arms_in_frame(
     robot: NominalRods, arms: tuple[ArmClosure, ...], data: Measurements, rows: np.ndarray
-) -> tuple[tuple[ArmClosure, ...], list[Finding]]:
-    """Arms on turntables in the frame of the measurements; CalibrationError for another robot."""
+) -> tuple[tuple[ArmClosure, ...], Fitting | None]:
+    """Arms on turntables in the frame of the measurements, as `in_frame` says of links."""
     misses = misses_of(links_of_arms(arms, data))
     missed = miss(misses, data.q, data.r, data.R)
     if missed < NEAR:
-        return arms, []
+        return arms, None
     fitting = frame_of(robot.robot, misses, data)
     if fitting is not None:
         there = moved_arms(arms, fitting.turn, fitting.shift)
         left = miss(misses_of(links_of_arms(there, data)), data.q, data.r, data.R)
         if left < NEAR:
-            return there, [in_words(fitting, rows)]
+            return there, fitting
         missed = min(missed, left)
     raise CalibrationError(
         f"Measurements: found {rows_in_words(rows)} in which links miss their nominal lengths by {missed:.3g} m in the "
@@ -131,14 +141,30 @@ def arms_in_frame(
 
 def in_words(fitting: Fitting, rows: np.ndarray) -> Finding:
     """The finding that the frame is another."""
-    angle = np.degrees(np.arccos(np.clip((np.trace(fitting.turn) - 1) / 2, -1.0, 1.0)))
-    x, y, z = fitting.shift
     words = (
-        f"the frame of {rows_in_words(rows)} is another than that of the nominal values (turned by {angle:.3g} degrees, "
-        f"its origin is at {x:.4g}, {y:.4g}, {z:.4g} m, links miss their lengths by {fitting.miss:.3g} m); identified in "
+        f"the frame of {rows_in_words(rows)} is another than that of the nominal values ({_told(fitting)}); identified in "
         "the frame measured, from nominal values moved there"
     )
     return Finding("frame", rows, words)
+
+
+def _told(fitting: Fitting) -> str:
+    angle = np.degrees(np.arccos(np.clip((np.trace(fitting.turn) - 1) / 2, -1.0, 1.0)))
+    x, y, z = fitting.shift
+    return (
+        f"turned by {angle:.3g} degrees, its origin is at {x:.4g}, {y:.4g}, {z:.4g} m, links miss their lengths by "
+        f"{fitting.miss:.3g} m"
+    )
+
+
+def not_in_base(robot: NominalRods, fitting: Fitting, rows: np.ndarray) -> CalibrationError:
+    """The refusal of measurements in another frame than the base in which they are said to be."""
+    return CalibrationError(
+        f"Measurements: found {rows_in_words(rows)} in another frame than the base of {robot.name} ({_told(fitting)}), "
+        "expected poses where the robot is commanded; move them there, or take frame='fitted'",
+        kind="frame",
+        rows=rows,
+    )
 
 
 def judged(found: FittedRods) -> list[Finding]:

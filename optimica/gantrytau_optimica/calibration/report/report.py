@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.judging.device_frames import frame_of
+from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
-from gantrytau_optimica.calibration.judging.plausibility import compare
 from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
 from gantrytau_optimica.calibration.report.report_page import html_report
-from gantrytau_optimica.calibration.rods.error_models import nominal_links, six_links
 
 BINS = 24
 OTHERS = (
@@ -38,21 +36,12 @@ LISTED = 2000  # poses, of more the worst
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """From the frame of measurements to the base of the robot: base = rotation @ measured + translation, m."""
-
-    rotation: np.ndarray
-    translation: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class About:
     """What a report says beside the calibration itself, as far as that is known.
 
     robot: its name with its prototype; facts: in words by heading, such as goal and device; good, verdict: whether it is
     good enough; notes: sentences; lines: of the rows in their file (N,); numbers: of the poses in a plan (N,); validation:
-    distances of poses from where fits without them expect them, m by row, NaN where there is none; motion: which laid
-    measurements over the plan.
+    distances of poses from where fits without them expect them, m by row, NaN where there is none.
     """
 
     robot: str = ""
@@ -63,7 +52,6 @@ class About:
     lines: np.ndarray | None = None
     numbers: np.ndarray | None = None
     validation: np.ndarray | None = None
-    motion: Motion | None = None
 
 
 def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, Any]:
@@ -91,7 +79,7 @@ def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, A
         "left_out_rows": found.left_out.tolist(),
         "validation_error_m": _validation(found, about),
         "noise_m": found.noise if np.isfinite(found.noise) else None,
-        "transformation": _transformation(about.motion or frame_motion(found)),
+        "transformation": _transformation(found.motion),
         "parameters": {n: np.asarray(v).tolist() for n, v in found.parameters.items()},
         "nominal": nominal_values(found),
         "deviations": {n: d if np.isfinite(d) else None for n, d in found.deviations.items()},
@@ -109,22 +97,6 @@ def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, A
 def fits_all(found: FittedRods) -> bool:
     """Whether errors are those of the fitted poses, as none were held out."""
     return np.array_equal(found.held_out, found.rows)
-
-
-def frame_motion(found: FittedRods) -> Motion | None:
-    """From the frame of the measurements to that of the nominal values, None where they are the same."""
-    if not any(finding.kind == "frame" for finding in found.findings):
-        return None
-    data = found.measurements.select(found.rows)
-    if found.nominal_rods.turntables:
-        assert found.nominal is not None
-        fitting = frame_of(found.nominal_rods.robot, found.nominal, data)
-    else:
-        links = nominal_links(found.nominal_rods, data, six_links(found.model, found.nominal_rods))
-        fitting = compare(links, data.q, data.r, data.R)
-    if fitting is None:
-        return None
-    return Motion(fitting.turn.T, -fitting.turn.T @ fitting.shift)
 
 
 def _transformation(motion: Motion | None) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from gantrytau_optimica.calibration.rods.groups import TAPE
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
 
 SHOWN = 3  # combinations that are named
+NOTHING_MEASURED = 1e3  # m, noise with which poses tell nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,23 +55,49 @@ def judge(
     nominal values, m. Raises ModelError for models that no robot can hold, where `expected` is not given.
     """
     checked = held_out(found) if isinstance(found, Calibration) else found
+    fit = checked.calibration
     where = "the fitted poses" if expected is None else "all planned poses"
-    expected = expected or expected_error(checked.calibration, tape=tape)
-    good = bool(checked.calibration.success and checked.error <= wanted and expected.error <= wanted)
+    expected = expected or expected_error(fit, tape=tape)
+    good = bool(fit.success and checked.error <= wanted and expected.error <= wanted)
     words = (
         f"{_validated(checked)}, {um(expected.error)} of the tool are expected over {where} by what was measured, "
         f"{um(wanted)} were wanted"
     )
     if not good:
         words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
-    return CalibrationVerdict(good, wanted, (words,), checked.error, expected.error)
+    return CalibrationVerdict(
+        good, wanted, (f"{words}.", _of_frame(fit, good, tape)), checked.error, expected.error
+    )
 
 
-def expected_error(found: Calibration, *, tape: float = TAPE) -> ToolError:
-    """The error of the tool to be expected at the poses that were fitted; tape: deviation of nominal values, m."""
+def _of_frame(found: Calibration, good: bool, tape: float) -> str:
+    """What a verdict means for coordinates in the base of the robot."""
+    if found.frame == "base":
+        return "Poses were measured in the base of the robot: its coordinates are as good as this."
+    holds = "This is good up to a frame" if good else "This holds up to a frame"
+    if found.motion is None:
+        return (
+            f"{holds}: coordinates are those of the frame measured, taken for the base of the robot; frame='base' says that "
+            "it is."
+        )
+    before = expected_error(found, tape=tape, noise=NOTHING_MEASURED)
+    return (
+        f"{holds}: R and t follow from nominal values, so that in coordinates of the base the tool may be off by "
+        f"{um(before.error)}, as before, where these are {um(tape)} off; measure in the base of the robot and take "
+        "frame='base' to know it there."
+    )
+
+
+def expected_error(found: Calibration, *, tape: float = TAPE, noise: float | None = None) -> ToolError:
+    """The error of the tool to be expected at the poses that were fitted.
+
+    tape: deviation of nominal values, m; noise: of a measured coordinate, m, by default what explains what is left.
+    """
     data = found.measurements.select(found.rows)
     poses = PoseArrays(data.q, data.r, data.R if found.plate_turns else None)
-    return tool_error(found.robot, poses, poses, noise=float(found.noise), tape=tape)
+    return tool_error(
+        found.robot, poses, poses, noise=float(found.noise if noise is None else noise), tape=tape
+    )
 
 
 def _validated(checked: CrossValidation) -> str:

@@ -36,7 +36,8 @@ end = {plate_end}
 radius = "{plate_radius}"
 
 [device]                    # kind = "laser tracker", "T-Mac", "single camera" or "stereo cameras"
-{device}        # where it stands, roughly; measurements may be in its own frame
+{device}        # where it stands, roughly
+frame = "fitted"            # measurements in its own frame, or any; "base": in that of the robot, where it is commanded
 target = [0.05, 0.0, 0.0]   # what it measures, in the frame of the tool
 {facing}
 

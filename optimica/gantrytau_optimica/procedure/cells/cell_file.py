@@ -18,6 +18,7 @@ from gantrytau_optimica.procedure.documents.rapid import check_program
 POINT = Value("m", ((3,),))
 ROTATION = Value("1", ((3, 3),))
 TEXT = Value("text")
+FRAME = Value("text", words=("fitted", "base"))
 LENGTH, ANGLE = Value("m", above=0.0), Value("rad", above=0.0)
 ERROR, TURN = Value("m", least=0.0), Value("rad", least=0.0)
 
@@ -50,7 +51,7 @@ OBSTACLES = {
     "cylinder": (kinematics.Cylinder, BAR, ("start", "end", "radius")),
     "capsule": (kinematics.Capsule, BAR, ("start", "end", "radius")),
 }
-_TARGET = {"r": POINT, "target": POINT, "facing": Value("1", ((3,),))}
+_TARGET = {"r": POINT, "target": POINT, "facing": Value("1", ((3,),)), "frame": FRAME}
 _TRACKER = _TARGET | {
     "R": ROTATION,
     "range_noise": ERROR,
@@ -99,8 +100,8 @@ class Cell:
 
     file: its path; name: of the robot, as the file names it, a model in a file by its full path; robot, limits, device:
     ready for use; values: those of the tape measure by name; tape: their standard deviation; wanted: the error of the tool
-    to be reached; poses: how many to measure, None for the usual number; plan: further keywords of `plan_calibration`;
-    program: those of `CalibrationPlan.program`.
+    to be reached; poses: how many to measure, None for the usual number; frame: in which the device measures, as of
+    `calibrate`; plan: further keywords of `plan_calibration`; program: those of `CalibrationPlan.program`.
     """
 
     file: Path
@@ -112,6 +113,7 @@ class Cell:
     tape: float
     wanted: float
     poses: int | None = None
+    frame: Any = "fitted"
     plan: Mapping[str, Any] = field(default_factory=dict)
     program: Mapping[str, Any] = field(default_factory=dict)
 
@@ -151,13 +153,15 @@ def read_cell(path: str | Path, robot: Robot | None = None) -> Cell:
     name, values = named(own["model"], file), _values(f"{whole}values", table.get("values", {}))
     goal = read_table(f"{whole}goal", table["goal"], GOAL, ("error",))
     model = robot if isinstance(robot, Model) else _found(f"{whole}robot.model", name, robot or robot_by_name)
+    device, frame = _device(f"{whole}device", table["device"])
     return Cell(
         file=file,
         name=name,
         robot=_with_values(f"{whole}values", model, values),
         values=values,
         limits=_limits(f"{whole}limits", table.get("limits", {})),
-        device=_device(f"{whole}device", table["device"]),
+        device=device,
+        frame=frame,
         tape=own["tape"],
         wanted=goal["error"],
         poses=goal.get("poses"),
@@ -256,9 +260,11 @@ def _program(place: str, table: Any) -> dict[str, Any]:
     return values
 
 
-def _device(place: str, table: Any) -> Device:
+def _device(place: str, table: Any) -> tuple[Device, Any]:
+    """The device, and the frame in which it measures."""
     make, values = _of_a_kind(place, table, DEVICES)
-    return _made(place, make, values)
+    frame = values.pop("frame", "fitted")
+    return _made(place, make, values), frame
 
 
 def _of_a_kind(place: str, table: Any, kinds: Mapping[str, Any]) -> tuple[Callable[..., Any], dict[str, Any]]:
