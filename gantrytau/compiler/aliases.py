@@ -6,9 +6,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
+import numpy as np
 
+from gantrytau.compiler.alphabets import Chains
 from gantrytau.compiler.definitions import Definitions
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.flattening.flat_model import FlatModel
@@ -17,6 +20,7 @@ from gantrytau.language.symbols import Derivative, derivative_name, derivatives_
 
 ZERO = ca.SX(0)
 LONGEST_SUM = 40  # terms; a longer sum is not looked at for aliases
+NOISE = 4 * np.finfo(float).eps  # of the terms that were added: their rounding, as in 0.1 + 0.2 - 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +63,7 @@ class Reduced:
     aliases: Mapping[str, Alias]
     unknowns: tuple[str, ...]
     known: frozenset[str]
-    chains: "Chains"
+    chains: Chains
     redundant: tuple[Equation, ...] = ()
     rates: Mapping[int, ca.SX] = field(default_factory=dict)
 
@@ -83,37 +87,35 @@ class Reduced:
         return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new)) if old else expression
 
 
-class Chains:
-    """Symbols of variables and their derivatives, the missing ones made when asked for."""
-
-    def __init__(self, flat: FlatModel):
-        self._sx: dict[str, ca.SX] = dict(flat.derivatives)
-        for variable in flat.variables:
-            self._sx.update(zip(variable.elements, variable.symbol.elements(), strict=True))
-
-    def sx(self, root: str, order: int = 0) -> ca.SX:
-        """The symbol of the order-th derivative of a variable."""
-        name = derivative_name(root, order)
-        if name not in self._sx:
-            self._sx[name] = ca.SX.sym(name)
-        return self._sx[name]
-
-    def named(self, name: str) -> ca.SX:
-        """The symbol of that name, `x` or `der(x)`."""
-        return self.sx(*split_derivative(name))
-
-    def rate(self, name: str) -> ca.SX:
-        """The symbol of the derivative of the symbol of that name."""
-        base, order = split_derivative(name)
-        return self.sx(base, order + 1)
-
-
 class _Terms:
-    """A sum of factors times symbols plus an offset of parameters."""
+    """A sum of factors times symbols, of names or of derivatives of roots, plus an offset of parameters.
+
+    sizes: of the terms that were added to a factor, by which is judged what cancels; size: of the numbers in the offset.
+    """
 
     def __init__(self) -> None:
-        self.factors: dict[str, float] = {}
-        self.offset = ZERO
+        self.factors: dict[Any, float] = {}
+        self.sizes: dict[Any, float] = {}
+        self.offset, self.size = ZERO, 0.0
+
+    def add(self, key: Any, factor: float, size: float) -> None:
+        """One more term; size: of what its factor is the sum of."""
+        self.factors[key] = self.factors.get(key, 0.0) + factor
+        self.sizes[key] = self.sizes.get(key, 0.0) + size
+
+    def shift(self, factor: float, offset: ca.SX) -> None:
+        """One more term of the offset."""
+        self.offset = _plus(self.offset, factor, offset)
+        if offset.is_constant():
+            self.size += abs(factor * float(offset))
+        if self.offset.is_constant() and abs(float(self.offset)) <= NOISE * self.size:
+            self.offset = ZERO
+
+    def left(self) -> list[tuple[Any, float]]:
+        """The terms that do not cancel."""
+        return [
+            (key, factor) for key, factor in self.factors.items() if abs(factor) > NOISE * self.sizes[key]
+        ]
 
 
 def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Reduced:
@@ -128,9 +130,13 @@ class _Elimination:
         self.parents: dict[str, Alias] = {}
         self.parameters = set(table.independent)
         self.rank: dict[str, tuple[int, ...]] = {}
+        self.sized: dict[str, int] = {}  # how well it is known how large a variable is
         for place, variable in enumerate(flat.variables):
             for name in variable.elements:
                 self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
+                self.sized[name] = 2 * variable.fixed + (
+                    variable.start is not None or variable.nominal is not None
+                )
         self.rated = [i for i, e in enumerate(flat.equations) if e.rate is not None]
         sides = table.to_reduced(
             ca.vertcat(
@@ -164,6 +170,10 @@ class _Elimination:
                 for i in used:
                     del sums[i]
                     remaining.remove(i)
+            for i, terms in sums.items():  # what cancels but for its rounding determines nothing
+                rooted = self._rooted(terms)
+                if not rooted.factors or len(rooted.left()) < len(rooted.factors):
+                    self.residuals[i] = self._written(rooted)
             if not changed:
                 break
             for i, new in zip(
@@ -219,6 +229,7 @@ class _Elimination:
             steady = {n: e for n, e in self.defined.items() if n not in done and self._steady(e)}
             if not steady:
                 return residuals
+            steady = self._without_rounding(steady)
             done |= steady.keys()
             count, names = len(residuals), list(self.defined)
             rates = list(self.rates)
@@ -234,6 +245,17 @@ class _Elimination:
             residuals = found[:count]
             self.defined = dict(zip(names, found[count:], strict=False))
             self.rates = dict(zip(rates, found[count + len(names) :], strict=True))
+
+    def _without_rounding(self, steady: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
+        """Numbers, of which those that the cosine of a right angle leaves in a matrix are zero."""
+        found = dict(steady)
+        for quantity in self.flat.propagated:
+            numbers = {
+                n: float(steady[n]) for n in quantity.elements if n in steady and steady[n].is_constant()
+            }
+            largest = max((abs(x) for x in numbers.values()), default=0.0)
+            found.update((n, ZERO) for n, x in numbers.items() if abs(x) <= NOISE * largest)
+        return found
 
     def _steady(self, expression: ca.SX) -> bool:
         return expression.is_constant() or all(
@@ -265,13 +287,13 @@ class _Elimination:
                 if split_derivative(name)[0] in self.defined:
                     return None
                 if name in self.parameters:
-                    terms.offset = terms.offset + factor * node
+                    terms.shift(factor, node)
                 elif name == self.flat.time.name():
                     return None
                 else:
-                    terms.factors[name] = terms.factors.get(name, 0.0) + factor
+                    terms.add(name, factor, abs(factor))
             elif node.is_constant():
-                terms.offset = terms.offset + factor * float(node)
+                terms.shift(factor, node)
             elif node.is_op(ca.OP_ADD):
                 stack += [(node.dep(0), factor), (node.dep(1), factor)]
             elif node.is_op(ca.OP_SUB):
@@ -285,22 +307,28 @@ class _Elimination:
             elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor * float(node.dep(1))))
             elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
-                terms.offset = terms.offset + factor * node
+                terms.shift(factor, node)
             else:
                 return None
         return None
 
-    def _use(self, terms: _Terms) -> bool:
-        """Turn the sum into an alias if at most two symbols are left in it."""
-        factors: dict[tuple[str, int], float] = {}
-        offset = terms.offset
+    def _rooted(self, terms: _Terms) -> _Terms:
+        """The same sum in roots and their derivatives."""
+        found = _Terms()
+        found.offset, found.size = terms.offset, terms.size
         for name, factor in terms.factors.items():
             alias = self.root(*split_derivative(name))
-            offset = _plus(offset, factor, alias.offset)
+            found.shift(factor, alias.offset)
             if alias.root is not None:
-                key = (alias.root, alias.order)
-                factors[key] = factors.get(key, 0.0) + factor * alias.factor
-        left = [(key, factor) for key, factor in factors.items() if abs(factor) > 1e-12]
+                found.add(
+                    (alias.root, alias.order), factor * alias.factor, terms.sizes[name] * abs(alias.factor)
+                )
+        return found
+
+    def _use(self, terms: _Terms) -> bool:
+        """Turn the sum into an alias if at most two symbols are left in it."""
+        rooted = self._rooted(terms)
+        left, offset = rooted.left(), rooted.offset
         if not left or len(left) > 2:
             return False
         if len(left) == 1:
@@ -311,7 +339,7 @@ class _Elimination:
             return True
         (a, factor_a), (b, factor_b) = left
         if a[1] == b[1] == 0:
-            if self.rank[a[0]] < self.rank[b[0]]:
+            if self._before(a[0], b[0], abs(factor_a) != abs(factor_b)):
                 a, b, factor_a, factor_b = b, a, factor_b, factor_a
         elif a[1] > 0 and b[1] == 0:
             a, b, factor_a, factor_b = b, a, factor_b, factor_a
@@ -319,6 +347,20 @@ class _Elimination:
             return False
         self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, _plus(ZERO, -1 / factor_a, offset))
         return True
+
+    def _before(self, a: str, b: str, scaled: bool) -> bool:
+        """Whether a rather than b is the root of both: of two scales that of a start, by which tolerances are meant."""
+        first, second = self.rank[a], self.rank[b]
+        if scaled and first[:2] == second[:2] and self.sized[a] != self.sized[b]:
+            return self.sized[a] > self.sized[b]
+        return first < second
+
+    def _written(self, terms: _Terms) -> ca.SX:
+        """A sum as an expression, without what cancels."""
+        found = terms.offset
+        for (root, order), factor in terms.left():
+            found = _plus(found, factor, self.chains.sx(root, order))
+        return found
 
     def _substitute(self, residuals: list[ca.SX]) -> list[ca.SX]:
         if not residuals:

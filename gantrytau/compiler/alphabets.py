@@ -18,6 +18,34 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.symbols import derivative_name, split_derivative
+
+
+class Chains:
+    """Symbols of variables and their derivatives, the missing ones made when asked for."""
+
+    def __init__(self, flat: FlatModel):
+        self._sx: dict[str, ca.SX] = dict(flat.derivatives)
+        for variable in flat.variables:
+            self._sx.update(zip(variable.elements, variable.symbol.elements(), strict=True))
+
+    def sx(self, root: str, order: int = 0) -> ca.SX:
+        """The symbol of the order-th derivative of a variable."""
+        name = derivative_name(root, order)
+        if name not in self._sx:
+            self._sx[name] = ca.SX.sym(name)
+        return self._sx[name]
+
+    def named(self, name: str) -> ca.SX:
+        """The symbol of that name, `x` or `der(x)`."""
+        return self.sx(*split_derivative(name))
+
+    def rate(self, name: str) -> ca.SX:
+        """The symbol of the derivative of the symbol of that name."""
+        base, order = split_derivative(name)
+        return self.sx(base, order + 1)
+
 
 @dataclass(frozen=True, eq=False)
 class Substitution:

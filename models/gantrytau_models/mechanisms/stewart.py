@@ -171,6 +171,7 @@ def _leg(model: str, number: int, below: np.ndarray, above: np.ndarray, way: np.
     # the first axis of the universal joint is level: of a leg that stands upright along x
     level = np.cross([0.0, 0.0, 1.0], along)
     level = level / np.linalg.norm(level) if np.linalg.norm(level) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    level[np.abs(level) < 1e-15] = 0.0  # what rounding leaves of the cosine of a right angle
     axis = level - (level @ along) * along
     return dict(
         base_offset=list(below),
