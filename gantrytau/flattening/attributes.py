@@ -10,6 +10,7 @@ from gantrytau.errors import ModelError, in_words
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Leaf, Placed
 from gantrytau.language.declarations import Parameter, StateSelect, evaluate
+from gantrytau.language.instructions import refuse_calls
 
 
 def flat_variable(placed: Placed) -> FlatVariable:
@@ -42,6 +43,8 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
             f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "
             f"parameters{why}"
         ) from error
+    if not found.is_constant():
+        refuse_calls(f"{placed.name}: {attribute}", found)
     size = len(placed.elements)
     if found.numel() == 1 and (size == 1 or attribute != "value"):
         elements = found.elements() * size

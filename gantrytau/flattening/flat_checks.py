@@ -8,6 +8,7 @@ import casadi as ca
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instantiation import Instance
+from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
@@ -23,6 +24,16 @@ def refuse_nan(equations: Iterable[Equation]) -> None:
                     "finite numbers; "
                     "functions of the module math do not work on symbols, use those of gantrytau or casadi"
                 )
+
+
+def refuse_tables(equations: Iterable[Equation]) -> None:
+    """ModelError with the name of an equation that calls what is no expression, as a table."""
+    equations = tuple(equations)
+    try:
+        refuse_calls("", *(e.residual for e in equations))
+    except ModelError:
+        for equation in equations:
+            refuse_calls(equation.name, equation.residual)
 
 
 def refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> None:

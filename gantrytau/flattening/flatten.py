@@ -7,7 +7,7 @@ from typing import Any
 from gantrytau.errors import told
 from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
-from gantrytau.flattening.flat_checks import refuse_absent, refuse_nan, refuse_starts
+from gantrytau.flattening.flat_checks import refuse_absent, refuse_nan, refuse_starts, refuse_tables
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.flattening.instants import expressed, read_events, with_expressions, with_starts
@@ -83,6 +83,7 @@ def write_out(instance: Instance) -> FlatModel:
         written_events = spread.substituted(expressed(events, instance.symbols))
         sampled, frictions = with_expressions(events, written_events)
         everything = (*written, *written_initial, *written_events)
+        refuse_tables(everything)
         refuse_nan(everything)
         spread.refuse_undefined(everything)
         absent = _absent(statements, tree)

@@ -5,6 +5,8 @@ from typing import TypeVar
 
 import casadi as ca
 
+from gantrytau.errors import ModelError
+
 Value = TypeVar("Value")
 
 
@@ -33,3 +35,19 @@ def computed(
         else:
             work[outside[0]] = operation(operator, [work[i] for i in inside])
     return [[found[i] for i in sorted(found)] for found in results]
+
+
+def refuse_calls(place: str, *expressions: ca.SX) -> None:
+    """ModelError for a call of what is no expression: a table, an external function, a callback.
+
+    CasADi evaluates it, but the derivative of such a call ends Python or is NaN (casadi 3.8).
+    """
+    whole = ca.vertcat(*(ca.vec(e) for e in expressions))
+    called = ca.Function("calls", ca.symvar(whole), [whole]).find_functions(0)
+    if called:
+        raise ModelError(
+            f"{place}: found a call of the function '{called[0].name()}', a table or a function from outside, "
+            "expected an expression of symbols; `table` is to come for tables. Until then write a formula, straight "
+            "pieces with if_else, or a casadi.Function of a formula; a course over time can be an Input with samples "
+            "(times, values)"
+        )

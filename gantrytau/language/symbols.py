@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from gantrytau.errors import ModelError
+from gantrytau.language.instructions import refuse_calls
 
 time = ca.SX.sym("time")  # the independent variable of every model, in s
 
@@ -65,6 +66,7 @@ class Symbols:
         found = self.find(expression)
         if found is not None:
             return ca.SX(0) if found.kind == "parameter" else self.derivative(found).sx
+        refuse_calls("der()", expression)
         inside, rates = [time], [ca.SX(1)]
         for leaf in ca.symvar(expression):
             symbol = self.find(leaf)

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.symbols import time
 
 
@@ -55,6 +56,7 @@ def _function(name: str, function: Callable[[Any], Any], size: int) -> list[Sign
             f"input {name}: the function of time does not work on a symbol ({reason}); write it with "
             "gantrytau.sin, exp, if_else, ..., or give samples (times, values)"
         ) from error
+    refuse_calls(f"input {name}", expression)
     if any(e.is_constant() and not np.isfinite(float(e)) for e in expression.elements()):
         raise ModelError(
             f"input {name}: the function of time does not work on a symbol (it gave {expression}); write it with "

@@ -16,6 +16,7 @@ from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.language.functions import Between
+from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.symbols import writing
 from gantrytau.simulation.signals import read_signals
 from gantrytau_optimica.problem.model_words import relation_text
@@ -79,6 +80,8 @@ def read_problem(
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
+    for one in (*asked.points, *asked.targets):
+        refuse_calls(str(one.symbol), one.expression)
     check_constraints(constraints, asked.targets)
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
     dae = translate(flat, units=False, given=_given(stages, flat), find=mentioned)
@@ -198,6 +201,7 @@ def _scalar(place: str, evaluate: Callable[[], Any]) -> ca.SX:
         ) from None
     if value.numel() != 1:
         raise ModelError(f"{place}: found shape {value.shape}, expected one number; sum it up or weigh it")
+    refuse_calls(place, value)
     return value
 
 
@@ -208,6 +212,7 @@ def _time(place: str, value: Any) -> ca.SX:
         raise ModelError(f"{place}: found {value!r}, expected a number in s or Free(...)") from None
     if time.numel() != 1:
         raise ModelError(f"{place}: found shape {time.shape}, expected one number")
+    refuse_calls(place, time)
     return time
 
 
@@ -232,6 +237,7 @@ def _constraint(place: str, statement: Any) -> list[ConstraintRow]:
     if isinstance(statement, Between):
         expression = ca.densify(ca.SX(statement.expression))
         limits = [_limit(place, bound, expression) for bound in (statement.lower, statement.upper)]
+        refuse_calls(place, expression, *limits)
         rows = zip(expression.elements(), *(limit.elements() for limit in limits), strict=True)
         return [ConstraintRow(e, low, high, f"{low} <= {e} <= {high}", place) for e, low, high in rows]
     if isinstance(statement, (bool, ca.DM)) or (isinstance(statement, ca.SX) and statement.is_constant()):
@@ -244,6 +250,7 @@ def _constraint(place: str, statement: Any) -> list[ConstraintRow]:
             f"{place}: found {statement!r}, expected a constraint; write `a == b`, `a <= b` or between(a, x, b) "
             "with symbols of the model, one by one or joined by casadi.vertcat(*list)"
         )
+    refuse_calls(place, statement)
     found: list[ConstraintRow] = []
     for element in ca.densify(statement).elements():
         equal = element.is_op(ca.OP_EQ)
