@@ -12,6 +12,7 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
 from gantrytau.errors import InitializationError, ModelError
+from gantrytau.flattening.shapes import elements_of
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 STEP = 0.3  # m or rad between stops on the way to given positions
@@ -109,19 +110,11 @@ def _jointly(
 
 
 def given_scalars(dae: Translated, given: Mapping[str, Any]) -> dict[str, float]:
-    """Values by scalar name; ModelError for unknown names, wrong lengths and numbers that are not finite."""
+    """Values by scalar name; ModelError for unknown names, wrong shapes and numbers that are not finite."""
     found: dict[str, float] = {}
     for name, value in given.items():
         elements = dae.expand(name)
-        try:
-            numbers = np.asarray(value, dtype=float).ravel(order="F")
-        except (TypeError, ValueError):
-            raise ModelError(f"{name}: found {value!r}, expected a number or an array of numbers") from None
-        if numbers.size != len(elements):
-            raise ModelError(f"{name}: found {numbers.size} values, expected {len(elements)}")
-        if not np.all(np.isfinite(numbers)):
-            raise ModelError(f"{name}: found {numbers.tolist()}, expected finite numbers")
-        found.update(zip(elements, numbers.tolist(), strict=True))
+        found.update(zip(elements, elements_of(name, value, dae.flat.shape(name)), strict=True))
     return found
 
 

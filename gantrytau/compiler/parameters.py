@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau.compiler.alphabets import values_at
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
+from gantrytau.flattening.shapes import fits
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +63,15 @@ def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatP
     elements = list(parameter.value)
     if parameter.name in values:
         array = _numbers(parameter.name, values[parameter.name])
-        if array.shape != parameter.shape:
+        if not fits(array.shape, parameter.shape):
             raise ModelError(f"{parameter.name}: value has shape {array.shape}, expected {parameter.shape}")
         elements = [ca.SX(float(x)) for x in array.ravel(order="F")]
     for index, name in enumerate(parameter.elements):
         if name in values and name != parameter.name:
             number = _numbers(name, values[name])
-            if number.shape:
+            if not fits(number.shape, ()):
                 raise ModelError(f"{name}: value has shape {number.shape}, expected ()")
-            elements[index] = ca.SX(float(number))
+            elements[index] = ca.SX(float(number.item()))
     for name, element in zip(parameter.elements, elements, strict=True):
         if element.is_constant() and not np.isfinite(float(element)):
             raise ModelError(f"{name}: value is {element}, expected a finite number")

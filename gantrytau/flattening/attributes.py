@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from gantrytau.errors import ModelError, in_words
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Leaf, Placed
+from gantrytau.flattening.shapes import fits, joined, numpy_shape
 from gantrytau.language.declarations import Parameter, StateSelect, evaluate
 from gantrytau.language.instructions import refuse_calls
 
@@ -36,7 +36,7 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
     try:
         value = evaluate(value, leaf.scope)
-        found = ca.densify(ca.SX(_array(value)))
+        found = joined(value)
     except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
         why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
         raise ModelError(
@@ -48,24 +48,17 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     size = len(placed.elements)
     if found.numel() == 1 and (size == 1 or attribute != "value"):
         elements = found.elements() * size
-    elif found.numel() == size and (len(placed.shape) < 2 or found.shape == placed.shape):
+    elif fits(numpy_shape(found), placed.shape):
         elements = found.elements()
     else:
-        shape = () if found.numel() == 1 else found.shape if found.shape[1] != 1 else (found.shape[0],)
-        raise ModelError(f"{placed.name}: {attribute} has shape {shape}, expected {placed.shape}")
+        raise ModelError(
+            f"{placed.name}: {attribute} has shape {numpy_shape(found)}, expected {placed.shape}"
+            + ("; give rows of columns" if len(placed.shape) == 2 else "")
+        )
     bad = [e for e in elements if e.is_constant() and not _allowed(float(e), attribute)]
     if bad:
         raise ModelError(f"{placed.name}: {attribute} is {bad[0]}, expected a finite number")
     return tuple(elements)
-
-
-def _array(value: Any) -> Any:
-    """A list of numbers, of rows of numbers, or of symbols as one array."""
-    if not isinstance(value, (list, tuple)):
-        return value
-    if any(isinstance(item, (ca.SX, ca.DM)) for item in value):
-        return ca.vertcat(*value)
-    return ca.DM(np.asarray(value, dtype=float))
 
 
 def _allowed(value: float, attribute: str) -> bool:

@@ -162,6 +162,11 @@ class FlatModel:
         known = [n for v in self.vectors.values() for n in (v.name, *v.elements)]
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Shape of what `expand` lists: of a whole quantity or a derivative of it, () of a scalar."""
+        whole = self.vectors.get(split_derivative(name).root)
+        return whole.shape if whole else ()
+
     @cached_property
     def hints(self) -> Mapping[str, str]:
         """Scalar name -> the likely cause where the equations do not determine it."""

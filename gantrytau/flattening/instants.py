@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip
+from gantrytau.flattening.shapes import joined
 from gantrytau.language.events import Sampling, Sticking
 from gantrytau.language.statements import Equation, Requirement
 from gantrytau.language.symbols import Symbol, Symbols, scalars
@@ -114,18 +114,14 @@ def _single(found: Sequence[Symbol], place: str) -> str:
 
 
 def _sized(value: Any, shape: tuple[int, int], place: str, role: str) -> list[ca.SX]:
-    """An expression as scalars, column after column, of a wanted shape; a row may stand for a column."""
+    """An expression as scalars, column after column, of a wanted shape."""
     try:
-        if isinstance(value, (list, tuple)):
-            symbolic = any(isinstance(item, ca.SX) for item in value)
-            value = ca.vertcat(*value) if symbolic else ca.DM(np.asarray(value, dtype=float))
-        found = ca.SX(value)
+        found = joined(value)
     except (NotImplementedError, RuntimeError, TypeError, ValueError) as error:
         raise ModelError(
             f"{place}: found {role} {value!r}, expected a number or an expression of symbols"
         ) from error
-    vectors = 1 in found.shape and 1 in shape
-    if found.numel() != shape[0] * shape[1] or (found.shape != shape and not vectors):
+    if found.shape != shape:
         raise ModelError(f"{place}: {role} has shape {found.shape}, expected {shape}; correct it")
     return scalars(found)
 

@@ -42,10 +42,10 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,) or (n, k)),
-    joined by straight lines; an input that is not named keeps its start value. parameters: name -> value;
-    outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the integrator gets
-    a tenth, and errors of long motions add up); points: of the result.
+    start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,), (n, k) or
+    (n, rows, columns)), joined by straight lines; an input that is not named keeps its start value.
+    parameters: name -> value; outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the
+    integrator gets a tenth, and errors of long motions add up); points: of the result.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values.
     """
@@ -59,7 +59,7 @@ def simulate(
         dae.expand(name)
     if any(split_derivative(name)[1] for name in wanted):
         dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
-    signals = read_signals(inputs or {}, dae.expand)
+    signals = read_signals(inputs or {}, dae.flat)
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)
     grid = np.linspace(start, stop, points)

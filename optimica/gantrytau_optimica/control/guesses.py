@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError, Result
+from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
@@ -103,34 +104,43 @@ def _given(dae: Dae, given: Mapping[str, Any], horizon: tuple[float, float]) -> 
             if alias is None or alias.root is None:
                 continue
             offset = dae.number(alias.offset)
-            found[alias.symbol] = _one(name, value, k, len(elements), alias.factor, offset, horizon[0], span)
+            scale = (alias.factor, offset)
+            found[alias.symbol] = _one(name, value, k, dae.flat.shape(name), scale, horizon[0], span)
     return found
 
 
 def _one(
-    name: str, value: Any, k: int, size: int, factor: float, offset: float, start: float, span: float
+    name: str,
+    value: Any,
+    k: int,
+    shape: tuple[int, ...],
+    scale: tuple[float, float],
+    start: float,
+    span: float,
 ) -> Guess:
+    """The course of the k-th element of a quantity, which is factor * symbol + offset by its `scale`."""
     function: Any = value
 
     def guess(fraction: np.ndarray) -> np.ndarray:
         try:
             if isinstance(value, Stretched):
-                raw = value.at(fraction)[:, None]
+                arrays = list(np.asarray(value.at(fraction)))
             elif callable(value):
-                raw = np.array(
-                    [np.ravel(function(start + f * span)) for f in np.atleast_1d(fraction)], dtype=float
-                )
+                arrays = [
+                    np.asarray(function(start + f * span), dtype=float) for f in np.atleast_1d(fraction)
+                ]
             else:
-                raw = np.tile(np.ravel(np.asarray(value, dtype=float)), (np.size(fraction), 1))
+                arrays = [np.asarray(value, dtype=float)]
         except Exception as error:  # of a function that is not ours
             raise ModelError(
                 f"guess {name}: {type(error).__name__}: {error}; expected a number, an array or a function of time"
             ) from error
-        if raw.shape[1] != size:
-            raise ModelError(f"guess {name}: found {raw.shape[1]} values, expected {size}")
-        if not np.all(np.isfinite(raw)):
+        for one in arrays:
+            check_shape(f"guess {name}", np.shape(one), () if isinstance(value, Stretched) else shape)
+        column = np.array([np.ravel(one, order="F")[k] for one in arrays])
+        if not np.all(np.isfinite(column)):
             raise ModelError(f"guess {name}: found values that are not finite")
-        return (raw[:, k] - offset) / factor
+        return (np.broadcast_to(column, np.shape(fraction)) - scale[1]) / scale[0]
 
     return guess
 

@@ -15,6 +15,7 @@ import numpy as np
 from gantrytau import Model, ModelError, der
 from gantrytau.errors import did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
+from gantrytau.flattening.shapes import numpy_shape
 from gantrytau.language.model import Declared
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.estimation.experiments import Experiment, is_free
@@ -85,6 +86,7 @@ def _phase(model: Model, experiment: Experiment, factor: float) -> Optimization:
                 raise ModelError(
                     f"measured {name}: found samples of {columns} columns, expected {found.numel()}"
                 )
+            samples.check_shape(f"measured {name}", numpy_shape(found))
             for one, column in zip(ca.vec(found).elements(), single_columns(samples), strict=True):
                 total = total + factor * sum_of_squares(one, column)
         return total

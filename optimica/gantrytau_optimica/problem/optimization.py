@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Parameter
+from gantrytau.flattening.shapes import numpy_shape
 from gantrytau_optimica.problem.samples import Samples
 
 
@@ -165,7 +166,10 @@ def _target(words: str, expression: Any, samples: Samples, integrated: bool) -> 
         raise ModelError(f"{words} was used outside of an optimisation problem; use it in objective()")
     if not isinstance(samples, Samples):
         raise ModelError(f"{words}: found {samples!r}, expected Samples(times, values)")
-    expression = ca.vec(_signals(words, expression, asked.points))
+    expression = _signals(words, expression, asked.points)
+    if expression.numel() == samples.values.shape[1]:
+        samples.check_shape(words, numpy_shape(expression))
+    expression = ca.vec(expression)
     if expression.numel() != samples.values.shape[1]:
         raise ModelError(
             f"{words}: found {expression.numel()} expressions and samples of {samples.values.shape[1]} columns, expected "

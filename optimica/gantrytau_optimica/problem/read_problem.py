@@ -179,14 +179,11 @@ def _courses(name: str, stages: list[tuple[str, Any]], dae: Dae) -> dict[str, ca
             if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
                 value = told(f"{name}, input {full}", partial(Samples, *value))
             if isinstance(value, Samples):
-                if value.values.shape[1] != len(elements):
-                    raise ModelError(
-                        f"input {full}: found {value.values.shape[1]} columns, expected {len(elements)}"
-                    )
+                value.check_shape(f"input {full}", dae.flat.shape(full))
                 found.update((e, (value, k)) for k, e in enumerate(elements))
             else:
                 found.update(
-                    {n: s for n, s in read_signals({full: value}, dae.expand).items() if isinstance(s, ca.SX)}
+                    {n: s for n, s in read_signals({full: value}, dae.flat).items() if isinstance(s, ca.SX)}
                 )
     return found
 

@@ -5,6 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.flattening.shapes import fits
 
 LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, across which nothing is known
 
@@ -12,11 +13,11 @@ LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, acro
 class Samples:
     """Measured values of k signals at n times.
 
-    times: (n,) in s, rising; values: (n,) or (n, k) in the unit of what they are compared with; deviation: standard
-    deviation of one value, a number, (k,) or (n, k); 1 where it is not known, which `weighted` tells; kind: "linear"
-    or "constant" (each value holds until the next) between samples; largest_gap: s, distance of two samples beyond
-    which the course between them is unknown (default: ten times the median distance). Raises ModelError for NaN, for
-    repeated or unsorted times, and for shapes that do not fit.
+    times: (n,) in s, rising; values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of what they are
+    compared with; deviation: standard deviation of one value, a number or of the shape of one or of all samples; 1 where
+    it is not known, which `weighted` tells; kind: "linear" or "constant" (each value holds until the next) between
+    samples; largest_gap: s, distance of two samples beyond which the course between them is unknown (default: ten
+    times the median distance). Raises ModelError for NaN, for repeated or unsorted times, and for shapes that do not fit.
     """
 
     def __init__(
@@ -34,14 +35,16 @@ class Samples:
             self.values = self.values[:, None]
         if (
             self.times.ndim != 1
-            or self.values.ndim != 2
+            or self.values.ndim not in (2, 3)
             or self.values.shape[0] != self.times.size
             or not self.times.size
         ):
             raise ModelError(
                 f"Samples: found times of shape {np.shape(times)} and values of shape {np.shape(values)}, expected (n,) and "
-                "(n,) or (n, k)"
+                "(n,), (n, k) or (n, rows, columns)"
             )
+        self.shape = self.values.shape[1:]
+        self.values = self._as_columns(self.values)
         if kind not in ("linear", "constant"):
             raise ModelError(f"Samples: found kind={kind!r}, expected 'linear' or 'constant'")
         self.kind = kind
@@ -52,6 +55,10 @@ class Samples:
 
     def __repr__(self) -> str:
         return f"<Samples: {self.times.size} of {self.values.shape[1]}, {self.times[0]:g} to {self.times[-1]:g} s>"
+
+    def _as_columns(self, values: np.ndarray) -> np.ndarray:
+        """One column for each element, those of a matrix column after column, (n, k)."""
+        return values.reshape(self.times.size, -1, order="F")
 
     def _check(self) -> None:
         bad = np.flatnonzero(~(np.isfinite(self.times) & np.all(np.isfinite(self.values), axis=1)))
@@ -77,7 +84,7 @@ class Samples:
     def _deviations(self, deviation: Any) -> np.ndarray:
         found = _numbers("deviation", deviation)
         try:
-            whole = np.broadcast_to(found, self.values.shape).copy()
+            whole = self._as_columns(np.broadcast_to(found, (self.times.size, *self.shape)).copy())
         except ValueError:
             raise ModelError(
                 f"Samples: found deviation of shape {found.shape}, expected a number, (k,) or the shape of the values "
@@ -86,6 +93,14 @@ class Samples:
         if not np.all(np.isfinite(whole)) or np.any(whole <= 0):
             raise ModelError("Samples: found a deviation that is not above 0, expected standard deviations")
         return whole
+
+    def check_shape(self, place: str, shape: tuple[int, ...]) -> None:
+        """ModelError unless each sample has the shape of what it is compared with."""
+        if not fits(self.shape, shape):
+            words = f"found {self.values.shape[1]} columns, expected {int(np.prod(shape))}"
+            if len(shape) == 2:
+                words += f": samples of shape {self.shape} for a matrix {shape}; give values of shape (n, rows, columns)"
+            raise ModelError(f"{place}: {words}")
 
     def require(self, what: str, start: float, final: float, between: bool) -> None:
         """ModelError if samples lie outside of the horizon; with `between`, if they do not cover it or have a gap."""
