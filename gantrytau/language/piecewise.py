@@ -52,6 +52,9 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     moving = [names is None or leaf.name() in names for leaf in leaves]
     if not any(moving):
         return Switched(tuple(expressions), ())
+    function = ca.Function("switched", [ca.vertcat(*leaves)], [whole])
+    if not any(function.instruction_id(k) in _SWITCHING for k in range(function.n_instructions())):
+        return Switched(tuple(expressions), ())
     reader = _Walk([])
     (found,) = computed(
         ca.Function("switched", [ca.vertcat(*leaves)], [whole], {"cse": True}),
@@ -68,6 +71,10 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     return Switched(tuple(shaped), tuple(reader.switches))
 
 
+_COMPARING = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_IF_ELSE_ZERO)
+_KINKED = (ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX, ca.OP_SIGN, ca.OP_COPYSIGN)
+_STEPPING = (ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FMOD, ca.OP_REMAINDER)
+_SWITCHING = frozenset((*_COMPARING, *_KINKED, *_STEPPING))
 _Value = tuple[ca.SX, bool]  # an expression, and whether it moves with the symbols asked for
 
 

@@ -9,8 +9,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import values_at
-from gantrytau.compiler.blocks.tearing import tear
+from gantrytau.compiler.blocks.tearing import switching_places, tear
 from gantrytau.compiler.translated import Translated
+from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 
@@ -26,12 +27,12 @@ def dependents(dae: Translated) -> list[tuple[int, str]]:
     jacobian = ca.jacobian(f, x)
     numbers = values_at(jacobian, dae.start)[None]
     # only an equation that is differentiated as often as the variable gives it as it is
-    slopes = ca.jacobian(
-        ca.vertcat(*(indexed.residuals[i, 0] for i in rows)), ca.vertcat(*(chains.sx(n) for n in columns))
-    )
+    positions = ca.vertcat(*(chains.sx(n) for n in columns))
+    smooth = switched([ca.vertcat(*(indexed.residuals[i, 0] for i in rows))], set(columns))
+    slopes = ca.jacobian(smooth.expressions[0], positions)
     steady = {
         (i, j) for i, j, e in entries(slopes) if all(s.name() in dae.table.values for s in ca.symvar(e))
-    }
+    } - switching_places(smooth, positions)
     whole = np.array(
         [
             [indexed.counts[i] == indexed.orders[n] and (a, b) in steady for b, n in enumerate(columns)]

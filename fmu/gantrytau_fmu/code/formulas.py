@@ -12,6 +12,7 @@ import casadi as ca
 
 from gantrytau import Dae
 from gantrytau.compiler.system import System
+from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.fmu_starts import Starts, starts_of
@@ -180,7 +181,8 @@ def _blocks(
 
 
 def _block(names: Sequence[str], unknowns: ca.SX, residual: ca.SX, frictions: bool) -> ImplicitBlock:
-    linear = not ca.depends_on(ca.jacobian(residual, unknowns), unknowns)
+    smooth = not switched([residual], set(names)).switches
+    linear = smooth and not ca.depends_on(ca.jacobian(residual, unknowns), unknowns)
     return ImplicitBlock(tuple(names), unknowns, residual, linear, frictions)
 
 

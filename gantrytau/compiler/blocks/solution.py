@@ -13,10 +13,12 @@ import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
+from gantrytau.compiler.blocks.pieces import PieceChoice, in_pieces
 from gantrytau.compiler.blocks.pivots import Guide, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
-from gantrytau.compiler.blocks.tearing import tear
+from gantrytau.compiler.blocks.tearing import switching_places, tear
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import split_derivative
 
 LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by unrolled elimination
@@ -26,9 +28,9 @@ LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by un
 class Block:
     """Equations that are solved together.
 
-    kind: "explicit", "linear", "quadratic", "spheres" or "nonlinear"; tears: symbols found from `residuals`
-    first; inner: the other unknowns as (symbol, expression of tears and earlier unknowns), in order;
-    solution: the tears in closed form, or None; root: the square root among them, or None.
+    kind: "explicit", "linear", "quadratic", "spheres", "piecewise" or "nonlinear"; tears: symbols found from
+    `residuals` first; inner: the other unknowns as (symbol, expression of tears and earlier unknowns), in order;
+    solution: the tears in closed form, or None; root: the square root among them, or None; pieces: of a piecewise one.
     """
 
     kind: str
@@ -39,6 +41,7 @@ class Block:
     inner: tuple[tuple[ca.SX, ca.SX], ...]
     solution: tuple[ca.SX, ...] | None
     root: QuadraticRoot | None = None
+    pieces: PieceChoice | None = None
     pairs: tuple[tuple[Key, str], ...] = ()  # equations solved for one unknown each
 
     @property
@@ -105,11 +108,13 @@ def solve_block(
     """The solution of one block; `guide` have a number for every symbol in it."""
     x = ca.vertcat(*(symbols[n] for n in unknowns))
     f = ca.vertcat(*(residuals[k] for k in equations))
-    jacobian = ca.jacobian(f, x)
+    smooth = switched([f], {leaf.name() for leaf in x.elements()})
+    jacobian = ca.jacobian(smooth.expressions[0], x)
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     if len(unknowns) == 1:
         return _finish(equations, unknowns, (x,), (f,), (), guide, ((equations[0], unknowns[0]),))
-    numbers = guide.around(jacobian)
+    numbers = guide.around(ca.densify(with_modes(smooth, [jacobian])[0]))
+    barred = switching_places(smooth, x)
     partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
     partner = {i: places.get(name, -1) for i, name in partners.items()}
@@ -122,7 +127,7 @@ def solve_block(
     ]
     tried = []
     for way in ways:
-        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way))
+        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, barred=barred, **way))
         if len(tried[-1].tears) <= max(len(first), 1):
             break
     torn = min(tried, key=lambda one: len(one.tears))
@@ -142,12 +147,16 @@ def solve_block(
 def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block:
     """Closed form for what is left after tearing, if there is one."""
 
-    def block(kind: str, solution=None, root=None) -> Block:
-        return Block(kind, equations, unknowns, tears, residuals, inner, solution, root, pairs)
+    def block(kind: str, solution=None, root=None, pieces=None) -> Block:
+        return Block(kind, equations, unknowns, tears, residuals, inner, solution, root, pieces, pairs)
 
     if not tears:
         return block("explicit", ())
     y, f = ca.vertcat(*tears), ca.vertcat(*residuals)
+    smooth = switched([f], {tear.name() for tear in tears})
+    if smooth.switches:
+        found = in_pieces(smooth, y, guide)
+        return block("nonlinear") if found is None else block("piecewise", found[0], pieces=found[1])
     jacobian = ca.jacobian(f, y)
     if not ca.depends_on(jacobian, y):
         if len(tears) == 1:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.blocks.pivots import reliable
+from gantrytau.language.piecewise import Switched, with_modes
 
 RELAXED_PIVOT = 0.1  # smallest pivot relative to its row, at all sample points, that is divided by
 
@@ -32,12 +33,14 @@ def tear(
     partner: Mapping[int, int],
     first: Set[int],
     steady: Collection[str] | None = None,
+    barred: Collection[tuple[int, int]] = (),
 ) -> Torn:
     """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
 
     relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
     partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
-    first: columns that are torn before others; steady: if given, only pivots of these symbols are accepted.
+    first: columns that are torn before others; steady: if given, only pivots of these symbols are accepted;
+    barred: places that are no pivots.
     """
     largest = np.abs(numbers).max(axis=2, keepdims=True)
     sizes = reliable(numbers, largest)
@@ -46,7 +49,8 @@ def tear(
     solvable: set[tuple[int, int]] = set()
     for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
         incidence[i].add(j)
-        if steady is not None and not all(leaf.name() in steady for leaf in ca.symvar(entry)):
+        moves = steady is not None and not all(leaf.name() in steady for leaf in ca.symvar(entry))
+        if moves or (i, j) in barred:
             large = False
         elif i in partner:
             large = partner[i] == j and sizes[i, j] > 0
@@ -57,6 +61,25 @@ def tear(
         if large:
             solvable.add((i, j))
     return _search(incidence, solvable, first, set(partner.values()))
+
+
+def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
+    """Places (equation, unknown) where something in an equation switches on the unknown, or the pivot jumps.
+
+    smooth: the equations as one column, with modes.
+    """
+    if not smooth.switches:
+        return set()
+    residual, modes = smooth.expressions[0], ca.vertcat(*(s.mode for s in smooth.switches))
+    margins = ca.vertcat(*with_modes(smooth, [s.margin for s in smooth.switches]))
+    by_unknown = np.array(ca.DM(ca.jacobian_sparsity(margins, x), 1))
+    by_mode = np.array(ca.DM(ca.jacobian_sparsity(residual, modes), 1))
+    found = {(int(i), int(j)) for i, j in zip(*np.nonzero(by_mode @ by_unknown), strict=True)}
+    slopes = ca.jacobian(residual, x)
+    for i, j, slope in zip(*slopes.sparsity().get_triplet(), slopes.nonzeros(), strict=True):
+        if ca.depends_on(slope, modes):
+            found.add((i, j))
+    return found
 
 
 def _search(

@@ -1,0 +1,48 @@
+"""How large the terms are that an expression is the sum of: what rounding errors, and small residuals, are measured by."""
+
+from collections.abc import Sequence
+
+import casadi as ca
+
+from gantrytau.language.instructions import computed
+
+_Sized = tuple[ca.SX, ca.SX]  # an expression, and the size of its terms
+_SUMS = (ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX)
+_SAME = (ca.OP_NEG, ca.OP_FABS, ca.OP_ASSIGN)
+
+
+def term_sizes(expressions: Sequence[ca.SX]) -> list[ca.SX]:
+    """For each scalar expression the sum of the absolute values of what it adds up, symbols being exact.
+
+    a * b + c has the size |a| |b| + |c|, also where the sum is zero.
+    """
+    leaves = ca.symvar(ca.vertcat(*expressions))
+    dense = [ca.densify(e) for e in expressions]
+    (found,) = computed(
+        ca.Function("sized", [ca.vertcat(*leaves)], [ca.vertcat(*dense)], {"cse": True}),
+        lambda _, i: (leaves[i], ca.fabs(leaves[i])),
+        lambda value: (ca.SX(value), ca.SX(abs(value))),
+        _operation,
+    )
+    return [size for _, size in found]
+
+
+def _operation(operator: int, operands: list[_Sized]) -> _Sized:
+    apply = ca.SX.unary if len(operands) == 1 else ca.SX.binary
+    value = apply(operator, *(e for e, _ in operands))
+    a, b = operands[0][1], operands[-1][1]
+    if operator in _SUMS:
+        return value, a + b
+    if operator in _SAME:
+        return value, a
+    if operator == ca.OP_TWICE:
+        return value, 2 * a
+    if operator == ca.OP_SQ:
+        return value, a**2
+    if operator == ca.OP_MUL:
+        return value, a * b
+    if operator == ca.OP_DIV:
+        return value, a / ca.fabs(operands[1][0])
+    if operator == ca.OP_IF_ELSE_ZERO:
+        return value, ca.if_else(operands[0][0], b, 0)
+    return value, ca.fabs(value)
