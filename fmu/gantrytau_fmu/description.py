@@ -4,6 +4,7 @@ One set of records, written and read: `export_fmu` makes them of a model, and th
 of the files. FMI 3.0.2, sections 2.2 and 2.4; FMI 2.0.4, section 2.2.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,6 +13,7 @@ from typing import Literal
 
 Interfaces = Literal["model-exchange", "co-simulation"]
 Value = float | int | bool | str | tuple[float | int | bool | str, ...]
+C_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 @dataclass(frozen=True)

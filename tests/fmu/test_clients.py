@@ -207,3 +207,19 @@ def test_casadi_reads_back_the_equations(fmu):
         by_x, by_u = (np.array(ca.densify(e)) for e in slopes(x, u, found))
         assert by_x == pytest.approx(jacobian[:, 1 : 1 + states], abs=bound)
         assert by_u == pytest.approx(jacobian[:, 1 + states : 1 + states + len(u)], abs=bound)
+
+
+@pytest.mark.parametrize("name", ["three-link"], indirect=True)
+def test_casadi_knows_the_slopes_by_parameters(fmu):
+    import casadi as ca
+
+    builder = ca.DaeBuilder("read", str(fmu.folder))
+    parameters = list(builder.p())
+    rates = builder.create("rates", ["x", "u", "p"], ["ode"])
+    truth = Numbers(fmu.dae)
+    p = np.array([fmu.dae.table.values[n] for n in parameters])
+    order = [list(fmu.dae.system().parameters).index(n) for n in parameters]
+    slopes = truth.jacobian(0.0, truth.x, truth.u)[:, 1 + truth.x.size + truth.u.size :][:, order]
+    found = np.array(ca.densify(rates.jacobian()(truth.x, truth.u, p, 0)[2]))
+    assert np.abs(slopes).max() > 1  # masses and friction act at the start
+    assert found == pytest.approx(slopes, abs=1e-12 * np.abs(slopes).max())

@@ -310,7 +310,6 @@ def _structure(
 ) -> ModelStructure:
     """Outputs, derivatives and initial unknowns, each with what it depends on."""
     formulas, found, variables = listed.formulas, listed.places_of, listed.variables
-    count = 1 + len(formulas.states) + len(formulas.inputs)
     names = ("time", *formulas.states, *formulas.inputs, *formulas.parameters)
     references = np.array([found[n] for n in names], dtype=int)
     solved = {formulas.states[k] for k in formulas.starts.solved}
@@ -323,9 +322,6 @@ def _structure(
         known = sorted(references[np.flatnonzero(chosen)].tolist())
         return Unknown(variables[reference].name, tuple(variables[k].name for k in known))
 
-    def limited(row: np.ndarray) -> np.ndarray:
-        return row & (np.arange(row.size) < count)
-
     # what initial equations determine depends on all that they may hold
     at_start = {
         r: (row | first) if (row & ~first).any() else row & first for r, row in {**by_output, **rates}.items()
@@ -333,8 +329,8 @@ def _structure(
     at_start |= {found[n]: first for n in solved}
     calculated = [r for r in at_start if variables[r].initial == "calculated"]
     return ModelStructure(
-        outputs=tuple(unknown(r, limited(row)) for r, row in by_output.items()),
-        derivatives=tuple(unknown(r, limited(row)) for r, row in rates.items()),
+        outputs=tuple(unknown(r, row) for r, row in by_output.items()),
+        derivatives=tuple(unknown(r, row) for r, row in rates.items()),
         initial_unknowns=tuple(unknown(r, at_start[r] & first) for r in sorted(calculated)),
         indicators=indicators,
     )

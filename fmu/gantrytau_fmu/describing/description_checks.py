@@ -10,12 +10,11 @@ from dataclasses import astuple
 from math import isfinite
 
 from gantrytau.errors import ModelError
-from gantrytau_fmu.description import FmuDescription, FmuVariable, Unknown, Value
+from gantrytau_fmu.description import C_NAME, FmuDescription, FmuVariable, Unknown, Value
 
 LETTERS = r"(?:[A-Za-z_]\w*|'(?:[\w!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['\"?\\abfnrtv])+')"
 IDENTIFIER = rf"{LETTERS}(?:\[\d+(?:,\d+)*\])?(?:\.{LETTERS}(?:\[\d+(?:,\d+)*\])?)*"
 STRUCTURED = re.compile(rf"(?:{IDENTIFIER}|der\({IDENTIFIER}(?:,\d+)?\))", re.ASCII)
-C_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 INT32 = range(-(2**31), 2**31)
 
 EXACT, FOUND, ANY = ("exact",), ("calculated", "approx"), ("calculated", "exact", "approx")

@@ -4,7 +4,6 @@ FMI 2.0.4, sections 2.2 and 2.3; FMI 3.0.2, sections 2.4 and 2.5.
 """
 
 import math
-import re
 from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
@@ -36,10 +35,6 @@ def _header(fmu: FmuFile) -> Iterator[FmuFinding]:
             "error", "the GUID or instantiation token is empty, expected one to tell versions apart"
         )
     for interface in fmu.interfaces:
-        if not re.fullmatch(r"[A-Za-z_]\w*", interface.identifier or "", re.ASCII):
-            yield FmuFinding(
-                "error", f"modelIdentifier '{interface.identifier}' of {interface.kind} is no name in C"
-            )
         if interface.capabilities.get("needsExecutionTool"):
             yield FmuFinding(
                 "note", f"{interface.kind} needs the tool {fmu.tool or 'that made it'} on this machine"

@@ -4,6 +4,7 @@ import importlib
 import os
 import re
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from xml.etree import ElementTree
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.description import (
+    C_NAME,
     Experiment,
     FmuInterface,
     FmuTerminal,
@@ -70,7 +72,7 @@ def read_fmu(path: str | os.PathLike[str]) -> FmuFile:
     """Describe an FMU of FMI 2.0 or 3.0 without loading its binaries.
 
     Raises ModelError for an archive that is damaged or unsafe (see `safety.open_archive`), for FMI 1.0 and other
-    versions, and for a model description that breaks its schema or contradicts itself.
+    versions, for a model description that breaks its schema or contradicts itself, and for names that no tool can use.
     """
     files = read_files(path)
     if problems := schema_problems(files):
@@ -146,7 +148,31 @@ def model_of(files: FmuTexts) -> Any:
     from fmpy.model_description import read_model_description
 
     with _consistent(files.path):
-        return read_model_description(files.packed(), validate=False)  # type: ignore[arg-type]
+        model = read_model_description(files.packed(), validate=False)  # type: ignore[arg-type]
+    refuse_names(files.path, model)
+    return model
+
+
+def refuse_names(path: str | Path, model: Any) -> None:
+    """ModelError for a modelIdentifier that is no name in C, and for variables that cannot be told apart.
+
+    Binaries are looked up, and sources compiled, under the identifier: a path or a command must not be taken for one.
+    model: FMPy's ModelDescription. FMI 2.0.4, section 2.2.1; FMI 3.0.2, section 2.4.1.
+    """
+    for attribute, kind in _KINDS.items():
+        interface = getattr(model, attribute)
+        if interface is not None and not C_NAME.fullmatch(interface.modelIdentifier or ""):
+            raise ModelError(
+                f"{path}: found the modelIdentifier {interface.modelIdentifier!r} of {kind}, expected a name in C "
+                "(letters, digits, '_'); do not run it, and ask its author for another export"
+            )
+    counts = Counter(variable.name for variable in model.modelVariables)
+    twice = [name for name, count in counts.items() if count > 1]
+    if twice:
+        raise ModelError(
+            f"{path}: found the variable {twice[0]!r} {counts[twice[0]]} times, expected each name once; "
+            "ask its author for another export"
+        )
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.results.series import split_element
+from gantrytau_fmu.reading.read_fmu import refuse_names
 
 KINDS = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean", "String": "text"}
 SETTABLE = ("parameter", "structuralParameter", "input", "output", "local")
@@ -181,6 +182,7 @@ def _description(file: str | Path, folder: Path) -> Any:
         raise ModelError(
             f"{file}: found FMI {description.fmiVersion}, expected 2.0 or 3.0; export it again from its tool"
         )
+    refuse_names(file, description)
     return description
 
 

@@ -247,3 +247,19 @@ def test_changed_letters_never_raise_anything_else(path, make, text):
         except GantryTauError:
             refused += 1
     assert 0 < refused <= len(places)
+
+
+@pytest.mark.parametrize("identifier", ["../lag", "lag;ls", "la g", "1ag", ""])
+def test_an_identifier_that_is_no_name_in_c_is_refused(path, identifier):
+    said = FMI3.replace(
+        '<CoSimulation modelIdentifier="lag"', f'<CoSimulation modelIdentifier="{identifier}"'
+    )
+    with pytest.raises(
+        ModelError, match=re.escape(f"found the modelIdentifier {identifier!r} of co-simulation")
+    ):
+        read_fmu(lag3(path, said))
+
+
+def test_a_variable_that_is_there_twice_is_refused(path):
+    with pytest.raises(ModelError, match="found the variable 'u' 2 times, expected each name once"):
+        read_fmu(lag2(path, FMI2.replace('name="y"', 'name="u"')))
