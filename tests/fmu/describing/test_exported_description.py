@@ -225,7 +225,9 @@ def test_dependencies_are_exactly_the_slopes_that_are_not_zero(name, exported):
     found = [{k for k, there in zip(known, row, strict=True) if there} for row in rows]
     parameters = set(known[1 + truth.x.size + truth.u.size :])
     assert [row - parameters for row in found] == [listed[u] - parameters for u in unknown]
-    assert all(row <= listed[u] for row, u in zip(found, unknown, strict=True))  # a mass may cancel in numbers only
+    assert all(
+        row <= listed[u] for row, u in zip(found, unknown, strict=True)
+    )  # a mass may cancel in numbers only
 
 
 def test_a_filter_at_rest_follows_its_input_from_the_first_instant(exported):
