@@ -193,6 +193,10 @@ def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str,
             rows = [(reader.line_num, row) for row in reader if "".join(row).strip()]
     except OSError as error:
         raise ModelError(f"{path}: found no file to read ({error.strerror}), expected a CSV file") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ModelError(
+            f"{path}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
+        ) from None
     if not rows:
         raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
     header = [name.strip() for name in rows[0][1]]

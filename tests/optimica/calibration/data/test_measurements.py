@@ -163,3 +163,14 @@ def test_one_row_and_many_in_words():
     one, two = ([*range(30), *more] for more in ([3], [3, 5]))
     assert "row 30 repeats earlier rows" in Measurements(q[one], r[one]).findings[0].message
     assert "rows 30 and 31 repeat earlier rows" in Measurements(q[two], r[two]).findings[0].message
+
+
+@pytest.mark.parametrize("content", [b"\x00\x01\xd5\xff", "q1,q2,q3,x,y,z".encode("utf-16")])
+def test_files_that_are_no_text(tmp_path, content):
+    path = tmp_path / "measurements.csv"
+    path.write_bytes(content)
+    with pytest.raises(
+        ModelError,
+        match=r"measurements\.csv: cannot be read as text \(.*save it as CSV with the encoding UTF-8",
+    ):
+        Measurements.read(path)
