@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.consistent_start import consistent_start
-from gantrytau.compiler.start.start_values import StartValues
+from gantrytau.compiler.start.start_values import StartValues, contradicts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
 from gantrytau.errors import InitializationError, ModelError
@@ -24,10 +24,11 @@ def evaluate(dae: Translated, given: dict[str, Any]) -> dict[str, Any]:
     scalars = given_scalars(dae, given)
     parameters = {n: v for n, v in scalars.items() if n in dae.table.symbols}
     if parameters:
-        rest = {n: v for n, v in scalars.items() if n not in parameters}
+        rest = {n: v for n, v in given.items() if not parameters.keys() & set(dae.expand(n))}
         return evaluate(retranslate(dae, with_values(dae.flat, parameters)), rest)
     values = dict(dae.start)
     held: set[str] = set()
+    sizes = {n: float(np.max(np.abs(x))) for whole, x in given.items() for n in dae.expand(whole)}
     for name, number in scalars.items():
         if name == dae.flat.time.name():
             values[name] = number
@@ -37,13 +38,14 @@ def evaluate(dae: Translated, given: dict[str, Any]) -> dict[str, Any]:
             raise ModelError(f"{dae.name}: {name} is propagated, not a variable; give what it follows from")
         if alias.root is None:
             offset = dae.number(alias.offset)
-            if abs(number - offset) > 1e-9 * max(1.0, abs(offset)):
+            if contradicts(number, offset, sizes[name]):
                 raise InitializationError(
                     f"{name}: found {number:g}, but it is constant and equal to {offset:g}"
                 )
             continue
         symbol, value = alias.symbol, dae.number(alias.root_value(number))
-        if symbol in held and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
+        size = (sizes[name] + abs(dae.number(alias.offset))) / abs(alias.factor)
+        if symbol in held and contradicts(values[symbol], value, size):
             raise InitializationError(
                 f"{name}: found {number:g}, which contradicts another given value of the same quantity"
             )

@@ -9,7 +9,7 @@ from gantrytau.errors import ModelError, in_words
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Leaf, Placed
 from gantrytau.flattening.shapes import fits, joined, numpy_shape
-from gantrytau.language.declarations import Parameter, StateSelect, evaluate
+from gantrytau.language.declarations import Formula, Parameter, StateSelect, evaluate
 from gantrytau.language.instructions import refuse_calls
 
 
@@ -34,9 +34,13 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
     """An attribute as one SX per scalar of a quantity; one number may stand for all starts or limits."""
     leaf: Leaf = placed.attributes[attribute]
     value = leaf.value.value if isinstance(leaf.value, Parameter) and not leaf.value.name else leaf.value
+    if leaf.scope is None and (isinstance(value, Formula) or callable(value)):
+        raise ModelError(
+            f"{placed.name}: {attribute}: found a formula in a modification of the outermost model, around which there is "
+            "no model whose parameters it could name, expected numbers; declare it in the body of a subclass"
+        )
     try:
-        value = evaluate(value, leaf.scope)
-        found = joined(value)
+        found = joined(evaluate(value, leaf.scope))
     except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
         why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
         raise ModelError(

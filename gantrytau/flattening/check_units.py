@@ -1,7 +1,8 @@
 """Checks that the two sides of every equation, and the terms of every sum, have one dimension.
 
 A number has no unit of its own: in a product it counts as one, in a sum it takes the unit of its
-neighbours. Quantities declared without a unit fit anywhere.
+neighbours. Quantities declared without a unit fit anywhere. Formulas of parameters, starts and limits are checked as
+equations are. The time times a number is taken as an angle: `sin(3 * time)` is what everybody writes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,18 +15,20 @@ from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instants import unit_equations
 from gantrytau.language.instructions import computed
+from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 from gantrytau.language.units import ONE, Dimension, dimension, unit_text
 
 NUMBER = "number"
 ANY = "any"
+CLOCK = {ca.OP_MUL, ca.OP_DIV, ca.OP_ADD, ca.OP_SUB}  # with a number, what makes another time of the time
 Unit = Dimension | str
 
 SAME = {
     ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_HYPOT, ca.OP_FMOD, ca.OP_REMAINDER, ca.OP_COPYSIGN,
 }  # fmt: skip
 RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
-KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
+KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
 ANGLES = {
     getattr(ca, f"OP_{name.upper()}"): name
     for name in [
@@ -54,11 +57,12 @@ SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 
 
 class Dimensioned(NamedTuple):
-    """An expression as it is written, its unit, and what is wrong with it."""
+    """An expression as it is written, its unit, what is wrong with it, and whether it is the time but for numbers."""
 
     unit: Unit
     text: str
     fault: str = ""
+    clock: bool = False
 
 
 def check_units(flat: FlatModel) -> None:
@@ -74,7 +78,7 @@ def check_units(flat: FlatModel) -> None:
         ),
     ]
     symbols += list(flat.derivatives.values())
-    for equations in (flat.equations, flat.initial_equations, unit_equations(flat)):
+    for equations in (flat.equations, flat.initial_equations, unit_equations(flat), _attributes(flat)):
         sides = [side for e in equations for side in (e.left, e.right)]
         terms = _terms(symbols, units, sides)
         for equation, *pair in zip(equations, terms[::2], terms[1::2], strict=True):
@@ -87,6 +91,23 @@ def check_units(flat: FlatModel) -> None:
                     f"{equation.name}: units disagree in `{equation.text[:160]}`: the left side is in "
                     f"{_text(left)}, the right side in {_text(right)}; correct the equation or a declaration"
                 )
+
+
+def _attributes(flat: FlatModel) -> list[Equation]:
+    """Formulas of parameters, starts, limits and requirements as equations."""
+    found: list[Equation] = []
+    for one in (*flat.variables, *flat.parameters):
+        stated = {key: getattr(one, key, None) for key in ("value", "start", "min", "max", "nominal")}
+        for key, formulas in stated.items():
+            for name, symbol, formula in zip(
+                one.elements, one.symbol.elements(), formulas or (), strict=False
+            ):
+                if not formula.is_constant():
+                    found.append(Equation(symbol, formula, one.owner, "", 0, label=f"{name}: {key}"))
+    for one in flat.requirements:
+        condition, label = ca.SX(one.condition), f"{one.path or 'the model'}: require"
+        found.append(Equation(condition, condition, one.path, one.model, 0, label=label))
+    return found
 
 
 def symbol_units(flat: FlatModel) -> Mapping[str, Unit]:
@@ -113,7 +134,8 @@ def _terms(
     symbols: Sequence[ca.SX], units: Mapping[str, Unit], expressions: Sequence[ca.SX]
 ) -> list[Dimensioned]:
     """Scalar expressions with their units."""
-    terms = [Dimensioned(units[s.name()], s.name()) for s in symbols]
+    clock = symbols[0].name()  # the time stands first
+    terms = [Dimensioned(units[s.name()], s.name(), clock=s.name() == clock) for s in symbols]
     function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
     found = computed(
         function, lambda k, _: terms[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
@@ -128,8 +150,14 @@ def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
     if operator in (ca.OP_POW, ca.OP_CONSTPOW) and units[1] == NUMBER:
         constant = Fraction(words[1]).limit_denominator(1000)
     unit, fault = _unit(operator, units, words, constant)
+    if fault and operator in ANGLES and operands[0].clock:
+        fault = None
     carried = next((term.fault for term in operands if term.fault), "")
-    return Dimensioned(unit, _words(operator, words), carried or fault or "")
+    plain = [term for term in operands if term.unit != NUMBER]
+    clock = (
+        bool(plain) and all(term.clock and term.unit == unit for term in plain) and operator in CLOCK | KEEP
+    )
+    return Dimensioned(unit, _words(operator, words), carried or fault or "", clock)
 
 
 def _unit(
@@ -153,8 +181,6 @@ def _unit(
         return _product(first, second, Fraction(1)), None
     if operation == ca.OP_DIV:
         return _product(first, second, Fraction(-1)), None
-    if operation == ca.OP_TWICE:
-        return first, None
     if operation in POWERS:
         return _power(first, POWERS[operation]), None
     if operation in (ca.OP_POW, ca.OP_CONSTPOW):
@@ -166,8 +192,8 @@ def _unit(
             return ONE, None
         name = ANGLES[operation]
         return ONE, (
-            f"the argument of {name}, `{words[0][:60]}`, is in {_text(first)}, expected 1 or rad; "
-            "divide it by a Parameter with that unit"
+            f"the argument of {name}, `{words[0][:60]}`, is in {_text(first)}, expected 1 or rad; a number has no unit, so "
+            f"make its factor a Parameter(..., unit='{unit_text(_times(ONE, first, Fraction(-1)))}')"
         )
     if operation == ca.OP_IF_ELSE_ZERO:
         return second, None

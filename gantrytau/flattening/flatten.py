@@ -177,13 +177,12 @@ def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str
     """Inputs that stay known from outside: not bound, not connected, not set by an enclosing component."""
     owners = {n: p.path for p in instance.quantities if p.declaration.kind == "input" for n in p.elements}
     for equation in equations:
-        for side in (equation.left, equation.right):
+        # a binding sets the variable on its left, and reads what is on its right
+        for side in (equation.left,) if equation.model == "binding" else (equation.left, equation.right):
             symbol = instance.symbols.find(side)
-            if symbol is not None and symbol.name in owners and equation.path != owners[symbol.name]:
-                inside = owners[symbol.name].startswith(equation.path) or equation.model in (
-                    "binding",
-                    "connection",
-                )
-                if inside:
+            owner = owners.get(symbol.name, equation.path) if symbol is not None else equation.path
+            if symbol is not None and owner != equation.path:
+                around = not equation.path or owner.startswith((f"{equation.path}.", f"{equation.path}["))
+                if around or equation.model in ("binding", "connection"):
                     del owners[symbol.name]
     return tuple(owners)

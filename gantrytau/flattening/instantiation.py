@@ -19,7 +19,7 @@ from gantrytau.language.model import (
     is_setting,
     refuse_container,
 )
-from gantrytau.language.symbols import Symbols, element_names
+from gantrytau.language.symbols import Symbols, element_names, time
 
 ATTRIBUTES = (
     "start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "description", "undetermined",
@@ -174,6 +174,11 @@ class _Builder:
 
     def _quantity(self, instance: Any, path: str, name: str, declaration: Quantity, modification: Any):
         full = f"{path}.{name}" if path else name
+        if full == time.name():
+            raise ModelError(
+                f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
+                f"model; expected another name, as {full}_left"
+            )
         attributes = {
             key: Leaf(getattr(declaration, key), instance)
             for key in ATTRIBUTES

@@ -2,9 +2,22 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, StructureError, der, simulate, translate
+from gantrytau import (
+    InitializationError,
+    Input,
+    Model,
+    Parameter,
+    Real,
+    Start,
+    StructureError,
+    cos,
+    der,
+    simulate,
+    translate,
+)
 
 DECADES = (1e-30, 1.38e-23, 2e-13, 1e-9, 1.0, 1e9, 1e23)
 
@@ -105,3 +118,51 @@ def test_small_differences_of_large_terms_are_kept():
             yield self.a - 1e15 * self.v + self.b == 3.0 * self.v
 
     assert translate(Difference()).evaluate({"v": 2.0})["b"] == 6.0
+
+
+class Small(Model):
+    x = Input(start=1.0)
+    y = Real()
+    zero = Real(3)
+
+    def equations(self):
+        yield self.y == self.x
+        yield self.zero == 0 * np.ones(3)
+
+
+def test_small_values_that_contradict_each_other_are_refused():
+    dae = translate(Small())
+    assert dae.evaluate({"x": 3e-10, "y": 3e-10})["y"] == 3e-10
+    for given, words in (
+        ({"x": 1e-10, "y": 2e-10}, r"y: found 2e-10, which contradicts another given value"),
+        ({"zero[1]": 2e-10}, r"zero\[1\]: found 2e-10, but it is constant and equal to 0"),
+        ({"zero": [0.0, 2e-10, 0.0]}, r"zero\[1\]: found 2e-10, but it is constant and equal to 0"),
+    ):
+        with pytest.raises(InitializationError, match=words):
+            dae.evaluate(given)
+
+
+def test_small_fixed_starts_that_contradict_each_other_are_refused():
+    class Twice(Model):
+        x = Real(start=1e-10, fixed=True)
+        y = Real(start=2e-10, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == -self.x
+            yield self.y == self.x
+
+    with pytest.raises(InitializationError, match=r"y: fixed start 2e-10 contradicts the fixed start of x"):
+        translate(Twice())
+    assert translate(Twice(y=Start(2e-10))).start["x"] == 1e-10
+
+
+def test_the_rounding_of_an_element_is_judged_by_its_vector():
+    class Level(Model):
+        r = Real(2)
+        phi = Input(start=0.0)
+
+        def equations(self):
+            yield self.r[0] == 0.5 * cos(self.phi)
+            yield self.r[1] == 0
+
+    assert translate(Level()).evaluate({"r": [0.5 * math.cos(0.3), 1e-17], "phi": 0.3})["r"][1] == 0.0

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.parameters import ParameterTable
@@ -29,8 +30,9 @@ def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> Start
         if variable.start is None:
             continue
         numbers = table.numbers(ca.vertcat(*variable.start))
+        size = float(np.max(np.abs(numbers)))
         for name, number in zip(variable.elements, numbers, strict=True):
-            _place(variable, name, float(number), reduced, values, owners, fixed)
+            _place(variable, name, float(number), size, reduced, values, owners, fixed)
     for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
         values[event.name] = _own_start(flat, table, event.name)
     values.update(table.values)
@@ -45,17 +47,25 @@ def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
     return table.number(variable.start[variable.elements.index(name)])
 
 
-def _place(variable: FlatVariable, name: str, number: float, reduced, values, owners, fixed) -> None:
+def contradicts(one: float, other: float, size: float) -> bool:
+    """Whether two numbers of one quantity differ by more than rounding; size: of the terms or the vector they are of."""
+    return abs(one - other) > 1e-9 * max(abs(one), abs(other), size)
+
+
+def _place(
+    variable: FlatVariable, name: str, number: float, size: float, reduced, values, owners, fixed
+) -> None:
     alias, table = reduced.aliases[name], reduced.table
+    size += abs(table.number(alias.offset))
     if alias.root is None:
         constant = table.number(alias.offset)
-        if variable.fixed and abs(number - constant) > 1e-9 * max(1.0, abs(constant)):
+        if variable.fixed and contradicts(number, constant, size):
             raise InitializationError(
                 f"{name}: found the fixed start {number:g}, but it is constant and equal to {constant:g}; leave it out"
             )
         return
     symbol, value = alias.symbol, table.number(alias.root_value(number))
-    if variable.fixed and symbol in fixed and abs(values[symbol] - value) > 1e-9 * max(1.0, abs(value)):
+    if variable.fixed and symbol in fixed and contradicts(values[symbol], value, size / abs(alias.factor)):
         raise InitializationError(
             f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
             "it is an alias; "
