@@ -78,7 +78,7 @@ class Started(Model):
     """Attributes of every kind, an initial equation, an output, a third derivative."""
 
     a = Parameter(2.0, unit="1/s", description='the "rate"')
-    b = Parameter(lambda self: ca.sqrt(self.a) * 3, unit="1/s", min=0.0)
+    b = Parameter(lambda self: ca.sqrt(18 * self.a**2) / 2, unit="1/s", min=0.0)
     x = Real(2, unit="m", start=[0.5, -1.5], fixed=True, description="place \\ way")
     w = Real(unit="m", start=1e-5, min=-10.0, prefer=StateSelect.AVOID)
     u = Input(unit="m/s3", start=1.0)
