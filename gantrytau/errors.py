@@ -59,6 +59,12 @@ class SolveError(GantryTauError):
         self.result: Any = result
         self.optimum: Any = optimum
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether it stopped because Ctrl-C was pressed."""
+        status = getattr(self.optimum, "status", "")
+        return isinstance(self.__context__, KeyboardInterrupt) or status == "interrupted"
+
 
 def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     """The closest of `names` as a question that ends a message, or what there is if none is close.

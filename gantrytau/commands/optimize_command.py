@@ -3,7 +3,8 @@
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -21,6 +22,7 @@ from gantrytau.commands.printing.reporting import (
     INTERRUPTED,
     MISUSE,
     as_json,
+    fail,
     note,
     refusing,
     reporting,
@@ -83,15 +85,42 @@ def optimize(
             optimum = _solved(chosen, quiet, policy)
         except SolveError as error:
             _leave(error, chosen, save, json)
-        files, wrong = _written(optimum, save, drawn, place)
-        if json:
-            found = optimum_summary.summary(chosen, optimum, files)
-            typer.echo(as_json({**found, "error": wrong} if wrong else found))
+        _answer(optimum, chosen, flat, Asked(save, drawn, place, json))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is wanted of an optimum: a file, pictures of variables and their place, and JSON."""
+
+    save: Path | None
+    drawn: tuple[str, ...]
+    place: str | None
+    json: bool
+
+
+def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", asked: Asked) -> None:
+    """Files first, then the report; Ctrl-C in between costs no file."""
+    files: list[str] = []
+    try:
+        wrong = _written(optimum, asked, files)
+        record = optimum_summary.summary(chosen, optimum, files) if asked.json else None
+        refinement = optimum.refinement
+        missed = str(refinement) if refinement is not None and not refinement.reached else ""
+        said = "\n".join(words for words in (wrong, missed) if words)
+        if record is not None:
+            typer.echo(as_json({**record, "error": said} if said else record))
         else:
             optimum_summary.show(optimum, flat, files)
-        if wrong:
-            note(wrong)
-            raise typer.Exit(MISUSE)
+    except KeyboardInterrupt:
+        if asked.save is not None and not files:
+            with suppress(KeyboardInterrupt, GantryTauError):  # pressed once more, it is written nevertheless
+                result_output.save(optimum.result, asked.save)
+                files.append(str(asked.save))
+        words = f"; written: {', '.join(files)}" if files else "; nothing was written"
+        fail(f"Interrupted{words}", INTERRUPTED, asked.json)
+    if said:
+        note(said)
+        raise typer.Exit(MISUSE if wrong else FAULT)
 
 
 def _flat(chosen: Chosen, drawn: tuple[str, ...]) -> "FlatModel":
@@ -115,38 +144,47 @@ def _solved(chosen: Chosen, quiet: bool, policy: dict[str, Any]) -> "Optimum":
 
 
 @contextmanager
-def _live(name: str, quiet: bool) -> Iterator[Callable[[int, float], None] | None]:
+def _live(name: str, quiet: bool) -> Iterator[Callable[..., None] | None]:
     """A line on the terminal that follows the solver; none where nobody would see it."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
-    from rich.text import Text
 
-    begin = time.perf_counter()
-    with Console(file=sys.stderr).status(Text(f"translating and building {name}")) as status:
-        yield lambda iteration, objective: status.update(
-            Text(
-                f"{name}: iteration {iteration}, objective {objective:.6g}, {time.perf_counter() - begin:.1f} s"
-            )
-        )
+    line = _Line(f"translating and building {name}")
+    with Console(file=sys.stderr).status(line):
+
+        def progress(iteration: int, objective: float, stage: str = "") -> None:
+            place = f"{stage}, " if stage else ""
+            line.words = f"{name}: {place}iteration {iteration}, objective {objective:.6g}"
+
+        yield progress
 
 
-def _written(
-    optimum: "Optimum", save: Path | None, drawn: tuple[str, ...], place: str | None
-) -> tuple[list[str], str]:
-    """The files of a solution, and why some are not written, which does not cost the answer."""
-    files: list[str] = []
+class _Line:
+    """Words and the seconds that it takes already, which go on while nothing is reported."""
+
+    def __init__(self, words: str):
+        self.words, self.begin = words, time.perf_counter()
+
+    def __rich__(self) -> Any:
+        from rich.text import Text
+
+        return Text(f"{self.words}, {time.perf_counter() - self.begin:.1f} s")
+
+
+def _written(optimum: "Optimum", asked: Asked, files: list[str]) -> str:
+    """Write the files of a solution, named in `files`; why some are not written, which does not cost the answer."""
     wrong: list[str] = []
     try:
-        files += result_output.save(optimum.result, save)
+        files += result_output.save(optimum.result, asked.save)
     except GantryTauError as error:
         wrong.append(str(error))
     try:
-        files += picture_output.draw(optimum, drawn, place) if place else []
+        files += picture_output.draw(optimum, asked.drawn, asked.place) if asked.place else []
     except GantryTauError as error:
         wrong.append(str(error))
-    return files, "\n".join(wrong)
+    return "\n".join(wrong)
 
 
 def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> NoReturn:
@@ -154,14 +192,16 @@ def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> 
     optimum = error.optimum
     if optimum is None:
         raise error
-    pressed = optimum.status == "interrupted"
+    pressed = error.interrupted
     message, files = solver_options.SPELLING.of(error), []
-    if save is not None and optimum.iterations > 0:
+    if save is not None and (optimum.success or optimum.iterations > 0):
         kept = save.with_name(f"{save.stem}.unfinished{save.suffix}")  # a solution saved before stays
         try:
             files = result_output.save(optimum.result, kept)
             message += f"\nWhat was reached until then is in {kept}"
-            if kept.suffix.lower() in FORMATS and (pressed or "limit reached" in optimum.status):
+            if kept.suffix.lower() in FORMATS and (
+                optimum.success or pressed or "limit reached" in optimum.status
+            ):
                 message += f"; --guess {kept} goes on from there"
         except GantryTauError as wrong:
             message += f"\nWhat was reached cannot be saved: {wrong}"

@@ -19,8 +19,10 @@ from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.problem_checks import one_point
 from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
+from gantrytau_optimica.refinement.reached import Reached
 from gantrytau_optimica.refinement.refinement import with_ramps
-from gantrytau_optimica.solving.ipopt import Progress, Solver
+from gantrytau_optimica.solving.clock import Clock, Progress
+from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.transcription.mesh import with_jumps
 from gantrytau_optimica.transcription.shooting import shoot
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -55,7 +57,8 @@ def optimize(
     controls: input -> dict(kind="constant" | "linear" | "ramps", elements=1, max_step=None, step_penalty=0.0).
     refine: relative accuracy to which limits and conditions hold when played back, and to which the objective stands.
     starts: first guesses that are tried; `.search` of the answer tells the branches they led to.
-    tolerance: of Ipopt; max_time: s, of one solve; progress: called with (iteration, objective).
+    tolerance: of Ipopt; max_time: s, of the whole call: a refinement that is not done ends with its best round;
+    progress: called with (iteration, objective), and stage= if it takes it: "round 2 of at most 13: playing back".
     record: a file or folder to which inputs, versions and verdict are written as JSON, whatever the outcome.
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
@@ -66,21 +69,25 @@ def optimize(
     )  # fmt: skip
     if record is not None:
         require_place(record)
-    begun, clock = datetime.now(UTC), time.perf_counter()
-    read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
-    read_time = time.perf_counter() - clock
-    found: Optimum | None = None
-    try:
-        found = prepare_with(read, (), policy).solve()
-        return found
-    except SolveError as error:
-        found = error.optimum
-        raise
-    finally:
-        if record is not None and found is not None:
-            write_record(
-                found, record, problem=problem, options=policy.given, started=begun, read_time=read_time
-            )
+    begun, clock = datetime.now(UTC), Clock(max_time, progress)
+    reached = Reached(clock)
+    with reached.kept():
+        read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
+        details = dict(problem=problem, options=policy.given, started=begun, read_time=max_time - clock.left)
+        found: Optimum | None = None
+        try:
+            found = reached.best = replace(prepare_with(read, (), policy), reached=reached).search()
+            return found
+        except SolveError as error:
+            found = error.optimum
+            raise
+        except KeyboardInterrupt:
+            found = reached.best
+            raise
+        finally:
+            if record is not None and found is not None:
+                clock.enter("writing the record")
+                write_record(found, record, **details)
 
 
 def prepare(

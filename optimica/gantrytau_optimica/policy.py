@@ -10,7 +10,8 @@ import numpy as np
 from gantrytau import ModelError, Result
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.solving.ipopt import Progress, SolverSettings
+from gantrytau_optimica.solving.clock import Progress
+from gantrytau_optimica.solving.ipopt import SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of
 from gantrytau_optimica.transcription.scheme import Collocation, collocation
 

@@ -19,8 +19,10 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.policy import Guesses
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import searched
+from gantrytau_optimica.refinement.reached import LATE, Reached
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
-from gantrytau_optimica.solving.ipopt import Solver
+from gantrytau_optimica.solving.clock import Clock
+from gantrytau_optimica.solving.ipopt import Pressed, Solver, SolverSettings
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, share_of
@@ -32,6 +34,7 @@ STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh i
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
+LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 ROUNDS = 6  # of solving again with points at moving times read from other elements
 
 UNSETTLED = "not settled: values at moving times leave the elements that they are read from"
@@ -39,7 +42,6 @@ REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
     "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
     "time limit reached": "Allow more with max_time=, or try another guess=.",
-    "interrupted": "What was reached so far is in .optimum.",
     "diverging: the problem may be unbounded": "Limit what runs away, or try another guess= or starts=.",
 }
 
@@ -56,6 +58,7 @@ class Prepared:
     refine: float | None = None
     starts: int = 1
     near: bool = False  # whether the guess is a solution
+    reached: Reached | None = None  # by the call at hand
 
     def __repr__(self) -> str:
         size, rows = self.program.places.size, self.program.assembled.rows
@@ -63,7 +66,14 @@ class Prepared:
 
     def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
-        read = self.built.read
+        settings = self.solver.settings
+        reached = Reached(Clock(settings.max_time, settings.progress))
+        with reached.kept():
+            return replace(self, reached=reached).search(parameters, guess)
+
+    def search(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
+        """`solve` as a part of a call that has `reached` something already, and looks after Ctrl-C itself."""
+        read, reached = self.built.read, self._reached
         given = self.guess if guess is None else read_guesses(guess, read)
         values = self._values(parameters or {})
         free = tuple(self._number(n, values, given) for n in self.built.problem.free)
@@ -74,11 +84,12 @@ class Prepared:
         lost = out_of_reach(built)
         if lost:
             unsolved = self.solver.unsolved(program, first_guess(program))
+            reached.keep(Optimum(read.name, built, program, unsolved, self.build_time))
             raise SolveError(
                 f"{read.name}: no solution: {reach_text(lost)}. Correct these conditions, or the "
                 "parameters of the model.",
                 equations=[x.equation for x in lost],
-                optimum=Optimum(read.name, built, program, unsolved, self.build_time),
+                optimum=reached.best,
             )
         first = first_guess(program)
         if isinstance(guess, Optimum) and guess.program.assembled is self.program.assembled:
@@ -91,18 +102,29 @@ class Prepared:
 
         def solve(program: Program, first: np.ndarray) -> Optimum:
             """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none."""
-            found = self._solved(optimum.built, program, Solver(program, again), first)
-            worse = found.objective - optimum.objective > STRAYED * max(abs(optimum.objective), 1e-9)
-            if (found.success and not worse) or found.status in ("interrupted", "time limit reached"):
+            found = self._solved(optimum.built, program, self._solver(program, again), first)
+            worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
+            if (found.success and not worse) or not reached.clock.left:
                 return found
-            close = self._solved(optimum.built, program, Solver(program, replace(again, near=True)), first)
+            close = self._solved(
+                optimum.built, program, self._solver(program, replace(again, near=True)), first
+            )
             return (
                 close
                 if close.success and not (found.success and found.objective < close.objective)
                 else found
             )
 
-        return refined(optimum, self.refine, solve)
+        return refined(optimum, self.refine, solve, reached)
+
+    @property
+    def _reached(self) -> Reached:
+        assert self.reached is not None
+        return self.reached
+
+    def _solver(self, program: Program, settings: SolverSettings) -> Solver:
+        """A solver that ends with the call."""
+        return Solver(program, replace(settings, max_time=max(self._reached.clock.left, LEAST_TIME)))
 
     def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
@@ -111,7 +133,8 @@ class Prepared:
             return solved_or_raise(self._alone(built, program, first, near))
         settings = self.solver.settings
         coarse = self._coarse(built)
-        solver = Solver(coarse, replace(settings, max_iterations=min(settings.max_iterations, MOST_TRIED)))
+        most = min(settings.max_iterations, MOST_TRIED)
+        solver = self._solver(coarse, replace(settings, max_iterations=most))
 
         def solve(problem: ControlProblem) -> Optimum:
             guesses = {s.name: s.guess for s in problem.signals}
@@ -121,19 +144,25 @@ class Prepared:
                 replace(built, problem=guessed.problem), guessed, solver, first_guess(guessed)
             )
 
-        best = searched(solve, built, self.starts)
+        clock = self._reached.clock
+        best = searched(solve, built, self.starts, clock)
         if best.search is None:
             return solved_or_raise(best)
+        self._reached.keep(best)
         if coarse.assembled is program.assembled:
             return solved_or_raise(best)
-        close = Solver(program, replace(settings, near=True))
+        close = self._solver(program, replace(settings, near=True))
         found: list[Optimum] = []
-        for branch in best.search.branches[:MOST_BRANCHES]:
+        branches = best.search.branches[:MOST_BRANCHES]
+        for number, branch in enumerate(branches, 1):
+            clock.enter(f"branch {number} of {len(branches)}, on the whole mesh")
             nearby = warm_start(list(branch.optimum.phases.values()), program)
             for one in (close, self.solver):
                 found.append(self._solved(built, program, one, nearby))
-                if found[-1].success or found[-1].status == "interrupted":
+                if found[-1].success or not clock.left:
                     break
+        if not clock.left and not any(o.success for o in found):
+            raise self._reached.stopped(LATE)
         optimum = min((o for o in found if o.success), key=lambda o: o.objective, default=found[0])
         return solved_or_raise(replace(optimum, search=best.search))
 
@@ -142,18 +171,18 @@ class Prepared:
         if near:
             settings = self.solver.settings
             most = min(settings.max_iterations, MOST_AGAIN)
-            nearby = Solver(program, replace(settings, near=True, max_iterations=most))
+            nearby = self._solver(program, replace(settings, near=True, max_iterations=most))
             optimum = self._solved(built, program, nearby, first)
-            if optimum.success or optimum.status == "interrupted":
+            if optimum.success:
                 return optimum
         optimum = self._solved(built, program, self.solver, first)
-        if optimum.success or self.refine is None or optimum.status in ("interrupted", "time limit reached"):
+        if optimum.success or self.refine is None or not self._reached.clock.left:
             return optimum
         layouts = program.places.layouts
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        solver = Solver(plain, self.solver.settings)
+        solver = self._solver(plain, self.solver.settings)
         free = self._solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
             return optimum
@@ -174,19 +203,26 @@ class Prepared:
         return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
 
     def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
-        """Where the solver ends from a first guess of the unknowns of a program."""
-        solution = solver.solve(program, first)
-        for number in range(ROUNDS):
-            if not solution.success or not program.astray(solution.w):
-                break
-            program = _relocated(program, solution.w, confined=number == ROUNDS - 1)
-            built = replace(built, problem=program.problem)
-            solution = Solver(program, solver.settings).solve(program, solution.w)
+        """Where the solver ends from a first guess of the unknowns of a program; what was reached knows it as well."""
+        clock = self._reached.clock
+        try:
+            solution = solver.solve(program, first, clock)
+            for number in range(ROUNDS):
+                if not solution.success or not program.astray(solution.w):
+                    break
+                program = _relocated(program, solution.w, confined=number == ROUNDS - 1)
+                built = replace(built, problem=program.problem)
+                solution = self._solver(program, solver.settings).solve(program, solution.w, clock)
+        except Pressed as pressed:
+            self._reached.keep(Optimum(built.read.name, built, program, pressed.solution, self.build_time))
+            raise
         if solution.success:
             program.require_points(solution.w)
             if program.astray(solution.w):
                 solution = replace(solution, success=False, status=UNSETTLED)
-        return Optimum(built.read.name, built, program, solution, self.build_time)
+        optimum = Optimum(built.read.name, built, program, solution, self.build_time)
+        self._reached.keep(optimum)
+        return optimum
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
         found: dict[str, float] = {}

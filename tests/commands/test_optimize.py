@@ -312,6 +312,86 @@ def test_ctrl_c_keeps_what_was_found(unsolved, move, tmp_path, monkeypatch):
     assert "With --save what was reached would have been kept" in unsolved(INTERRUPTED, move)["error"]
 
 
+def at_stage(monkeypatch, stage):
+    """Let Ctrl-C be pressed as a stage of the work begins."""
+    solve = gantrytau_optimica.optimize
+
+    def pressed(problem, **policy):
+        def press(iteration, objective, stage=""):
+            if stage == press.wanted:
+                signal.raise_signal(signal.SIGINT)
+
+        press.wanted = stage
+        return solve(problem, **{**policy, "progress": press})
+
+    monkeypatch.setattr(gantrytau_optimica, "optimize", pressed)
+
+
+def test_ctrl_c_in_a_refinement_keeps_the_last_solution(run, move, tmp_path, monkeypatch):
+    at_stage(monkeypatch, "round 2 of at most 13: playing back")
+    arguments = (
+        "optimize",
+        move,
+        "--elements",
+        "7",
+        "--refine",
+        "1e-6",
+        "--save",
+        tmp_path / "move.csv",
+        "--json",
+    )
+    found = run(*arguments)
+    assert found.exit_code == INTERRUPTED
+    record = json.loads(found.stdout)
+    kept = tmp_path / "move.unfinished.csv"
+    assert record["files"] == [str(kept)]
+    assert record["success"] is True
+    assert record["refinement"]["reached"] is False
+    assert record["refinement"]["stopped"] == "interrupted"
+    assert (
+        "interrupted at round 2 of at most 13: playing back; found until then: a solution on"
+        in record["error"]
+    )
+    assert f"What was reached until then is in {kept}; --guess {kept} goes on from there" in record["error"]
+    assert ".optimum" not in record["error"]
+    assert columns(kept)["cart.x [m]"][-1] == pytest.approx(1.0, abs=1e-6)  # solved
+
+
+def test_ctrl_c_in_the_report_does_not_cost_the_files(run, move, tmp_path, monkeypatch):
+    def pressed(*arguments):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("gantrytau.commands.printing.optimum_summary.show", pressed)
+    table = tmp_path / "move.csv"
+    found = run("optimize", move, "--save", table)
+    assert (found.exit_code, found.stderr.splitlines()[-1]) == (INTERRUPTED, f"Interrupted; written: {table}")
+    assert columns(table)["cart.x [m]"][-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_an_accuracy_that_is_not_reached_is_told_to_programs(run, move, tmp_path, monkeypatch):
+    monkeypatch.setattr("gantrytau_optimica.refinement.refinement.MOST_ROUNDS", 1)
+    table = tmp_path / "move.csv"
+    arguments = ("optimize", move, "--elements", "7", "--refine", "1e-9", "--save", table)
+    spoken, printed = run(*arguments), run(*arguments, "--json")
+    assert (spoken.exit_code, printed.exit_code) == (FAULT, FAULT)
+    record = json.loads(printed.stdout)
+    assert record["refinement"]["accuracy"] == 1e-9
+    assert record["refinement"]["reached"] is False
+    assert len(record["refinement"]["rounds"]) == 2
+    assert record["error"].startswith("NOT refined to 1e-09 in 2 rounds")
+    assert record["error"] in spoken.stderr
+    assert record["files"] == [str(table)]  # it is a solution, of which the error is known
+    assert columns(table)["time [s]"][-1] == pytest.approx(fastest(), rel=1e-2)
+
+
+def test_a_refined_answer_is_told_to_be(answer, move):
+    found = answer("optimize", move, "--elements", "7", "--refine", "1e-6")
+    assert found["refinement"]["reached"] is True
+    assert found["refinement"]["stopped"] is None
+    assert found["refinement"]["rounds"][0]["elements"] == 7
+    assert answer("optimize", move)["refinement"] is None
+
+
 def test_what_cannot_be_saved_does_not_hide_why_it_stopped(unsolved, move, tmp_path):
     (tmp_path / "move.unfinished.csv").mkdir()
     report = unsolved(FAULT, move, "--max-iterations", "2", "--save", tmp_path / "move.csv")

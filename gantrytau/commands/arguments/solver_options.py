@@ -32,7 +32,8 @@ MaxIterations = Annotated[
     int, typer.Option(min=1, help="After which the solver gives up.", rich_help_panel=SOLVER)
 ]
 MaxTime = Annotated[
-    float, typer.Option(help="In s, after which the solver gives up.", rich_help_panel=SOLVER)
+    float,
+    typer.Option(help="In s, of the whole work: what was found until then is kept.", rich_help_panel=SOLVER),
 ]
 Starts = Annotated[
     int | None,

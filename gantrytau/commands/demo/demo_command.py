@@ -44,8 +44,7 @@ def demo(
             partial = output / UNFINISHED
             save_trajectory(error.optimum, partial)
             screen.print(f"The unfinished trajectory is in {partial}")
-        stopped = error.optimum is not None and error.optimum.status == "interrupted"
-        raise typer.Exit(INTERRUPTED if stopped else FAULT) from None
+        raise typer.Exit(INTERRUPTED if error.interrupted else FAULT) from None
     except GantryTauError as error:
         screen.print(str(error), markup=False)
         raise typer.Exit(FAULT) from None

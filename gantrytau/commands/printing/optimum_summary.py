@@ -23,6 +23,7 @@ def summary(chosen: Chosen, optimum: "Optimum", files: list[str]) -> dict[str, A
         "objective": optimum.objective,
         "final_time": optimum.final_time,
         "free": optimum.free,
+        "refinement": _refinement(optimum),
         "iterations": optimum.iterations,
         "seconds": {"build": optimum.build_time, "solve": optimum.solve_time},
         "versions": {
@@ -33,6 +34,17 @@ def summary(chosen: Chosen, optimum: "Optimum", files: list[str]) -> dict[str, A
         "report": optimum.report().splitlines(),
         "files": files,
     }
+
+
+def _refinement(optimum: "Optimum") -> dict[str, Any] | None:
+    """Whether the accuracy asked for was reached, and the rounds; None where none was asked for."""
+    from dataclasses import asdict
+
+    found = optimum.refinement
+    if found is None:
+        return None
+    named = {"accuracy": found.accuracy, "reached": found.reached, "stopped": found.stopped or None}
+    return {**named, "rounds": [asdict(one) for one in found.rounds], "kept": found.kept}
 
 
 def show(optimum: "Optimum", flat: "FlatModel", files: list[str]) -> None:

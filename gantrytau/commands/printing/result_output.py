@@ -38,7 +38,7 @@ def save(result: "Result", file: Path | None) -> list[str]:
 
 def stop(error: SolveError, spelling: Spelling, output: Path | None, json: bool) -> NoReturn:
     """Save what a simulation found until it stopped, say so, and leave."""
-    pressed = isinstance(error.__context__, KeyboardInterrupt)
+    pressed = error.interrupted
     message = str(error).partition(";")[0] if pressed else spelling.of(error)
     files: list[str] = []
     if output is not None and error.result is not None:

@@ -19,6 +19,13 @@ class Optimum(ProgramAnswer):
     `time` holds the start and all collocation points, in s; build_time and solve_time are in s.
     """
 
+    def with_notes(self, **notes: Any) -> "Optimum":
+        """The same answer with `refinement` or `search`; what was found out about it already stays."""
+        noted = replace(self, **notes)
+        for name in {"playback", "phases"} & vars(self).keys():
+            object.__setattr__(noted, name, vars(self)[name])
+        return noted
+
     def save(self, path: Any):
         """Save all variables over time, as Result.save; with the ending .optimum the whole solution, for load_optimum."""
         return save_optimum(self, path) if Path(path).suffix == SUFFIX else super().save(path)

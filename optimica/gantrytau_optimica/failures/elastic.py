@@ -187,7 +187,7 @@ class Elastic:
             return None
         nlp, derivatives = self.functions
         m = len(self.softs)
-        watch = Watch(self.size + m, self.rows, None)
+        watch = Watch(self.size + m, self.rows)
         options = {
             "iteration_callback": watch,
             "print_time": False,
@@ -214,6 +214,8 @@ class Elastic:
                 lbg=self.low,
                 ubg=self.high,
             )
+        if watch.pressed:
+            raise KeyboardInterrupt
         if not solver.stats()["success"]:
             return None
         x, duals = np.array(found["x"]).ravel(), np.array(found["lam_g"]).ravel()

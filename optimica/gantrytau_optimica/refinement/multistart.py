@@ -11,6 +11,7 @@ from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Phase, Signal
 from gantrytau_optimica.control.guesses import Guess, horizon, with_algebraics
 from gantrytau_optimica.control.limits import signal_limits
+from gantrytau_optimica.solving.clock import Clock
 
 SEED = 20121
 EXTENTS = (0.15, 0.6)  # of the way from start to end, between which it is drawn how far a guess is bent
@@ -46,7 +47,7 @@ class Search:
         return "\n".join([*lines, *(f"  {branch}" for branch in self.branches[:8])])
 
 
-def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: int) -> Optimum:
+def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: int, clock: Clock) -> Optimum:
     """The best optimum from `starts` first guesses, the default one first; if none is found, where that one ended.
 
     Every state that is not itself a derivative is bent by a few half waves, which vanish at the ends; those that are its
@@ -55,8 +56,9 @@ def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: i
     random = np.random.default_rng(SEED)
     tried: list[Optimum] = []
     for k in range(starts):
+        clock.enter(f"first guess {k + 1} of {starts}")
         tried.append(solve(built.problem if k == 0 else with_algebraics(built, bent(built.problem, random))))
-        if tried[-1].status == "interrupted":
+        if not clock.left:
             break
     found = sorted((o for o in tried if o.success), key=lambda o: o.objective)
     if not found:
@@ -67,7 +69,7 @@ def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: i
             branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
         else:
             branches.append(SolutionBranch(optimum.objective, 1, optimum))
-    return replace(found[0], search=Search(starts, tuple(branches), len(tried) - len(found)))
+    return replace(found[0], search=Search(len(tried), tuple(branches), len(tried) - len(found)))
 
 
 def bent(problem: ControlProblem, random: np.random.Generator) -> ControlProblem:

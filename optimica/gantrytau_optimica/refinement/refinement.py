@@ -9,6 +9,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.switches import Switch
 from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
+from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, Reached
 from gantrytau_optimica.refinement.remesh import better_mesh
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -34,26 +35,40 @@ class Round:
     error: float  # of the objective as played back
     size: float  # of the objective
 
+    def __str__(self) -> str:
+        return (
+            f"which passes limits by {self.violation:.2g} and misses conditions by {self.defect:.2g} of their size, and the "
+            f"objective by {abs(self.error) / self.size:.2g}"
+        )
+
 
 @dataclass(frozen=True)
 class Refinement:
-    """How an answer was refined: wanted accuracy, all rounds, the switches at the end, and whether it was reached."""
+    """How an answer was refined: wanted accuracy, all rounds, the number of the one that was kept (the last if it was
+    reached, else the best), its switches, and why it ended before if it did.
+    """
 
     accuracy: float
     rounds: tuple[Round, ...]
     switches: tuple[Switch, ...]
     reached: bool
+    kept: int = 0
+    stopped: str = ""
 
     def __repr__(self) -> str:
         return f"<{self}>"
 
     def __str__(self) -> str:
-        first, last = self.rounds[0], self.rounds[-1]
         word = "Refined to" if self.reached else "NOT refined to"
+        why = f" ({self.stopped})" if self.stopped else ""
+        if not self.rounds:
+            return f"{word} {self.accuracy:g}{why}"
+        first, last = self.rounds[0], self.rounds[-1]
         change = abs(self.rounds[-1].objective - self.rounds[-2].objective) if len(self.rounds) > 1 else 0.0
+        held = "" if self.reached else f"; round {self.kept + 1} is kept, {self.rounds[self.kept]}"
         return (
-            f"{word} {self.accuracy:g} in {len(self.rounds)} rounds, {first.elements} to {last.elements} elements, "
-            f"{len(self.switches)} switches; the last round changed the objective by {change:.2g}"
+            f"{word} {self.accuracy:g} in {len(self.rounds)} rounds{why}, {first.elements} to {last.elements} elements, "
+            f"{len(self.switches)} switches; the last round changed the objective by {change:.2g}{held}"
         )
 
 
@@ -87,33 +102,71 @@ def without_ramps(problem: ControlProblem) -> ControlProblem:
     return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
 
 
-def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum]) -> Optimum:
-    """The optimum on better and better meshes until it holds when played back.
+def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], reached: Reached) -> Optimum:
+    """The optimum on better and better meshes until it holds when played back, or the best of them when that is not
+    reached: after so many rounds, elements or seconds, or where the next mesh has no solution.
 
-    solve: (program, first guess of its unknowns) -> Optimum, which need not be a success.
+    solve: (program, first guess of its unknowns) -> Optimum, which need not be a success; reached: is kept up to date.
     """
-    search = optimum.search
-    rounds: list[Round] = [_round(optimum)]
-    moving = True
-    while True:
-        switches = tuple(s for t in optimum.phases.values() for s in switches_of(t))
-        done = _holds(rounds, accuracy)
-        if done or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
-            return replace(
-                optimum, refinement=Refinement(accuracy, tuple(rounds), switches, done), search=search
-            )
-        moving = moving and rounds[-1].defect < SMALL * accuracy
-        for how in [*(["moving"] if moving else []), "switches", "divided"]:
-            better = _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
-            if better is not None:
+    clock, search, best = reached.clock, optimum.search, optimum
+    rounds: list[Round] = []
+    moving, stopped = True, ""
+    try:
+        while True:
+            number = f"round {len(rounds) + 1} of at most {MOST_ROUNDS + 1}"
+            clock.enter(f"{number}: playing back")
+            rounds.append(_round(optimum))
+            kept = _kept(rounds, accuracy)
+            best = optimum if kept == len(rounds) - 1 else best
+            reached.best = best.with_notes(refinement=_record(best, rounds, accuracy), search=search)
+            if _holds(rounds, accuracy) or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
                 break
-            moving = False
-        else:
-            return replace(
-                optimum, refinement=Refinement(accuracy, tuple(rounds), switches, False), search=search
-            )
-        optimum = better
-        rounds.append(_round(optimum))
+            clock.enter(f"{number}: solving on the next mesh")
+            moving = moving and rounds[-1].defect < SMALL * accuracy
+            better = None
+            for how in [*(["moving"] if moving else []), "switches", "divided"]:
+                better = (
+                    _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
+                    if clock.left
+                    else None
+                )
+                if better is not None:
+                    break
+                moving = False
+            if better is None:
+                stopped = "" if clock.left else LATE
+                break
+            optimum = better
+    except KeyboardInterrupt:
+        newest = reached.best or best
+        refinement = replace(_record(best, rounds, accuracy), reached=False, stopped=INTERRUPTED)
+        reached.best = newest.with_notes(refinement=refinement, search=search)
+        raise
+    return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)
+
+
+def _record(best: Optimum, rounds: Sequence[Round], accuracy: float, stopped: str = "") -> Refinement:
+    switches = tuple(s for t in best.phases.values() for s in switches_of(t))
+    done = _holds(rounds, accuracy)
+    return Refinement(accuracy, tuple(rounds), switches, done, _kept(rounds, accuracy), stopped)
+
+
+def _kept(rounds: Sequence[Round], accuracy: float) -> int:
+    """The last round where it holds, else the one that fails by the least."""
+    last = len(rounds) - 1
+    if last < 0:  # interrupted in the first
+        return 0
+    return last if _holds(rounds, accuracy) else int(np.argmin([_off(rounds, k) for k in range(last + 1)]))
+
+
+def _off(rounds: Sequence[Round], k: int) -> float:
+    """By how much a round fails, relative: by what limits, conditions and objective are off, and by how much the objective
+    differs from that of the round before, or after the first.
+    """
+    one, other = rounds[k], rounds[k - 1 if k else min(1, len(rounds) - 1)]
+    moved = abs(one.objective - other.objective) / one.size
+    off = max(one.violation, one.defect, abs(one.error) / one.size, moved)
+    return off if np.isfinite(off) else np.inf
 
 
 def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, how: str) -> list[Mesh]:
@@ -149,10 +202,12 @@ def _round(optimum: Optimum) -> Round:
     return Round(elements, optimum.objective, played.violation, defect, optimum.iterations, error, size)
 
 
-def _holds(rounds: list[Round], accuracy: float) -> bool:
+def _holds(rounds: Sequence[Round], accuracy: float) -> bool:
     """Whether limits and conditions hold and the objective stands still."""
+    if len(rounds) < 2:
+        return False
     last = rounds[-1]
-    if len(rounds) < 2 or max(last.violation, last.defect) > accuracy:
+    if max(last.violation, last.defect) > accuracy:
         return False
     unmoved = abs(last.objective - rounds[-2].objective) <= accuracy * last.size
     return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * last.size

@@ -111,7 +111,7 @@ def _parts(played: Replayed, accuracy: float) -> np.ndarray:
 def _passed(played: Replayed) -> np.ndarray:
     """By how much limits are passed in every piece, relative to their range."""
     worst = np.zeros(played.times.size)
-    for limit, row, size in measured(played.trajectory.phase, played.values):
+    for limit, row, size in measured(played.trajectory, played.values):
         amount = np.maximum(limit.lower - row, row - limit.upper) / size
         worst = np.maximum(worst, np.nan_to_num(amount, nan=0.0))
     return worst.reshape(-1, PLACES.size).max(axis=1)

@@ -1,7 +1,6 @@
 """Ipopt on a transcribed problem: progress, interruption, and statuses in words."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.interruption import on_interrupt
+from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.transcription.program import Program, first_guess
 
 WORDS = {
@@ -43,8 +43,6 @@ NEAR = {
 SLOPE = 1e-4  # of the objective by a scaled unknown: steepest slopes at the guess are scaled up to it
 MOST_SCALED = 1e4
 
-Progress = Callable[[int, float], None]  # iteration, objective
-
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -59,6 +57,14 @@ class Solution:
     status: str
     iterations: int
     solve_time: float
+
+
+class Pressed(KeyboardInterrupt):
+    """Ctrl-C while Ipopt was at work, which let go at the end of its iteration; solution: where it was."""
+
+    def __init__(self, solution: Solution):
+        super().__init__()
+        self.solution = solution
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,7 @@ class Solver:
     def __init__(self, program: Program, settings: SolverSettings):
         assembled = program.assembled
         self.settings = settings
-        self.watch = Watch(assembled.variables, assembled.rows, settings.progress)
+        self.watch = Watch(assembled.variables, assembled.rows)
         options = {
             "iteration_callback": self.watch,
             "print_time": False,
@@ -118,13 +124,16 @@ class Solver:
             solve_time=0.0,
         )
 
-    def solve(self, program: Program, guess: np.ndarray) -> Solution:
-        """Solve the program, with its limits as they are now, from unknowns `guess` (unscaled)."""
+    def solve(self, program: Program, guess: np.ndarray, clock: Clock | None = None) -> Solution:
+        """Solve the program, with its limits as they are now, from unknowns `guess` (unscaled).
+
+        clock: of the call; by default a solve has one of its own. Raises Pressed when Ctrl-C is.
+        """
         begin = time.perf_counter()
         first = pushed(program, guess)
         if not finite(program, first):
             return replace(self.unsolved(program, first), status=NOT_BEGUN)
-        self.watch.stop, self.watch.error, self.watch.iteration = False, None, 0
+        self.watch.begin(clock or Clock(self.settings.max_time, self.settings.progress))
         with on_interrupt(self.watch.ask_to_stop):
             found = self.nlpsol(
                 x0=guess / program.places.scale,
@@ -137,10 +146,12 @@ class Solver:
             raise self.watch.error
         stats: dict[str, Any] = self.nlpsol.stats()
         word = str(stats["return_status"])
+        if word == "User_Requested_Stop" and not self.watch.pressed:
+            word = "Maximum_WallTime_Exceeded"
         moved = np.abs(np.array(found["x"]).ravel() - first / program.places.scale)
         if word.startswith("Maximum") and np.max(moved, initial=0.0) > FAR:
             word = "Diverging_Iterates"
-        return Solution(
+        solution = Solution(
             w=np.array(found["x"]).ravel() * program.places.scale,
             multipliers=np.array(found["lam_g"]).ravel(),
             bound_multipliers=np.array(found["lam_x"]).ravel() / program.places.scale,
@@ -151,6 +162,9 @@ class Solver:
             iterations=int(stats["iter_count"]),
             solve_time=time.perf_counter() - begin,
         )
+        if self.watch.pressed:
+            raise Pressed(solution)
+        return solution
 
 
 def pushed(program: Program, guess: np.ndarray) -> np.ndarray:
@@ -180,9 +194,9 @@ def _objective_scale(program: Program) -> float:
 
 
 class Watch(ca.Callback):
-    """Called by Ipopt after every iteration: reports progress, and stops when Ctrl-C was pressed."""
+    """Called by Ipopt after every iteration: reports progress, and stops when Ctrl-C was pressed or time is over."""
 
-    def __init__(self, unknowns: int, constraints: int, progress: Progress | None):
+    def __init__(self, unknowns: int, constraints: int):
         ca.Callback.__init__(self)
         self.sizes = {
             "x": unknowns,
@@ -192,11 +206,15 @@ class Watch(ca.Callback):
             "lam_g": constraints,
             "lam_p": 0,
         }
-        self.progress = progress
-        self.stop = False
-        self.error: Exception | None = None
-        self.iteration = 0
+        self.begin(None)
         self.construct("watch", {})
+
+    def begin(self, clock: Clock | None) -> None:
+        """Before a solve; without a clock nobody is told, and it takes the time that it takes."""
+        self.clock = clock
+        self.pressed = False
+        self.error: BaseException | None = None
+        self.iteration = 0
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -211,12 +229,15 @@ class Watch(ca.Callback):
     def eval(self, arg: Any) -> list[int]:
         self.iteration += 1
         try:
-            if self.progress is not None:
-                self.progress(self.iteration, float(arg[1]))
-        except Exception as error:  # raised again once Ipopt has let go
-            self.stop, self.error = True, error
-        return [1 if self.stop else 0]
+            if self.clock is not None:
+                self.clock.tell(self.iteration, float(arg[1]))
+        except KeyboardInterrupt:
+            self.pressed = True
+        except BaseException as error:  # raised again once Ipopt has let go
+            self.error = error
+        late = self.clock is not None and not self.clock.left
+        return [1 if self.pressed or late or self.error is not None else 0]
 
     def ask_to_stop(self) -> None:
         """Let Ipopt finish its iteration and keep what it has."""
-        self.stop = True
+        self.pressed = True

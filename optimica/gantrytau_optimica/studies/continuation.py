@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau import SolveError
+from gantrytau import SolveError, heeding_interrupts
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.prepared import Prepared
+from gantrytau_optimica.solving.ipopt import Pressed
 from gantrytau_optimica.transcription.program import Program
 
 HALVINGS = 3  # of a step that fails: at most eight steps to the next value
@@ -25,6 +26,7 @@ class Continuation:
     findings: tuple[str, ...]
 
 
+@heeding_interrupts()
 def follow(prepared: Prepared, name: str, values: Sequence[float]) -> Continuation:
     """Solve for all values of the held parameter `name`; Ctrl-C ends it, and what was found so far is kept."""
     found: dict[float, Optimum] = {}
@@ -40,10 +42,16 @@ def follow(prepared: Prepared, name: str, values: Sequence[float]) -> Continuati
                 failures.pop(value, None)
             except SolveError as error:
                 failures[value] = error
-                stopped = _interrupted(error)
+                stopped = error.interrupted
+            except KeyboardInterrupt:
+                failures[value] = SolveError("interrupted")
+                stopped = True
     ordered = {value: found[value] for value in values if value in found}
     if not stopped:
-        findings += _onto_better(prepared, name, ordered)
+        try:
+            findings += _onto_better(prepared, name, ordered)
+        except KeyboardInterrupt:
+            findings.append("interrupted before all motions were compared with those of other values")
     return Continuation(ordered, failures, tuple(findings))
 
 
@@ -69,7 +77,7 @@ def _approach(
         optimum = solve_from(prepared, name, start[1], value)
     except SolveError as error:
         middle = _between(start[0], value)
-        if halvings == 0 or _interrupted(error) or middle in (start[0], value):
+        if halvings == 0 or error.interrupted or middle in (start[0], value):
             raise
         near = _approach(prepared, name, start, middle, halvings - 1, steps)
         return _approach(prepared, name, (middle, near), value, halvings - 1, steps)
@@ -80,7 +88,11 @@ def _approach(
 def solve_from(prepared: Prepared, name: str, start: Optimum, value: float) -> Optimum:
     """Solve for a value of one held parameter, from the unknowns of an optimum of the same program."""
     program = _at(start, prepared.program, name, value)
-    solution = prepared.solver.solve(program, start.solution.w)
+    try:
+        solution = prepared.solver.solve(program, start.solution.w)
+    except Pressed as pressed:
+        reached = replace(start, program=program, solution=pressed.solution)
+        raise SolveError(reached.report(), optimum=reached) from pressed
     if solution.success and program.astray(solution.w):  # times of conditions moved into other elements
         return prepared.solve({name: value}, guess=start if len(start.phases) == 1 else None)
     built = replace(start.built, problem=program.problem)
@@ -139,7 +151,3 @@ def _cheapest(optima: dict[float, Optimum], name: str, value: float) -> tuple[fl
         if off < FEASIBLE:
             costs.append((float(objective[0]), other))
     return min(costs)
-
-
-def _interrupted(error: SolveError) -> bool:
-    return error.optimum is not None and error.optimum.status == "interrupted"

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, heeding_interrupts
 from gantrytau.compiler.request import names
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.held_parameters import holding
@@ -146,6 +146,7 @@ class Sensitivities:
         )
 
 
+@heeding_interrupts()
 def sensitivities(optimum: Optimum, parameters: Sequence[str] | None = None) -> Sensitivities:
     """Derivatives of an optimum with respect to parameters, at most one sparse factorisation for all.
 

@@ -73,7 +73,7 @@ def test_a_limit_on_a_difference_is_measured_by_its_terms(problem, size):
     optimum = optimize(problem(chase=Chase(size=size, x=dict(start=0.0, fixed=True))), elements=20)
     (found,) = optimum.playback.violations
     played = optimum.playback
-    larger = np.max(np.abs([played["chase.x"], played["chase.y"]]))
+    larger = np.max(np.abs([optimum["chase.x"], optimum["chase.y"]]))
     assert found.range == pytest.approx(larger, rel=1e-6)
     assert found.amount == pytest.approx(max(np.max(played["chase.ahead"]), 0.0), rel=1e-6, abs=1e-12 * size)
     assert found.amount < 1e-3 * size + 2e-8  # by which the solver relaxes limits

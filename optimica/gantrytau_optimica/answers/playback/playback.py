@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from gantrytau import ModelError, Result
+from gantrytau import ModelError, Result, heeding_interrupts
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.playback.ranges import FLAT, condition_sizes, magnitude, measured
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
@@ -127,6 +127,7 @@ class Playback:
         return "\n".join(["Played back:", *(f"  {line}" for line in self.lines())])
 
 
+@heeding_interrupts()
 def play_back(optimum: ProgramAnswer) -> Playback:
     """Integrate the model with the inputs of an optimum, and look at all limits and conditions."""
     phases = {name: replay(optimum.built, t) for name, t in optimum.phases.items()}
@@ -139,7 +140,7 @@ def play_back(optimum: ProgramAnswer) -> Playback:
 
 def _violations(played: Replayed) -> list[Violation]:
     phase, found = played.trajectory.phase, []
-    for limit, row, size in measured(phase, played.values):
+    for limit, row, size in measured(played.trajectory, played.values):
         amount = np.maximum(limit.lower - row, row - limit.upper)
         amount = np.where(np.isfinite(amount), amount, -np.inf)
         worst = int(np.argmax(amount))
@@ -196,11 +197,11 @@ def _sums(played: Replayed) -> list[tuple[ca.SX, np.ndarray]]:
 
 
 def _condition_sizes(problem: ControlProblem, phases: list[Replayed]) -> np.ndarray:
-    """What is small for the conditions at single times, (k,), as played."""
+    """What is small for the conditions at single times, (k,), by the solution."""
 
     def values(number: int, point: PointValue, expressions: ca.SX) -> np.ndarray:
-        played = phases[number]
-        return played.at(expressions, np.array([played.trajectory.moment(point.time)]))[:, 0]
+        trajectory = phases[number].trajectory
+        return trajectory.values(expressions, np.array([trajectory.moment(point.time)]))[:, 0]
 
     return condition_sizes(problem, phases[0].trajectory.numbers, values)
 

@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase, PointValue, Signal
+from gantrytau_optimica.control.control_problem import ControlProblem, Limit, PointValue, Signal
+from gantrytau_optimica.transcription.trajectory import Trajectory
 
 NOISE = 1e-7  # of `nominal`: terms that stay below are what solver and integrator leave of a zero
 FLAT = 1e-6  # of the sum of its terms: below, an objective is what rounding leaves of a zero
@@ -21,11 +22,13 @@ _SUMS = (ca.OP_ADD, ca.OP_SUB)
 _SAME = (ca.OP_NEG, ca.OP_FABS)
 
 
-def measured(phase: Phase, values: Callable[[ca.SX], np.ndarray]) -> Measured:
+def measured(trajectory: Trajectory, values: Callable[[ca.SX], np.ndarray]) -> Measured:
     """All limits along a phase, those of algebraics by themselves included, with values (n,) and range of each.
 
-    values: expressions (m,) of the symbols of the phase -> (m, n), along a motion of that phase.
+    values: expressions (m,) of the symbols of the phase -> (m, n), along a motion. Ranges are those of the solution, which
+    a motion may have left by far.
     """
+    phase = trajectory.phase
     own = [
         Limit(s.symbol, s.min, s.max, s.words or s.name)
         for s in phase.algebraics
@@ -36,10 +39,9 @@ def measured(phase: Phase, values: Callable[[ca.SX], np.ndarray]) -> Measured:
         return []
     parts = [terms(limit.expression) for limit in limits]
     slopes = _slopes([limit.expression for limit in limits], phase.signals)
-    rows = values(
-        ca.vertcat(*(limit.expression for limit in limits), *slopes, *(t for p in parts for t in p))
-    )
-    rows, sizes = rows[: len(limits)], iter(_largest(rows[len(limits) :]))
+    rows = values(ca.vertcat(*(limit.expression for limit in limits)))
+    inside = trajectory.values(ca.vertcat(*slopes, *(t for part in parts for t in part)), trajectory.time)
+    sizes = iter(_largest(inside))
     moves = [next(sizes) for _ in limits]
     largest = [max((next(sizes) for _ in part), default=0.0) for part in parts]
     return [

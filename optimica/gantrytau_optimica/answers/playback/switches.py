@@ -99,7 +99,7 @@ def _of_limits(trajectory: Trajectory) -> list[Switch]:
     phase = trajectory.phase
     inputs = {s.name for s in phase.inputs}
     shares, found = trajectory.fractions, []
-    for limit, row, size in measured(phase, lambda e: trajectory.values(e, trajectory.time)):
+    for limit, row, size in measured(trajectory, lambda e: trajectory.values(e, trajectory.time)):
         bare = bare_limit(limit, phase)
         if limit.lower == limit.upper or (bare is not None and bare[0] in inputs):
             continue
