@@ -85,11 +85,11 @@ def optimize(
             optimum = _solved(chosen, quiet, policy)
         except SolveError as error:
             _leave(error, chosen, save, json)
-        _answer(optimum, chosen, flat, Asked(save, drawn, place, json))
+        _answer(optimum, chosen, flat, Wanted(save, drawn, place, json))
 
 
 @dataclass(frozen=True)
-class Asked:
+class Wanted:
     """What is wanted of an optimum: a file, pictures of variables and their place, and JSON."""
 
     save: Path | None
@@ -98,12 +98,12 @@ class Asked:
     json: bool
 
 
-def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", asked: Asked) -> None:
+def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", wanted: Wanted) -> None:
     """Files first, then the report; Ctrl-C in between costs no file."""
     files: list[str] = []
     try:
-        wrong = _written(optimum, asked, files)
-        record = optimum_summary.summary(chosen, optimum, files) if asked.json else None
+        wrong = _written(optimum, wanted, files)
+        record = optimum_summary.summary(chosen, optimum, files) if wanted.json else None
         refinement = optimum.refinement
         missed = str(refinement) if refinement is not None and not refinement.reached else ""
         said = "\n".join(words for words in (wrong, missed) if words)
@@ -112,12 +112,12 @@ def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", asked: Asked)
         else:
             optimum_summary.show(optimum, flat, files)
     except KeyboardInterrupt:
-        if asked.save is not None and not files:
+        if wanted.save is not None and not files:
             with suppress(KeyboardInterrupt, GantryTauError):  # pressed once more, it is written nevertheless
-                result_output.save(optimum.result, asked.save)
-                files.append(str(asked.save))
+                result_output.save(optimum.result, wanted.save)
+                files.append(str(wanted.save))
         words = f"; written: {', '.join(files)}" if files else "; nothing was written"
-        fail(f"Interrupted{words}", INTERRUPTED, asked.json)
+        fail(f"Interrupted{words}", INTERRUPTED, wanted.json)
     if said:
         note(said)
         raise typer.Exit(MISUSE if wrong else FAULT)
@@ -173,15 +173,15 @@ class _Line:
         return Text(f"{self.words}, {time.perf_counter() - self.begin:.1f} s")
 
 
-def _written(optimum: "Optimum", asked: Asked, files: list[str]) -> str:
+def _written(optimum: "Optimum", wanted: Wanted, files: list[str]) -> str:
     """Write the files of a solution, named in `files`; why some are not written, which does not cost the answer."""
     wrong: list[str] = []
     try:
-        files += result_output.save(optimum.result, asked.save)
+        files += result_output.save(optimum.result, wanted.save)
     except GantryTauError as error:
         wrong.append(str(error))
     try:
-        files += picture_output.draw(optimum, asked.drawn, asked.place) if asked.place else []
+        files += picture_output.draw(optimum, wanted.drawn, wanted.place) if wanted.place else []
     except GantryTauError as error:
         wrong.append(str(error))
     return "\n".join(wrong)

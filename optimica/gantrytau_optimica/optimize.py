@@ -19,7 +19,7 @@ from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.problem_checks import one_point
 from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
-from gantrytau_optimica.refinement.reached import Reached
+from gantrytau_optimica.refinement.reached import BestSoFar
 from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.solving.ipopt import Solver
@@ -70,7 +70,7 @@ def optimize(
     if record is not None:
         require_place(record)
     begun, clock = datetime.now(UTC), Clock(max_time, progress)
-    reached = Reached(clock)
+    reached = BestSoFar(clock)
     with reached.kept():
         read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
         details = dict(problem=problem, options=policy.given, started=begun, read_time=max_time - clock.left)

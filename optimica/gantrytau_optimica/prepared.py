@@ -19,7 +19,7 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.policy import Guesses
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import searched
-from gantrytau_optimica.refinement.reached import LATE, Reached
+from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Pressed, Solver, SolverSettings
@@ -58,7 +58,7 @@ class Prepared:
     refine: float | None = None
     starts: int = 1
     near: bool = False  # whether the guess is a solution
-    reached: Reached | None = None  # by the call at hand
+    reached: BestSoFar | None = None  # by the call at hand
 
     def __repr__(self) -> str:
         size, rows = self.program.places.size, self.program.assembled.rows
@@ -67,7 +67,7 @@ class Prepared:
     def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
         settings = self.solver.settings
-        reached = Reached(Clock(settings.max_time, settings.progress))
+        reached = BestSoFar(Clock(settings.max_time, settings.progress))
         with reached.kept():
             return replace(self, reached=reached).search(parameters, guess)
 
@@ -118,7 +118,7 @@ class Prepared:
         return refined(optimum, self.refine, solve, reached)
 
     @property
-    def _reached(self) -> Reached:
+    def _reached(self) -> BestSoFar:
         assert self.reached is not None
         return self.reached
 

@@ -11,7 +11,7 @@ INTERRUPTED, LATE = "interrupted", "time limit reached"
 KEPT = "What was reached so far is in .optimum."
 
 
-class Reached:
+class BestSoFar:
     """One call's clock, and the best optimum until now: a solved one on the finest mesh, else where the solver was."""
 
     def __init__(self, clock: Clock):

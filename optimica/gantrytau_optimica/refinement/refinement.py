@@ -9,7 +9,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.switches import Switch
 from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
-from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, Reached
+from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -102,7 +102,7 @@ def without_ramps(problem: ControlProblem) -> ControlProblem:
     return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
 
 
-def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], reached: Reached) -> Optimum:
+def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], reached: BestSoFar) -> Optimum:
     """The optimum on better and better meshes until it holds when played back, or the best of them when that is not
     reached: after so many rounds, elements or seconds, or where the next mesh has no solution.
 
