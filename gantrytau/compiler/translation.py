@@ -109,7 +109,7 @@ def _translated(
     by_name = {n: reduced.chains.named(n) for n in unknowns}
     guide = Guide(sample, table.values, choice.states)
     blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
-    refuse_undetermined(blocks, indexed, reduced, sample, flat)
+    refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
     return Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )

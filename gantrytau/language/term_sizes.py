@@ -1,6 +1,6 @@
 """How large the terms are that an expression is the sum of: what rounding errors, and small residuals, are measured by."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
@@ -9,18 +9,21 @@ from gantrytau.language.instructions import computed
 _Sized = tuple[ca.SX, ca.SX]  # an expression, and the size of its terms
 _SUMS = (ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX)
 _SAME = (ca.OP_NEG, ca.OP_FABS, ca.OP_ASSIGN)
+_TURNING = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN)
 
 
-def term_sizes(expressions: Sequence[ca.SX]) -> list[ca.SX]:
-    """For each scalar expression the sum of the absolute values of what it adds up, symbols being exact.
+def term_sizes(expressions: Sequence[ca.SX], least: Mapping[str, float] | None = None) -> list[ca.SX]:
+    """For each scalar expression the sum of the absolute values of what it adds up, symbols being as large as they are.
 
-    a * b + c has the size |a| |b| + |c|, also where the sum is zero.
+    a * b + c has the size |a| |b| + |c|, also where the sum is zero; sin(a) at least the size of a where it is steep.
+    least: symbols that count as at least so large, because they are sums themselves.
     """
+    least = least or {}
     leaves = ca.symvar(ca.vertcat(*expressions))
     dense = [ca.densify(e) for e in expressions]
     (found,) = computed(
         ca.Function("sized", [ca.vertcat(*leaves)], [ca.vertcat(*dense)], {"cse": True}),
-        lambda _, i: (leaves[i], ca.fabs(leaves[i])),
+        lambda _, i: (leaves[i], ca.fmax(ca.fabs(leaves[i]), least.get(leaves[i].name(), 0.0))),
         lambda value: (ca.SX(value), ca.SX(abs(value))),
         _operation,
     )
@@ -45,4 +48,8 @@ def _operation(operator: int, operands: list[_Sized]) -> _Sized:
         return value, a / ca.fabs(operands[1][0])
     if operator == ca.OP_IF_ELSE_ZERO:
         return value, ca.if_else(operands[0][0], b, 0)
+    if operator in _TURNING:
+        t = ca.SX.sym("t")
+        slope = ca.substitute(ca.jacobian(apply(operator, t), t), t, operands[0][0])
+        return value, ca.fabs(value) + ca.fabs(slope) * a
     return value, ca.fabs(value)

@@ -13,48 +13,69 @@ from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import undetermined, without_inertia
+from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import StructureError
 from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.term_sizes import term_sizes
 
-LEAST = 1e-12  # of a coefficient, or of a singular value, relative to the terms of its equation
+NOISE = 1e-12  # of a coefficient relative to the terms that it adds up: below, it is zero but for rounding
+LEAST = 1e-12  # singular value of the coefficients, rows and columns scaled, relative to the largest
+ROUNDS = 4  # of scaling rows and columns
 
 
 def refuse_undetermined(
-    blocks: Sequence[Block], indexed: Indexed, reduced: Reduced, sample: Mapping[str, float], flat: FlatModel
+    blocks: Sequence[Block],
+    indexed: Indexed,
+    reduced: Reduced,
+    asked: StartValues,
+    sample: Mapping[str, float],
+    flat: FlatModel,
 ) -> None:
-    """StructureError that names the unknowns which the equations leave free at the start, and why."""
+    """StructureError that names the unknowns which the equations leave free at the start, and why.
+
+    asked: start values before they were consistent; sample: afterwards.
+    """
     watched = [b for b in blocks if b.tears and b.kind in ("explicit", "linear")]
     if not watched:
         return
-    residual = ca.vertcat(*(r for b in watched for r in b.residuals))
-    leaves = ca.symvar(residual)
-    jacobian = ca.jacobian(residual, ca.vertcat(*leaves))
-    entries = values_at(ca.vertcat(*jacobian.nonzeros()), sample).ravel()
-    rows, columns = (np.array(x, dtype=int) for x in jacobian.sparsity().get_triplet())
-    largest = np.zeros(residual.numel())
-    np.maximum.at(largest, rows, np.nan_to_num(np.abs(entries)))
-    place = {leaf.name(): j for j, leaf in enumerate(leaves)}
+    matrices = [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in watched]
+    entries = [e for m in matrices for e in m.nonzeros()]
+    sizes = term_sizes(entries, _found_sizes(reduced, asked, sample, flat))
+    values, terms = values_at(ca.horzcat(ca.vertcat(*entries), ca.vertcat(*sizes)), sample).T
+    values = np.where(np.abs(values) <= NOISE * terms, 0.0, values)
     begin = 0
-    for block in watched:
-        count = len(block.tears)
-        own = {place[y.name()]: k for k, y in enumerate(block.tears) if y.name() in place}
-        matrix = np.zeros((count, count))
-        for k in np.flatnonzero((rows >= begin) & (rows < begin + count)):
-            if columns[k] in own:
-                matrix[rows[k] - begin, own[columns[k]]] = entries[k]
-        free = _free(block, matrix, largest[begin : begin + count, None])
-        begin += count
+    for block, symbolic in zip(watched, matrices, strict=True):
+        matrix = np.zeros(symbolic.shape)
+        matrix[tuple(symbolic.sparsity().get_triplet())] = values[begin : begin + symbolic.nnz()]
+        begin += symbolic.nnz()
+        free = _free(block, matrix)
         if free:
             names = [indexed.names[i] for i, _ in block.equations]
             raise undetermined(flat, reduced, free, names)
 
 
-def _free(block: Block, matrix: np.ndarray, terms: np.ndarray) -> list[str]:
-    """Unknowns that a matrix leaves free; terms: the largest coefficient in each equation."""
+def _found_sizes(
+    reduced: Reduced, asked: StartValues, sample: Mapping[str, float], flat: FlatModel
+) -> dict[str, float]:
+    """How large symbols count that were found from equations: what is left of their terms may be rounding."""
+    found = {n: 1.0 for n, v in sample.items() if n not in reduced.table.values and asked.values.get(n) != v}
+    for variable in flat.variables:
+        for name, nominal in zip(variable.elements, variable.nominal or (), strict=False):
+            alias = reduced.aliases[name]
+            if alias.root is not None and alias.symbol in found:
+                found[alias.symbol] = abs(reduced.table.number(nominal) / alias.factor)
+    return found
+
+
+def _free(block: Block, matrix: np.ndarray) -> list[str]:
+    """Unknowns that a matrix leaves free."""
     if not np.all(np.isfinite(matrix)):
         return []
-    _, values, right = np.linalg.svd(matrix / np.maximum(terms, 1e-300))
-    if values[-1] > LEAST * max(values[0], 1e-3):
+    for _ in range(ROUNDS):  # units and sizes of bodies count for nothing
+        matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=1, keepdims=True)), 1e-150)
+        matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=0, keepdims=True)), 1e-150)
+    _, values, right = np.linalg.svd(matrix)
+    if values[-1] > LEAST * values[0]:
         return []
     shares = np.abs(right[-1])
     return [block.tears[k].name() for k in np.argsort(-shares) if shares[k] > 0.1 * shares.max()]

@@ -12,10 +12,15 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.errors import InitializationError
+from gantrytau.language.term_sizes import term_sizes
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
 TOLERANCE = (
     1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
+)
+SOLVED = 1e-9  # the same, for an equation to hold
+ROUNDING = (
+    1e-14  # of what unknowns of size one contribute to an equation: what is left of equations solved together
 )
 ITERATIONS = 100
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
@@ -63,6 +68,12 @@ class Level:
         x, residual, jacobian = self._symbolic
         entries = ca.vertcat(*jacobian.nonzeros()) if jacobian.nnz() else ca.SX(0, 1)
         return ca.Function("level", [x], [residual, ca.densify(entries)])
+
+    def sizes(self, numbers: np.ndarray) -> np.ndarray:
+        """How large the terms of the residuals are, at numbers of the leaves."""
+        x, _, _ = self._symbolic
+        terms = ca.vertcat(*term_sizes(self.residuals))
+        return np.array(ca.Function("sizes", [x], [terms])(numbers)).ravel()
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals, and the entries of their derivatives by the leaves, at numbers of the leaves."""
@@ -143,8 +154,11 @@ def _solve(
         around = _propagated(level, around, missing)
     point = around[columns]
     point, f, jacobian = newton(at, point, weights)
-    scale = _terms(jacobian, point)
-    bad = ~(np.abs(f) <= 1e-9 * scale)
+    bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+    if np.any(bad):
+        small = np.abs(jacobian) @ np.maximum(np.abs(point), 1.0)
+        around[columns] = point
+        bad &= ~(np.abs(f) <= np.maximum(SOLVED * level.sizes(around), ROUNDING * small))
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
@@ -167,8 +181,12 @@ def newton(
     damping = 0.0
     for _ in range(ITERATIONS):
         sound = np.all(np.isfinite(f)) and np.all(np.isfinite(jacobian))
-        if not sound or np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
+        if not sound or np.all(np.abs(f) <= TOLERANCE * (np.abs(jacobian) @ np.abs(point))):
             break
+        # where large terms could not be met better, small ones may still be, by steps that serve at once
+        attempts, enough = 25, 0.1
+        if np.all(np.abs(f) <= TOLERANCE * _terms(jacobian, point)):
+            attempts, enough = 1, 0.5
         rows = np.linalg.norm(jacobian * weights, axis=1)
         rows = np.maximum(rows, NOISE * rows.max(initial=1e-30))
         scaled, target = jacobian * weights / rows[:, None], -f / rows
@@ -177,7 +195,7 @@ def newton(
         along = left.T @ target
         known = sizes > 1e-11 * sizes[:1]
         moved = False
-        for attempt in range(25):
+        for attempt in range(attempts):
             shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
             step = weights * (right.T @ (shares * along))
             if attempt:
@@ -186,7 +204,7 @@ def newton(
             sound = np.all(np.isfinite(f_new)) and np.all(np.isfinite(jacobian_new))
             size = np.linalg.norm(f_new / rows) if sound else np.inf
             # at once only where the equations are as good as linear; a large step may reach another branch
-            if size < (1 - 1e-4 if attempt else 0.1) * merit:
+            if size < (1 - 1e-4 if attempt else enough) * merit:
                 point, f, jacobian, moved = point + step, f_new, jacobian_new, True
                 damping = 0.0 if size < 0.1 * merit else damping / 10
                 break

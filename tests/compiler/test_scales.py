@@ -1,0 +1,109 @@
+"""Sound models of any size are translated and solved; what rounding alone determines is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gantrytau import (
+    Fixed,
+    Input,
+    Model,
+    Parameter,
+    Real,
+    Start,
+    StructureError,
+    cos,
+    der,
+    simulate,
+    sin,
+    translate,
+)
+
+
+class Square(Model):
+    x = Real(start=1.0, fixed=True)
+    y = Real()
+
+    def equations(self):
+        yield der(self.x) == -self.x
+        yield self.y == self.x * self.x
+
+
+class Cube(Model):
+    x = Input(start=1.0)
+    y = Real(start=1.0)
+
+    def equations(self):
+        yield self.y**3 == self.x
+
+
+class Mass(Model):
+    m = Parameter(1.0)
+    f = Input(start=1.0)
+    x = Real(start=0.0, fixed=True)
+    v = Real(start=0.0, fixed=True)
+
+    def equations(self):
+        yield der(self.x) == self.v
+        yield self.m * der(self.v) == self.f
+
+
+class Pair(Model):
+    """Two balances whose sizes are given."""
+
+    row = Parameter(1.0, evaluate=True)
+    column = Parameter(1.0, evaluate=True)
+    u = Input(start=0.0)
+    x = Real()
+    y = Real()
+
+    def equations(self):
+        yield self.row * (2 * self.x + self.column * self.y) == self.row * self.u
+        yield self.x - 3 * self.column * self.y == 1
+
+
+class Turned(Model):
+    """A coefficient that is the cosine of a quarter of a turn."""
+
+    angle = Input(start=math.pi / 2)
+    x = Real()
+    y = Real()
+
+    def equations(self):
+        yield cos(self.angle) * self.x + sin(self.angle) * self.y == 1
+        yield self.y == 1
+
+
+@pytest.mark.parametrize("size", [1.0, 1e7, 1e15, 1e100])
+def test_a_coefficient_is_not_small_because_another_is_large(size):
+    final = simulate(Square(x=Fixed(size)), stop=1.0, points=2)
+    assert final.final("y") == pytest.approx((size * math.exp(-1)) ** 2, rel=2e-6)
+
+
+@pytest.mark.parametrize("m", [1e-30, 1e-12, 6e24])
+def test_bodies_of_any_mass(m):
+    assert simulate(Mass(m=m, f=Start(m)), stop=1.0, points=2).final("x") == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-30, 1e-24, 1e-15, 1e-8, 1.0, 1e12])
+def test_small_cubes_are_solved_by_their_own_terms(size):
+    root = np.cbrt(1.5 * size)
+    dae = translate(Cube(x=Start(size), y=Start(float(np.cbrt(size)))))
+    assert dae.evaluate({"x": 1.5 * size})["y"] == pytest.approx(root, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("row", [1e-20, 1e-8, 1.0, 1e20])
+@pytest.mark.parametrize("column", [1e-20, 1.0, 1e20])
+def test_rows_and_columns_of_linear_blocks_have_any_size(row, column):
+    dae = translate(Pair(row=row, column=column))
+    for x, y in (
+        tuple(float(v) for v in dae.function(["u"], ["x", "y"])(2.0)),
+        tuple(dae.evaluate({"u": 2.0})[n] for n in ("x", "y")),
+    ):
+        assert (x, y * column) == pytest.approx((1.0, 0.0), abs=1e-14)
+
+
+def test_what_rounding_alone_determines_is_refused():
+    with pytest.raises(StructureError, match="x is not determined at the start"):
+        translate(Turned())
