@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-RANK = 1e-7  # of the largest singular value of normed columns: below it parameters cannot be told apart
+DOUBTFUL = 1e-5  # of the largest singular value of normed columns: below it parameters may not be told apart
+ROUNDING = 1e-11  # of it, what rounding leaves of a value that is zero
+NEARLY = 1e-7  # the same, where the words for what is silent are looked for
+CONFIRMED = 0.5  # of what a combined change moves on a mesh, by which a finer one may differ
 SILENT = 1e-10  # of the measured values: a parameter that moves them less, when doubled, has no influence
 EXPONENTS = {1.0: "", 2.0: "^2", 3.0: "^3", 4.0: "^4", 1.5: "^(3/2)"}  # of simple laws
 SURE = 1e-3  # how closely a ratio of changes is to be a simple number
@@ -25,6 +28,10 @@ class LocalSlopes:
     jacobian: np.ndarray
     values: np.ndarray
 
+    def of(self, some: Sequence[int]) -> "LocalSlopes":
+        """Those of some parameters."""
+        return LocalSlopes(self.jacobian[:, some], self.values[some])
+
 
 def without_influence(point: LocalSlopes, sizes: np.ndarray, measured: float) -> list[int]:
     """Numbers of the parameters that no residual depends on; measured: norm of the values in deviations."""
@@ -32,14 +39,49 @@ def without_influence(point: LocalSlopes, sizes: np.ndarray, measured: float) ->
     return np.flatnonzero(moved <= SILENT * max(measured, np.max(moved, initial=0.0))).tolist()
 
 
-def silent_changes(point: LocalSlopes, sizes: np.ndarray) -> np.ndarray:
-    """Combined changes that no residual notices, relative to `sizes`, each with as few parameters as possible, (k, d)."""
+@dataclass(frozen=True, eq=False)
+class Silence:
+    """Combined changes (k, d) of the parameters by their sizes that no residual notices; resolved: whether that is sure."""
+
+    changes: np.ndarray
+    resolved: bool
+
+
+def silent_directions(
+    point: LocalSlopes, sizes: np.ndarray, finer: LocalSlopes | None = None, rounding: float = ROUNDING
+) -> Silence:
+    """What no residual notices; finer: slopes on a finer mesh, which differ where the mesh is too coarse to tell;
+    rounding: without it, what counts as zero.
+
+    A small singular value is one of rounding, and its vector silent, if the finer mesh does not confirm what it moves.
+    """
     slopes = point.jacobian * sizes
     norms = np.linalg.norm(slopes, axis=0)
-    _, singular, right = np.linalg.svd(slopes / norms, full_matrices=False)
-    null = right[singular <= RANK * singular[0]].T
+    norms = np.where(norms > 0, norms, 1.0)
+    slopes = slopes / norms
+    _, singular, right = np.linalg.svd(slopes, full_matrices=False)
+    null, resolved = [], True
+    for value, vector in zip(singular, right, strict=True):
+        if value > DOUBTFUL * singular[0]:
+            continue
+        if finer is None:
+            silent = value <= rounding * singular[0]
+        else:
+            moved, again = slopes @ vector, (finer.jacobian * sizes / norms) @ vector
+            silent = np.linalg.norm(again - moved) > CONFIRMED * value
+            resolved = resolved and not (silent and np.linalg.norm(again) > ROUNDING * singular[0])
+            silent = silent or value <= np.finfo(float).eps * singular[0]
+        if silent:
+            null.append(vector)
+    return Silence(np.array(null).reshape(len(null), sizes.size).T / norms[:, None], resolved)
+
+
+def _sparse_changes(point: LocalSlopes, sizes: np.ndarray, null: np.ndarray) -> np.ndarray:
+    """Combined changes (k, d) that span the same as `null`, relative to `sizes`, each with as few parameters as possible."""
     if not null.shape[1]:
         return null
+    norms = np.linalg.norm(point.jacobian * sizes, axis=0)
+    null = null * norms[:, None]
     found: Any = qr(null.T, pivoting=True, mode="r")
     pivots = found[1][: null.shape[1]]
     null = null @ np.linalg.inv(null[pivots])
@@ -49,14 +91,21 @@ def silent_changes(point: LocalSlopes, sizes: np.ndarray) -> np.ndarray:
 
 
 def indistinguishable(
-    names: Sequence[str], point: LocalSlopes, sizes: np.ndarray, elsewhere: Callable[[], LocalSlopes | None]
+    names: Sequence[str],
+    point: LocalSlopes,
+    sizes: np.ndarray,
+    finer: LocalSlopes | None,
+    elsewhere: Callable[[], LocalSlopes | None],
 ) -> list[str]:
     """A sentence for each group that cannot be told apart; [] if all can. elsewhere: slopes at another point."""
-    changes = silent_changes(point, sizes)
+    changes = _sparse_changes(point, sizes, silent_directions(point, sizes, finer).changes)
     if not changes.shape[1]:
         return []
     other = elsewhere()
-    again = None if other is None else silent_changes(other, sizes)
+    again = None
+    if other is not None:
+        null = silent_directions(other, sizes, rounding=NEARLY).changes
+        again = _sparse_changes(other, sizes, null)
     if again is not None and again.shape != changes.shape:
         again = None
     found = []

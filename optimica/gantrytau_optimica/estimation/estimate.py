@@ -9,40 +9,44 @@ computed for bad guesses of them (Bock, 1983, Recent advances in parameter ident
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Unpack
 
 import numpy as np
 
 from gantrytau import Model, ModelError, SolveError
+from gantrytau.interruption import heeding_interrupts
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, Phase
-from gantrytau_optimica.estimation.collinear_parameters import (
-    LocalSlopes,
-    indistinguishable,
-    without_influence,
-)
-from gantrytau_optimica.estimation.estimation import Estimate
+from gantrytau_optimica.estimation.estimation import Estimate, estimated
 from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_times
-from gantrytau_optimica.estimation.experiments import Experiment, named
-from gantrytau_optimica.estimation.mesh_shift import mesh_shift
+from gantrytau_optimica.estimation.experiments import Experiment, expected_noise, named
+from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, descended, fit_on_mesh, solution_at
+from gantrytau_optimica.estimation.mesh_error import with_corners
+from gantrytau_optimica.estimation.refined_fit import (
+    Budget,
+    RefinedFit,
+    TimeOver,
+    fit_on,
+    refined_fit,
+    weighted,
+)
 from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
-from gantrytau_optimica.estimation.robust_weights import huber_weights, median_deviation
+from gantrytau_optimica.estimation.weights import Weighing, Weights
 from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
 from gantrytau_optimica.prepared import Prepared
-from gantrytau_optimica.solving.ipopt import Solver, SolverSettings
+from gantrytau_optimica.solving.ipopt import WORDS, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_jumps
-from gantrytau_optimica.transcription.scheme import Collocation, collocation
+from gantrytau_optimica.transcription.program import Program, first_guess
+from gantrytau_optimica.transcription.scheme import collocation
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-EXPECTED_NOISE = (
-    0.01  # of the spread of the data, where no deviations were given: for the solver's scaling only
-)
-AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
-ROUNDS, SETTLED = 30, 1e-6  # of reweighing, and the relative change of the weights at which it ends
+HALTED = (WORDS["User_Requested_Stop"], WORDS["Maximum_WallTime_Exceeded"])
+MOST_STEPS, SHARE = 30, 0.2  # steps from the first guesses, and the part of the time that they may take
+EXPLAINED = 0.3  # of the spread of each measured course: what a fit from the first guesses may leave
+AT_FIRST = 50  # elements or a few more, on which a first answer is looked for from far away
 
 
 def estimate(
@@ -66,19 +70,22 @@ def estimate(
     _check(parameters, loss, asked)
     trials = named(experiments)
     known = next(iter(trials[0].measured.values())).weighted
-    read = plan(model, parameters, trials, 1.0 if known else _factor(trials))
+    read = plan(model, parameters, trials, {} if known else expected_noise(trials))
     _check_amount(read, known)
-    built = _built(read)
-    grid = collocation("radau", 1) if read.static else asked.collocation
-    meshes = [_mesh(read, k, phase, asked.mesh) for k, phase in enumerate(built.problem.phases)]
-    program = transcribe(built.problem, meshes, grid)
-    found = residuals(program)
-    check_determined(found, _without_start(read))
-    optimum = Prepared(built, program, Solver(program, asked.solver), {}, time.perf_counter() - begin).solve()
-    weights = np.ones(sum(found.sizes))
-    if loss == "robust":
-        optimum, weights = _robust(optimum, found, asked.solver, grid, meshes, known)
-    return _answer(read, found, optimum, weights, known, loss)
+    work = _Work(read, _built(read), known, loss, asked, "elements" in policy, Budget(begin + asked.max_time))
+    optimum = work.first(begin)
+    try:
+        with heeding_interrupts():
+            return work.finished(optimum)
+    except (KeyboardInterrupt, TimeOver) as end:
+        last = work.optimum(optimum)
+        found = ", ".join(f"{n.name} = {last.numbers[n.name]:.6g}" for n in read.numbers)
+        why = (
+            "interrupted" if isinstance(end, KeyboardInterrupt) else f"max_time={asked.max_time:g} s is over"
+        )
+        raise SolveError(
+            f"{read.read.name}: {why}; what was solved until then is in .optimum: {found}", optimum=last
+        ) from None
 
 
 def _check(parameters: Any, loss: Any, policy: Policy) -> None:
@@ -104,13 +111,6 @@ def _check_amount(read: Plan, known: bool) -> None:
             f"{read.read.name}: {size} measured values for {count} numbers ({names}), expected "
             f"{'at least as many' if size < count else 'more, to tell the noise'}; {remedy}, or estimate less"
         )
-
-
-def _factor(experiments: Sequence[Experiment]) -> float:
-    """Of the sum of squares, so that it is of the order of the number of samples at the answer."""
-    values = [s.values - s.values.mean(axis=0) for e in experiments for s in e.measured.values()]
-    spread = np.sqrt(np.mean(np.concatenate([v.ravel() for v in values]) ** 2))
-    return float((EXPECTED_NOISE * (spread or 1.0)) ** -2)
 
 
 def _built(read: Plan) -> Built:
@@ -143,14 +143,6 @@ def _course(times: np.ndarray, values: np.ndarray):
     return lambda t: np.array([np.interp(t, times, column) for column in values.T])
 
 
-def _mesh(read: Plan, number: int, phase: Phase, mesh: Mesh) -> Mesh:
-    """Elements of one experiment: borders where inputs jump, and for static models one at every sample."""
-    if read.static:
-        steps = np.diff(sample_times(read.experiments[number]))
-        return mesh_of([steps[0] if steps.size else 1.0, *steps])
-    return with_jumps(mesh, phase)
-
-
 def _without_start(read: Plan) -> dict[str, list[str]]:
     """States whose initial value the model does not fix, by experiment."""
     dae = read.read.dae
@@ -163,106 +155,131 @@ def _without_start(read: Plan) -> dict[str, list[str]]:
     return found
 
 
-def _robust(
-    optimum: Optimum,
-    found: Residuals,
-    settings: SolverSettings,
-    grid: Collocation,
-    meshes: Sequence[Mesh],
-    known: bool,
-) -> tuple[Optimum, np.ndarray]:
-    """Least squares again with stray values weighted down, until the weights settle."""
-    weights = np.ones(sum(found.sizes))
-    for _ in range(ROUNDS):
-        errors = found.values(optimum.solution.w)
-        size = 1.0 if known else float(median_deviation(errors)) or 1.0
-        before, weights = weights, huber_weights(errors, size)
-        if np.max(np.abs(weights - before)) < SETTLED:
-            break
-        problem = _weighted(found.program.problem, weights)
-        program = transcribe(problem, meshes, grid)
-        solution = Solver(program, settings).solve(program, optimum.solution.w)
-        optimum = replace(optimum, program=program, solution=solution)
-        if not solution.success:
-            raise SolveError(f"{optimum.report()}\nThe robust fit did not settle.", optimum=optimum)
-    return optimum, weights
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """One call of `estimate`: what was read, how it is to be solved, and what was solved last."""
 
+    read: Plan
+    built: Built
+    known: bool
+    loss: Literal["squares", "robust"]
+    asked: Policy
+    chosen: bool  # whether the caller chose the elements
+    budget: Budget
+    solved: list[MeshFit] = field(default_factory=list)
+    steps: list[float] = field(default_factory=list)  # sums of squares
 
-def _weighted(problem: ControlProblem, weights: np.ndarray) -> ControlProblem:
-    """The problem with the deviations of its samples widened by 1 / sqrt(weight)."""
-    phases, begin = [], 0
-    for phase in problem.phases:
-        sums = []
-        for one in phase.sums:
-            mine = weights[begin : begin + one.times.size]
-            sums.append(replace(one, deviations=one.deviations / np.sqrt(mine)))
-            begin += one.times.size
-        phases.append(replace(phase, sums=tuple(sums)))
-    return replace(problem, phases=tuple(phases))
+    @property
+    def settings(self) -> SolverSettings:
+        """Those of Ipopt, with the time that is left."""
+        return replace(self.asked.solver, max_time=self.budget.left)
 
+    def first(self, begin: float) -> Optimum:
+        """The answer on the mesh to begin with, from the first guesses. Raises SolveError, ModelError."""
+        scheme = collocation("radau", 1) if self.read.static else self.asked.collocation
+        program = transcribe(self.built.problem, self._meshes(), scheme)
+        check_determined(residuals(program), _without_start(self.read))
+        spent = time.perf_counter() - begin
+        from_guess = self._from_the_guess(program)
+        if from_guess is not None and self._explains(from_guess, program):
+            return self._solved(program, from_guess, spent)
+        try:
+            return Prepared(self.built, program, Solver(program, self.settings), {}, spent).solve()
+        except SolveError as error:
+            halted = error.optimum is None or error.optimum.status in HALTED
+            if from_guess is None or halted:
+                raise
+        return self._solved(program, from_guess, spent)
 
-def _answer(
-    read: Plan, found: Residuals, optimum: Optimum, weights: np.ndarray, known: bool, loss: str
-) -> Estimate:
-    """The record, once it is clear that the data determine the parameters."""
-    w = optimum.solution.w
-    parameters = optimum.numbers
-    order = list(parameters)
-    at_bounds = {}
-    for number in read.numbers:
-        for bound in (number.min, number.max):
-            if abs(parameters[number.name] - bound) <= AT_BOUND * number.size:
-                at_bounds[number.name] = bound
-    inner = [k for k, name in enumerate(order) if name not in at_bounds]
-    slopes = found.jacobian(w)[:, inner]
-    scales = np.concatenate([s.deviations for s in found.program.problem.sums])
-    measured = np.concatenate([s.values for s in found.program.problem.sums])
-    _refuse_lost(read, found, optimum, inner, slopes, float(np.linalg.norm(measured / scales)))
-    shown = {n.name: parameters[n.name] for n in read.numbers}
-    chosen = [k for n in read.numbers for k in inner if order[k] == n.name]
-    names, slopes = tuple(order[k] for k in chosen), slopes[:, [inner.index(k) for k in chosen]]
-    errors = found.values(w)
-    shift = np.zeros(len(names))
-    if inner and not read.static:
-        shift = mesh_shift(optimum, found.program.problem, slopes, errors)
-    return Estimate(
-        read.read.name, read.experiments, shown, at_bounds, names, slopes, errors, scales, weights,
-        dict(zip(names, shift.tolist(), strict=True)), known, loss, optimum,
-    )  # fmt: skip
+    def _from_the_guess(self, program: Program) -> np.ndarray | None:
+        """Unknowns of the best fit by steps from the motion with the first guesses; None if they lead nowhere.
 
+        Much quicker than Ipopt from afar, but its motion must exist for all numbers on the way.
+        """
+        found, steps = residuals(program), iter(range(min(MOST_STEPS, self.asked.max_iterations)))
+        end = time.perf_counter() + SHARE * self.budget.left
 
-def _refuse_lost(
-    read: Plan, found: Residuals, optimum: Optimum, inner: list[int], slopes: np.ndarray, measured: float
-) -> None:
-    """SolveError that names the parameters which the data cannot determine or tell apart."""
-    w, free = optimum.solution.w, found.program.places.free
-    size = {n.name: n.size for n in read.numbers}
-    names = [found.program.problem.free[k].name for k in inner]
-    values = w[free][inner]
-    sizes = np.array([max(abs(v), 1e-3 * size[n]) for n, v in zip(names, values, strict=True)])
-    point = LocalSlopes(slopes, values)
-    if not inner:
-        return
-    silent = without_influence(point, sizes, measured)
-    kept = [k for k in range(len(inner)) if k not in silent]
+        def step(cost: float) -> None:
+            if next(steps, None) is None or time.perf_counter() > end:
+                raise TimeOver
+            self._step(cost)
 
-    def elsewhere() -> LocalSlopes | None:
-        numbers = w[free].copy()
-        numbers[inner] += sizes * 0.1 * (1 + np.arange(len(inner)) / len(inner))
-        moved = found.on_manifold(w, numbers)
-        if moved is None:
+        try:
+            return descended(found, first_guess(program), Weights.even(found.total), step)
+        except TimeOver:
             return None
-        return LocalSlopes(found.jacobian(moved)[:, inner][:, kept], moved[free][inner][kept])
 
-    words = [f"{names[k]} has no influence on what was measured" for k in silent]
-    if kept:
-        words += indistinguishable(
-            [names[k] for k in kept], LocalSlopes(slopes[:, kept], values[kept]), sizes[kept], elsewhere
+    def _explains(self, w: np.ndarray, program: Program) -> bool:
+        """Whether a fit leaves little of how the values spread, so that it is not a minimum far from the best one."""
+        found, sums = residuals(program), program.problem.sums
+        left = np.split(found.values(w), np.cumsum([s.times.size for s in sums])[:-1])
+        spread = [(s.values - s.values.mean()) / s.deviations for s in sums]
+        return all(
+            np.linalg.norm(a) <= EXPLAINED * np.linalg.norm(b) for a, b in zip(left, spread, strict=True)
         )
-    if words:
-        remedy = "Leave it out" if len(words) == len(silent) == 1 else "Take one of each as known"
-        raise SolveError(
-            f"{read.read.name}: {'; '.join(words)}. {remedy}, or add measured variables or experiments in which they "
-            "show.",
-            optimum=optimum,
-        )
+
+    def _solved(self, program: Program, w: np.ndarray, spent: float) -> Optimum:
+        plain = Solver(program, self.settings).unsolved(program, w)
+        solution = replace(solution_at(program, w, plain), success=True, status=WORDS["Solve_Succeeded"])
+        return Optimum(self.read.read.name, self.built, program, solution, spent)
+
+    def _step(self, cost: float) -> None:
+        self.steps.append(cost)
+        self.budget.check()
+        if self.asked.progress is not None:
+            self.asked.progress(len(self.steps), cost)
+
+    def _meshes(self) -> list[Mesh]:
+        """Elements: borders where inputs jump or bend, and for static models one at every sample."""
+        if self.read.static:
+            steps = [np.diff(sample_times(e)) for e in self.read.experiments]
+            return [mesh_of([one[0] if one.size else 1.0, *one]) for one in steps]
+        begun = self.asked.mesh
+        thinned = np.arange(0, begun.elements, max(1, begun.elements // AT_FIRST))
+        begun = Mesh(np.append(begun.borders[thinned], 1.0))
+        return self._with_borders(begun)
+
+    def _with_borders(self, mesh: Mesh) -> list[Mesh]:
+        return [with_corners(with_jumps(mesh, phase), phase) for phase in self.built.problem.phases]
+
+    def solve(self, found: Residuals, w: np.ndarray, weights: Weights) -> np.ndarray | None:
+        """Unknowns by Ipopt from unknowns near them; None where it finds none. KeyboardInterrupt as it is pressed."""
+        self.budget.check()
+        program = _weighted(found.program, weights)
+        solution = Solver(program, replace(self.settings, near=True)).solve(program, w)
+        if solution.status == WORDS["User_Requested_Stop"]:
+            raise KeyboardInterrupt
+        return solution.w if solution.success else None
+
+    def finished(self, optimum: Optimum) -> Estimate:
+        """The estimate, from the answer on the first mesh. Raises SolveError where data do not tell parameters apart."""
+        found = residuals(optimum.program)
+        weighing = Weighing(self.read.outputs, self.known, self.loss)
+        fit = fit_on_mesh(found, optimum.solution.w, weighing, weighing.first(), self.solve, self._step)
+        if fit is None:
+            raise SolveError(f"{optimum.report()}\nThe fit did not settle.", optimum=optimum)
+        self.solved.append(fit)
+        if self.read.static:
+            return estimated(self.read, RefinedFit(fit, None, ""), weighing, self.optimum(optimum))
+        whole = self._with_borders(self.asked.mesh)
+        if len(whole[0].borders) > len(fit.residuals.program.places.layouts[0].mesh.borders):
+            fit = fit_on(whole, fit, None, weighing, self.solve, self._step) or fit
+            self.solved.append(fit)
+        refined = refined_fit(fit, weighing, self.solve, self._step, not self.chosen, self.solved.append)
+        return estimated(self.read, refined, weighing, self.optimum(optimum))
+
+    def optimum(self, first: Optimum) -> Optimum:
+        """What was solved last as an optimum; first: the answer on the first mesh."""
+        if not self.solved:
+            return first
+        fit = self.solved[-1]
+        program = fit.residuals.program
+        if np.any(fit.weights.roots != 1.0):
+            program = _weighted(program, fit.weights)
+        return replace(first, program=program, solution=solution_at(program, fit.w, first.solution))
+
+
+def _weighted(program: Program, weights: Weights) -> Program:
+    layouts = program.places.layouts
+    problem = weighted(program.problem, weights.roots)
+    return transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme)

@@ -53,16 +53,23 @@ class Plan:
     experiments: tuple[Experiment, ...]
     static: bool
 
+    @property
+    def outputs(self) -> np.ndarray:
+        """For every measured value, in the order of the residuals, the number of its name among all measured, (N,)."""
+        measured = [(name, s.values.size) for e in self.experiments for name, s in e.measured.items()]
+        order = list(dict.fromkeys(name for name, _ in measured))
+        return np.repeat([order.index(name) for name, _ in measured], [size for _, size in measured])
+
 
 def plan(
-    model: Any, parameters: Mapping[str, Any], experiments: tuple[Experiment, ...], factor: float
+    model: Any, parameters: Mapping[str, Any], experiments: tuple[Experiment, ...], noise: Mapping[str, float]
 ) -> Plan:
-    """Read the problem of estimating `parameters`; factor: of the sum of squares. Raises ModelError."""
+    """Read the problem of estimating `parameters`; noise: deviations by name where none were given. Raises ModelError."""
     instance = model() if isinstance(model, type) and issubclass(model, Model) else model
     if not isinstance(instance, Model) or isinstance(instance, Optimization):
         raise ModelError(f"estimate: found {model!r}, expected a Model (its class or an instance)")
     change = _Change(type(instance).__name__, parameters, experiments)
-    phases = {e.name: _phase(instance, e, factor) for e in experiments}
+    phases = {e.name: _phase(instance, e, noise) for e in experiments}
     problem = type(type(instance).__name__, (Optimization,), phases)
     read = read_problem(problem, change)
     _check_inputs(read, experiments)
@@ -74,7 +81,7 @@ def plan(
     return Plan(read, tuple(change.numbers), experiments, still)
 
 
-def _phase(model: Model, experiment: Experiment, factor: float) -> Optimization:
+def _phase(model: Model, experiment: Experiment, noise: Mapping[str, float]) -> Optimization:
     """The phase of one experiment, not yet with free parameters."""
 
     def objective(self: Any) -> Any:
@@ -86,9 +93,15 @@ def _phase(model: Model, experiment: Experiment, factor: float) -> Optimization:
                 raise ModelError(
                     f"measured {name}: found samples of {columns} columns, expected {found.numel()}"
                 )
+<<<<<<< HEAD
             samples.check_shape(f"measured {name}", numpy_shape(found))
             for one, column in zip(ca.vec(found).elements(), single_columns(samples), strict=True):
                 total = total + factor * sum_of_squares(one, column)
+=======
+            given = noise.get(name)
+            for one, column in zip(ca.vec(found).elements(), single_columns(samples, given), strict=True):
+                total = total + sum_of_squares(one, column)
+>>>>>>> b8c5483 (Estimates stand on meshes that end at corners of inputs and are cut where they matter; print tells all warnings)
         return total
 
     begin, stop = experiment.horizon
@@ -127,11 +140,12 @@ def member(model: Any, name: str) -> Any:
     return found
 
 
-def single_columns(samples: Samples) -> list[Samples]:
-    """Samples of one column each."""
+def single_columns(samples: Samples, noise: float | None) -> list[Samples]:
+    """Samples of one column each; noise: their deviation if they have none."""
+    deviations = samples.deviations if noise is None else np.full(samples.values.shape, noise)
     return [
         Samples(samples.times, values, deviation=deviation)
-        for values, deviation in zip(samples.values.T, samples.deviations.T[:, :, None], strict=True)
+        for values, deviation in zip(samples.values.T, deviations.T[:, :, None], strict=True)
     ]
 
 

@@ -1,6 +1,6 @@
 """Experiments: what was measured, under which inputs, from which start; checked when they are told."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
@@ -9,6 +9,10 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau_optimica.problem.optimization import Free, Optimization
 from gantrytau_optimica.problem.samples import Samples
+
+EXPECTED = 0.01  # of the spread of the data: their noise, until the fit tells it
+FEW_ALIKE = 4  # values, from which on equal ones are no accident
+SPREAD = 1e-9  # of the largest value: what does not spread more is constant
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +128,47 @@ def named(experiments: Any) -> tuple[Experiment, ...]:
             "Samples(..., deviation=...) everywhere, or their sizes relative to each other cannot be told"
         )
     return whole
+
+
+def expected_noise(experiments: Sequence[Experiment]) -> dict[str, float]:
+    """A deviation of the values of every measured name, where none were given: a part of how far they spread."""
+    found = {}
+    for name in dict.fromkeys(n for e in experiments for n in e.measured):
+        mine = [e.measured[name].values for e in experiments if name in e.measured]
+        spread = np.sqrt(np.mean(np.concatenate([(v - v.mean(axis=0)).ravel() for v in mine]) ** 2))
+        largest = max(float(np.max(np.abs(v))) for v in mine)
+        found[name] = EXPECTED * float(spread if spread > SPREAD * largest else largest or 1.0)
+    return found
+
+
+def told_twice(experiments: Sequence[Experiment]) -> list[str]:
+    """Words for measured courses that are the same as others: values that are measured twice are never equal."""
+    columns = [
+        (f"{name}{f' (column {k})' if s.values.shape[1] > 1 else ''} of {e.name}", e, s.times, column)
+        for e in experiments
+        for name, s in e.measured.items()
+        for k, column in enumerate(s.values.T)
+    ]
+    found: dict[tuple[str, str], list[str]] = {}
+    for j, (what, mine, times, values) in enumerate(columns):
+        for other, theirs, moments, before in columns[:j]:
+            if _same(times, values, moments, before):
+                found.setdefault((theirs.name, mine.name), []).append(f"{other} and {what}")
+    return [
+        f"{pairs[0]} hold the same values{f' (and {len(pairs) - 1} more)' if len(pairs) > 1 else ''}: if they were measured "
+        "once, give them once, as deviations come out too small"
+        for pairs in found.values()
+    ]
+
+
+def _same(times: np.ndarray, values: np.ndarray, moments: np.ndarray, others: np.ndarray) -> bool:
+    """Whether most values of the shorter course stand at the same times in the other, or the courses are equal."""
+    if values.size == others.size and np.array_equal(values, others):
+        return bool(np.ptp(values) > 0)
+    _, mine, theirs = np.intersect1d(times, moments, return_indices=True)
+    alike = values[mine] == others[theirs]
+    enough = 2 * np.sum(alike) > min(values.size, others.size)
+    return bool(enough and np.sum(alike) >= FEW_ALIKE and np.ptp(values[mine][alike]) > 0)
 
 
 def replaced(experiment: Experiment, **changes: Any) -> Experiment:

@@ -9,11 +9,12 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.estimation.experiments import Experiment, told_twice
 from gantrytau_optimica.estimation.robust_weights import median_deviation
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
-COARSE = 0.2  # deviations by which a halved mesh may move a parameter
+COMPUTED = 1e-6  # of the data: residuals that no measurement leaves
+ENDS = {"time": "raise max_time=", "lost": "raise elements=, or give guess= of the motion"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +23,12 @@ class ParameterFit:
 
     parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;
     jacobian: slopes of the residuals in deviations, (N, k), for the parameters `names` that are at no limit; errors:
-    these residuals, model less measured, (N,); scales: the deviations, (N,), 1 where none was given; known: whether
-    the deviations were given; weights: (N,) of a robust fit, else ones; mesh_shift: by how much the parameters
-    would move on half as long elements, about, by name (NaN: not found); optimum: the solved problem, whose objective
-    is a multiple of the sum of squares.
+    these residuals, model less measured, (N,); scales: the deviations, (N,), 1 for one output without, and for several
+    those that the fit leaves of each; known: whether the deviations were given; weights: (N,) of a robust fit, else ones;
+    mesh_shift: by how much the parameters would move on half as long elements, about, by name, and finer_deviations: how
+    sure they would be there (NaN: not found); limited: whether limits of the model's variables bind; ended: why the mesh
+    was not refined until the estimate stood ("": it stands); optimum: the solved problem, whose objective is a multiple
+    of the sum of squares.
     """
 
     name: str
@@ -38,9 +41,12 @@ class ParameterFit:
     scales: np.ndarray
     weights: np.ndarray
     mesh_shift: dict[str, float]
+    finer_deviations: dict[str, float]
     known: bool
     loss: str
     optimum: Optimum
+    limited: bool = False
+    ended: str = ""
 
     @property
     def freedom(self) -> int:
@@ -59,7 +65,7 @@ class ParameterFit:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of the residuals, of a robust fit by the median of their amounts."""
+        """Standard deviation of the residuals by `scales`, of a robust fit by the median of their amounts."""
         if self.loss == "robust":
             return float(median_deviation(self.errors))
         return float(np.sqrt(self.variance))
@@ -75,11 +81,12 @@ class ParameterFit:
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        """(k, k) of `names`, by the singular values of the normed slopes."""
+        """(k, k) of `names`, by the singular values of the normed slopes, with what the mesh costs as one more error."""
         norms = np.linalg.norm(self.jacobian, axis=0)
         _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
         root = right.T / singular / norms[:, None]
-        return root @ root.T * self._factor
+        shift = np.nan_to_num([self.mesh_shift[n] for n in self.names])
+        return root @ root.T * self._factor + np.outer(shift, shift)
 
     @property
     def _factor(self) -> float:
@@ -163,19 +170,44 @@ class ParameterFit:
             for j, b in enumerate(self.names[:i])
             if abs(correlation[i, j]) > STRONG
         ]
-        deviations = self.deviations
-        worst = max(self.names, key=lambda n: abs(self.mesh_shift[n]) / deviations[n], default="")
-        if worst and not abs(self.mesh_shift[worst]) <= COARSE * deviations[worst]:
+        found += [*self._mesh_words(), *told_twice(self.experiments)]
+        if self.limited:
             found.append(
-                f"the mesh is coarse: on twice the elements {worst} moves by "
-                f"{self.mesh_shift[worst] / deviations[worst]:.2g} of its deviations; raise elements="
+                "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them"
             )
         if self.known and self.loss == "squares" and self.probability < 1e-3:
             found.append(
                 f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
                 "small, or the model is wrong"
             )
+        if not self.known and self.freedom > 0 and self.noise <= COMPUTED * self._spread:
+            found.append(
+                f"the residuals are {self.noise / self._spread:.1g} of the spread of the data, as those of computed values: "
+                "the deviations are those of rounding, not of measuring"
+            )
         return tuple(found)
+
+    @property
+    def _spread(self) -> float:
+        """Of the measured values, in the deviations of the residuals."""
+        values = np.concatenate(
+            [s.values.ravel(order="F") for e in self.experiments for s in e.measured.values()]
+        )
+        return float(np.sqrt(np.mean((values / self.scales) ** 2)))
+
+    def _mesh_words(self) -> list[str]:
+        """What the mesh costs, where that matters, and why it was not made finer."""
+        if not self.names or self.ended == "":
+            return []
+        ways = ENDS.get(self.ended, "raise elements=, or leave it out")
+        moved = {n: abs(self.mesh_shift[n]) / self.finer_deviations[n] for n in self.names}
+        if not np.all(np.isfinite(list(moved.values()))):
+            return [f"what the mesh costs is not known, as the motion on a finer one was not found; {ways}"]
+        worst = max(moved, key=lambda n: moved[n])
+        return [
+            f"the mesh is coarse: on twice the elements {worst} moves by {self.mesh_shift[worst]:.2g}, "
+            f"{moved[worst]:.2g} of its deviations there; {ways}"
+        ]
 
     def __repr__(self) -> str:
         deviations: Mapping[str, float] = self.deviations
@@ -183,4 +215,6 @@ class ParameterFit:
             f"{n} = {v:.5g}" + (f" ± {deviations[n]:.2g}" if n in deviations else " (limit)")
             for n, v in self.parameters.items()
         )
-        return f"<{type(self).__name__} {self.name}: {words}>"
+        return "\n".join(
+            [f"<{type(self).__name__} {self.name}: {words}>", *(f"Note: {one}" for one in self.warnings)]
+        )

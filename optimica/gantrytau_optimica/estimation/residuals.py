@@ -38,6 +38,11 @@ class Residuals:
     assembled: Assembled
     sizes: tuple[int, ...]
 
+    @property
+    def total(self) -> int:
+        """N."""
+        return sum(self.sizes)
+
     def values(self, w: np.ndarray) -> np.ndarray:
         """(model - measured) / deviation, (N,)."""
         return np.array(self.assembled.nlp(w / self.program.places.scale, [])[1]).ravel()
@@ -62,6 +67,27 @@ class Residuals:
             moved = factors.solve(equations[:, free].toarray())
             found = found - slopes[:, self.others] @ moved
         return found / program.places.scale[free]
+
+    def defects(self, w: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """What the defect of each equation at w changes in rows (k, N) @ residuals, to first order, (equations, k).
+
+        For unknowns that are carried over from another mesh and do not fulfil the equations of this one.
+        """
+        scaled = w / self.program.places.scale
+        _, factors = self._factorised(w)
+        values = np.array(self.program.assembled.nlp(scaled, [])[1]).ravel()
+        slopes = self.assembled.jac_g(scaled, [])[1].sparse().tocsc()[:, self.others]
+        adjoint = factors.solve((slopes.T @ rows.T), trans="T")
+        return -adjoint * (values - self.program.lbg)[self.equations, None]
+
+    def multipliers(self, w: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Those of the equations, and of the limits of the free numbers, where the objective has a scaled slope (n,)."""
+        if not self.others.size:
+            return np.zeros(0), -slope[self.program.places.free]
+        equations, factors = self._factorised(w)
+        found = factors.solve(-slope[self.others], trans="T")
+        free = self.program.places.free
+        return found, -slope[free] - equations[:, free].T @ found
 
     def on_manifold(self, w: np.ndarray, numbers: np.ndarray) -> np.ndarray | None:
         """Unknowns that fulfil the equations for other free numbers, by Newton's method from w; None if it fails."""

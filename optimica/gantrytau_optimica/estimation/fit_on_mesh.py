@@ -1,0 +1,178 @@
+"""Least squares on one mesh, from an answer nearby: steps of Gauss and Newton on the manifold of the equations.
+
+    minimise |V (r + J dp)|^2 over dp within limits;   p + share dp, and the motion to it by Newton's method
+
+where V holds the weights of the residuals. Where a limit of the model's variables is in the way, Ipopt goes on.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from gantrytau_optimica.estimation.residuals import Residuals, residuals
+from gantrytau_optimica.estimation.weights import Weighing, Weights
+from gantrytau_optimica.solving.ipopt import Solution
+from gantrytau_optimica.transcription.program import Program
+
+STEPS = 60
+SETTLED = 1e-5  # of a deviation, or
+FINE = 1e-11  # of its size: a step of a number that changes nothing more
+SHARES = 0.5 ** np.arange(12)
+RANK = 1e-11  # of the largest singular value of normed slopes: directions in which no step is taken
+LIMIT = 1e-7  # of typical sizes, by which a limit of the model may be passed
+AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
+REWEIGHED = 40
+SAME = 1e-4  # relative: a change of the weights that changes nothing more
+
+Solve = Callable[[Residuals, np.ndarray, Weights], np.ndarray | None]
+Step = Callable[[float], None]  # told of the sum of squares before every step; may raise
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFit:
+    """Numbers and motion on one mesh: unknowns w (n,), residuals (N,) and their slopes (N, k) as the program weighs them.
+
+    limited: whether limits of the model's variables hold the motion.
+    """
+
+    residuals: Residuals
+    w: np.ndarray
+    errors: np.ndarray
+    jacobian: np.ndarray
+    weights: Weights
+    limited: bool
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The free numbers, (k,)."""
+        return self.w[self.residuals.program.places.free]
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Typical sizes of the free numbers, (k,)."""
+        scale = self.residuals.program.places.scale[self.residuals.program.places.free]
+        return np.maximum(np.abs(self.numbers), 1e-3 * scale)
+
+    @property
+    def inner(self) -> np.ndarray:
+        """Which free numbers stand at no limit, (k,)."""
+        free = self.residuals.program.problem.free
+        low, high = np.array([n.min for n in free]), np.array([n.max for n in free])
+        near = AT_BOUND * np.array([n.nominal or 1.0 for n in free])
+        return (np.abs(self.numbers - low) > near) & (np.abs(self.numbers - high) > near)
+
+
+def fit_on_mesh(
+    found: Residuals,
+    w: np.ndarray,
+    weighing: Weighing,
+    weights: Weights,
+    solve: Solve,
+    step: Step,
+) -> MeshFit | None:
+    """The best fit on the mesh of `found` from unknowns w near it; None where it is not found.
+
+    solve: Ipopt's answer from unknowns with weights, for where limits of the model bind.
+    """
+    limited, fit = False, None
+    for _ in range(REWEIGHED):
+        moved = None if limited else descended(found, w, weights, step)
+        if moved is None:
+            moved, limited = solve(found, w, weights), True
+            if moved is None:
+                return None
+        w = moved
+        errors, jacobian = found.values(w), found.jacobian(w)
+        fit = MeshFit(found, w, errors, jacobian, weights, limited and not _inside(found, w, -LIMIT))
+        if weighing.steady:
+            break
+        before, weights = weights, weighing.weights(errors, jacobian, weights)
+        if np.max(np.abs(weights.roots / before.roots - 1)) < SAME:
+            break
+    return fit
+
+
+def descended(found: Residuals, w: np.ndarray, weights: Weights, step: Step) -> np.ndarray | None:
+    """Unknowns of the least sum of squares; None if limits are passed or steps do not lead to it."""
+    program, roots = found.program, weights.roots
+    free, scale = program.places.free, program.places.scale
+    low, high = program.lbw[free] * scale[free], program.ubw[free] * scale[free]
+    sizes = scale[free]
+    at = found.on_manifold(w, np.clip(w[free], low, high))
+    if at is None:
+        return None
+    errors = found.values(at) * roots
+    for _ in range(STEPS):
+        step(float(errors @ errors))
+        slopes = found.jacobian(at) * roots[:, None]
+        change = bounded_step(slopes, errors, sizes, low - at[free], high - at[free])
+        size = np.linalg.norm(errors) / np.sqrt(max(errors.size - free.size, 1))
+        gained = np.linalg.norm(slopes @ change)
+        if gained <= SETTLED * size or np.all(
+            np.abs(change) <= FINE * np.maximum(np.abs(at[free]), 1e-3 * sizes)
+        ):
+            return at if _inside(found, at, LIMIT) else None
+        for share in SHARES:
+            moved = found.on_manifold(at, at[free] + share * change)
+            if moved is None:
+                continue
+            after = found.values(moved) * roots
+            if np.linalg.norm(after) < np.linalg.norm(errors):
+                break
+        else:
+            # what is left to be gained is lost in the rounding of the residuals
+            return at if gained <= 1e-3 * size and _inside(found, at, LIMIT) else None
+        at, errors = moved, after
+    return None
+
+
+def bounded_step(
+    slopes: np.ndarray, errors: np.ndarray, sizes: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """The step (k,) within low and high that makes |errors + slopes step| least; of several the smallest."""
+    norms = np.linalg.norm(slopes * sizes, axis=0)
+    norms = sizes / np.where(norms > 0, norms, 1.0)
+    step = norms * np.linalg.lstsq(slopes * norms, -errors, rcond=RANK)[0]
+    if np.all((step >= low) & (step <= high)):
+        return step
+    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    open_ = high - low > 0
+    inside = lsq_linear(
+        slopes[:, open_] * norms[open_], -errors, ((low / norms)[open_], (high / norms)[open_]), "bvls"
+    )
+    step = np.zeros(sizes.size)
+    step[open_] = np.clip(norms[open_] * inside.x, low[open_], high[open_])
+    return step
+
+
+def _inside(found: Residuals, w: np.ndarray, room: float) -> bool:
+    """Whether the motion keeps the limits of the model, but for `room` of typical sizes (below 0: stays off them)."""
+    program = found.program
+    x = (w / program.places.scale)[found.others]
+    low, high = program.lbw[found.others], program.ubw[found.others]
+    rows = np.array(program.assembled.nlp(w / program.places.scale, [])[1]).ravel()
+    unequal = program.lbg != program.ubg
+    rows, lower, upper = rows[unequal], program.lbg[unequal], program.ubg[unequal]
+    passed = [(low, low - x), (high, x - high), (lower, lower - rows), (upper, rows - upper)]
+    return all(np.all(by <= room * np.maximum(1.0, np.abs(limit))) for limit, by in passed)
+
+
+def solution_at(program: Program, w: np.ndarray, before: Solution) -> Solution:
+    """Unknowns w of a fit as a solution of its program, with the multipliers that belong to them.
+
+    Of the equations, G_y^T lambda = -f_y; of the limits, what is then left of the slope by the free numbers.
+    """
+    found = residuals(program)
+    x, free, scale = w / program.places.scale, program.places.free, program.places.scale
+    objective, rows = program.assembled.nlp(x, [])
+    slope = np.array(program.assembled.grad_f(x, [])[1]).ravel()
+    multipliers, bounds = np.zeros(program.assembled.rows), np.zeros(w.size)
+    equations, own = found.multipliers(w, slope)
+    multipliers[found.equations] = equations
+    bounds[free] = own / scale[free]
+    return replace(
+        before, w=w, multipliers=multipliers, bound_multipliers=bounds, constraints=np.array(rows).ravel(),
+        objective=float(objective),
+    )  # fmt: skip

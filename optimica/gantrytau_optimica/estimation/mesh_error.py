@@ -1,0 +1,183 @@
+"""How far an estimate lies off because the motion is computed on a mesh, and in which elements that arises.
+
+    every element cut into two:  r': residuals on the finer mesh at the same numbers;  dp = -(J'^T J')^-1 J'^T r'
+
+A step of Gauss and Newton: collocation loses at least a factor of four with half the length, so dp is most of the error.
+To first order it is a sum over elements, -(J^T J)^-1 J^T dr/dw G_w^-1 defect, where the defects are those of the coarse
+motion in the equations of the finer mesh (Becker, Rannacher (2001), Acta Numerica 10, 1: dual-weighted residuals).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau_optimica.control.control_problem import Phase
+from gantrytau_optimica.estimation.fit_on_mesh import RANK, MeshFit, bounded_step
+from gantrytau_optimica.estimation.residuals import Residuals, residuals
+from gantrytau_optimica.solving.warm_start import warm_start
+from gantrytau_optimica.transcription.layout import Layout
+from gantrytau_optimica.transcription.mesh import Mesh, with_borders
+from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.trajectory import Trajectory
+from gantrytau_optimica.transcription.transcribe import transcribe
+
+COARSE = 0.2  # deviations by which a finer mesh may move a number, or
+FINE = 1e-7  # of its size
+CANCELLED = 5.0  # times that: what elements may contribute that cancel each other
+BENT = (
+    1e-9  # of the range of an input: a change of its slope, times the distance of samples, that is a corner
+)
+MOST_OF = 0.6  # of the elements: where as many are cut, all are
+MUCH = 200.0  # times its share, from which on an element is cut twice
+INNER = 0.02  # of an element, off its ends: where it is cut at a corner
+
+
+@dataclass(frozen=True, eq=False)
+class MeshError:
+    """What the mesh of a fit costs.
+
+    finer, w: the mesh of twice the elements, and the motion on it with the numbers of the fit; jacobian (N, k): slopes
+    there; shift (k,): how far the best numbers there are off, about; parts: by phase, contributions (elements, k);
+    deviations (k,): of the numbers there.
+    """
+
+    finer: Residuals
+    w: np.ndarray
+    jacobian: np.ndarray
+    shift: np.ndarray
+    parts: tuple[np.ndarray, ...]
+    deviations: np.ndarray
+    allowed: np.ndarray
+
+    @property
+    def stands(self) -> bool:
+        """Whether the mesh hardly matters."""
+        whole = np.sum([np.sum(np.abs(part), axis=0) for part in self.parts], axis=0)
+        return bool(np.all(np.abs(self.shift) <= self.allowed) and np.all(whole <= CANCELLED * self.allowed))
+
+
+def corners(phase: Phase) -> np.ndarray:
+    """Times in s at which known inputs of a phase jump or bend."""
+    found = [np.zeros(0)]
+    for course in phase.courses:
+        kinks = course.kinks
+        if not kinks.size:
+            continue
+        gaps = np.diff(kinks) if kinks.size > 1 else np.ones(1)
+        step = np.minimum(np.append(gaps[0], gaps), np.append(gaps, gaps[-1])) / 2
+        before, here, after = (course.value(kinks + shift) for shift in (-step, 0.0, step))
+        bends = np.abs(after - 2 * here + before)
+        found.append(kinks[bends > BENT * np.max(np.abs([before, here, after]))])
+    return np.unique(np.concatenate(found))
+
+
+def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
+    """What the mesh costs; None where the motion on a finer one is not found. known: deviations of the data were given."""
+    program = fit.residuals.program
+    problem, layouts = program.problem, program.places.layouts
+    finer = residuals(transcribe(problem, halved(fit), layouts[0].scheme))
+    near = carried_over(program, fit.w, finer.program)
+    w = finer.on_manifold(near, fit.numbers)
+    if w is None:
+        return None
+    inner, roots = fit.inner, fit.weights.roots
+    slopes, errors = finer.jacobian(w), finer.values(w) * roots
+    weighed = slopes[:, inner] * roots[:, None]
+    free, scale = fit.residuals.program.places.free, fit.residuals.program.places.scale
+    low, high = program.lbw[free] * scale[free] - fit.numbers, program.ubw[free] * scale[free] - fit.numbers
+    shift = np.zeros(fit.numbers.size)
+    shift[inner] = bounded_step(weighed, errors, fit.sizes[inner], low[inner], high[inner])
+    left = errors + weighed @ shift[inner]
+    inverse = _inverse(weighed, fit.sizes[inner])
+    variance = 1.0 if known else float(left @ left) / max(left.size - inner.sum(), 1)
+    deviations = np.zeros(shift.size)
+    deviations[inner] = np.sqrt(np.sum(inverse**2, axis=1) * variance)
+    parts = np.zeros((finer.equations.size, shift.size))
+    parts[:, inner] = finer.defects(near, -inverse * roots)
+    allowed = np.maximum(COARSE * deviations, FINE * fit.sizes)
+    return MeshError(finer, w, slopes, shift, _by_element(finer, layouts, parts), deviations, allowed)
+
+
+def carried_over(program: Program, w: np.ndarray, other: Program) -> np.ndarray:
+    """Unknowns of `other`, the same problem on other meshes, from those of `program`."""
+    numbers = w[program.places.free]
+    old = [Trajectory(program.problem, layout, w, numbers) for layout in program.places.layouts]
+    found = warm_start(old, other)
+    for one, layout in zip(old, other.places.layouts, strict=True):
+        if layout.begin.size:
+            found[layout.begin] = one.signals(one.times(np.zeros(1)))[len(layout.phase.states) :][
+                : layout.begin.size, 0
+            ]
+    return found
+
+
+def _inverse(slopes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Pseudoinverse (k, N) of slopes (N, k), by columns of equal length."""
+    norms = np.linalg.norm(slopes, axis=0)
+    norms = np.where(norms > 0, norms, 1.0 / sizes)
+    return np.linalg.pinv(slopes / norms, rcond=RANK) / norms[:, None]
+
+
+def _by_element(finer: Residuals, layouts: Sequence[Layout], parts: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Contributions of equations (e, k) summed by the elements that were cut."""
+    program = finer.program
+    place = np.full(program.assembled.rows, -1)
+    place[finer.equations] = np.arange(finer.equations.size)
+    found = [np.zeros((layout.mesh.elements, parts.shape[1])) for layout in layouts]
+    for group in program.groups:
+        inside = (place[group.rows] >= 0) & np.isfinite(group.moments)
+        if group.phase < 0 or not np.any(inside):
+            continue
+        element, _ = layouts[group.phase].mesh.locate(group.moments[inside])
+        np.add.at(found[group.phase], element, parts[place[group.rows[inside]]])
+    return tuple(found)
+
+
+def better_meshes(fit: MeshFit, error: MeshError) -> list[Mesh]:
+    """The meshes with those elements cut that contribute more than their share of what is allowed."""
+    layouts = fit.residuals.program.places.layouts
+    total = sum(layout.mesh.elements for layout in layouts)
+    meshes = []
+    for layout, part in zip(layouts, error.parts, strict=True):
+        excess = np.max(np.abs(part) / np.where(error.allowed > 0, error.allowed, np.inf), axis=1) * total
+        cuts = np.where(excess > 1.0, 1, 0) + np.where(excess > MUCH, 1, 0)
+        meshes.append(_cut(layout.mesh, cuts, _corners_as_shares(layout.phase)))
+    cut = sum(mesh.elements for mesh in meshes) - total
+    return meshes if cut < MOST_OF * total else halved(fit)
+
+
+def with_corners(mesh: Mesh, phase: Phase) -> Mesh:
+    """The mesh with borders at all corners of inputs, if these are not more than elements."""
+    shares = _corners_as_shares(phase)
+    return with_borders(mesh, shares) if 0 < shares.size <= mesh.elements else mesh
+
+
+def _corners_as_shares(phase: Phase) -> np.ndarray:
+    start, final = float(phase.start_time), float(phase.final_time)
+    found = (corners(phase) - start) / (final - start)
+    return found[(found > 0) & (found < 1)]
+
+
+def halved(fit: MeshFit) -> list[Mesh]:
+    """The meshes with every element cut into two."""
+    layouts = fit.residuals.program.places.layouts
+    return [_cut(la.mesh, np.ones(la.mesh.elements, int), _corners_as_shares(la.phase)) for la in layouts]
+
+
+def _cut(mesh: Mesh, cuts: np.ndarray, corners: np.ndarray) -> Mesh:
+    """Elements cut as often as `cuts` (n,) says: at the corner next to the middle, or else in the middle."""
+    while np.any(cuts > 0):
+        left, right = mesh.borders[:-1], mesh.borders[1:]
+        middle, width = (left + right) / 2, right - left
+        if corners.size:
+            after = np.clip(np.searchsorted(corners, middle), 1, max(corners.size - 1, 1))
+            pair = corners[np.minimum([after - 1, after], corners.size - 1)]
+            nearest = np.where(np.abs(pair[0] - middle) <= np.abs(pair[1] - middle), pair[0], pair[1])
+            inside = np.abs(nearest - middle) < (0.5 - INNER) * width
+            middle = np.where(inside, nearest, middle)
+        cut = cuts > 0
+        borders = np.sort(np.concatenate([mesh.borders, middle[cut]]))
+        cuts = np.repeat(np.maximum(cuts - 1, 0), np.where(cut, 2, 1))
+        mesh = Mesh(borders, (), mesh.shortest)
+    return mesh

@@ -1,0 +1,145 @@
+"""A fit on better and better meshes, until what it says no longer depends on them."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.estimation.collinear_parameters import LocalSlopes, silent_directions
+from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, Solve, Step, fit_on_mesh
+from gantrytau_optimica.estimation.mesh_error import (
+    MeshError,
+    better_meshes,
+    carried_over,
+    halved,
+    mesh_error,
+)
+from gantrytau_optimica.estimation.residuals import residuals
+from gantrytau_optimica.estimation.weights import Weighing
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.transcribe import transcribe
+
+MOST_ROUNDS = 14
+MOST_ELEMENTS = 6000
+BLIND = 2  # rounds in which all elements are cut because the data seem to tell nothing of a parameter
+
+Ended = Literal["", "time", "lost", "elements"]
+
+
+class TimeOver(Exception):
+    """No time is left; what was solved before stands."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Time until which all is to be done, of time.perf_counter in s."""
+
+    end: float
+
+    @property
+    def left(self) -> float:
+        """s, above 0."""
+        return max(self.end - time.perf_counter(), 1e-3)
+
+    def check(self) -> None:
+        """TimeOver if there is none left."""
+        if time.perf_counter() > self.end:
+            raise TimeOver
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedFit:
+    """The last fit, what its mesh costs (None: not known), and why it ended before it stood ("": it stands)."""
+
+    fit: MeshFit
+    error: MeshError | None
+    ended: Ended
+
+
+def refined_fit(
+    fit: MeshFit,
+    weighing: Weighing,
+    solve: Solve,
+    step: Step,
+    further: bool,
+    keep: Callable[[MeshFit], None],
+) -> RefinedFit:
+    """The fit on meshes that are refined where it matters, until it stands; further: whether they may be.
+
+    keep: told of every fit that is found.
+    """
+    error: MeshError | None = None
+    blind = 0
+    try:
+        for _ in range(MOST_ROUNDS):
+            step(_cost(fit))
+            error = mesh_error(fit, weighing.known)
+            if not further:
+                return RefinedFit(fit, error, "" if error is not None and error.stands else "elements")
+            resolved = error is not None and (blind == BLIND or _resolved(fit, error))
+            if error is not None and error.stands and resolved:
+                return RefinedFit(fit, error, "")
+            blind += not resolved
+            meshes = better_meshes(fit, error) if error is not None and resolved else halved(fit)
+            if sum(m.elements for m in meshes) > MOST_ELEMENTS:
+                return RefinedFit(fit, error, "elements")
+            better = fit_on(meshes, fit, error, weighing, solve, step)
+            if better is None:
+                return RefinedFit(fit, error, "lost")
+            fit, error = better, None
+            keep(fit)
+    except TimeOver:
+        return RefinedFit(fit, error, "time")
+    return RefinedFit(fit, error, "elements")
+
+
+def _cost(fit: MeshFit) -> float:
+    """Sum of squares."""
+    return float(np.sum((fit.errors * fit.weights.roots) ** 2))
+
+
+def _resolved(fit: MeshFit, error: MeshError) -> bool:
+    """Whether the mesh is fine enough to say which parameters the data determine."""
+    inner, roots = fit.inner, fit.weights.roots[:, None]
+    here, there = (
+        LocalSlopes(j[:, inner] * roots, fit.numbers[inner]) for j in (fit.jacobian, error.jacobian)
+    )
+    return silent_directions(here, fit.sizes[inner], there).resolved
+
+
+def fit_on(
+    meshes: Sequence[Mesh],
+    fit: MeshFit,
+    error: MeshError | None,
+    weighing: Weighing,
+    solve: Solve,
+    step: Step,
+) -> MeshFit | None:
+    """The fit on other meshes, from this one; None where it is not found. Raises TimeOver."""
+    program = fit.residuals.program
+    layouts = program.places.layouts
+    if error is not None:
+        program, w = error.finer.program, error.w
+        same = [layout.mesh.borders for layout in program.places.layouts]
+        if all(np.array_equal(mesh.borders, borders) for mesh, borders in zip(meshes, same, strict=True)):
+            return fit_on_mesh(error.finer, w, weighing, fit.weights, solve, step)
+    else:
+        w = fit.w
+    step(_cost(fit))
+    found = residuals(transcribe(program.problem, meshes, layouts[0].scheme))
+    return fit_on_mesh(found, carried_over(program, w, found.program), weighing, fit.weights, solve, step)
+
+
+def weighted(problem: ControlProblem, roots: np.ndarray) -> ControlProblem:
+    """The problem with the deviations of its samples divided by roots (N,) of weights."""
+    phases, begin = [], 0
+    for phase in problem.phases:
+        sums = []
+        for one in phase.sums:
+            sums.append(replace(one, deviations=one.deviations / roots[begin : begin + one.times.size]))
+            begin += one.times.size
+        phases.append(replace(phase, sums=tuple(sums)))
+    return replace(problem, phases=tuple(phases))

@@ -1,0 +1,91 @@
+"""How residuals are weighed: by given deviations, by the noise of each output as the fit leaves it, and strays less.
+
+    noise_g^2 = sum over the values of output g of residual^2 / (their number - the share of the parameters they tell)
+
+Without deviations, outputs of different units have no common noise. Their variances are estimated with the parameters,
+each from the degrees of freedom that its values keep (restricted maximum likelihood; Harville (1977), J. American
+Statistical Association 72, 320). A robust fit takes medians instead.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gantrytau_optimica.estimation.robust_weights import huber_weights, median_deviation
+
+LEAST = 1e-7  # of the expected noise: that of computed data, which have none
+FEWEST = (
+    2  # degrees of freedom from which the noise of an output is estimated; below, it is that of the others
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """noise (N,): deviation of every residual in the units in which they come; huber (N,): weights at most 1 of strays."""
+
+    noise: np.ndarray
+    huber: np.ndarray
+
+    @staticmethod
+    def even(count: int) -> "Weights":
+        """Those of residuals that come in deviations, without strays."""
+        return Weights(np.ones(count), np.ones(count))
+
+    @property
+    def roots(self) -> np.ndarray:
+        """Factors (N,) of the residuals whose squares are summed."""
+        return np.sqrt(self.huber) / self.noise
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """outputs (N,): number of the output of every residual; known: whether the deviations were given."""
+
+    outputs: np.ndarray
+    known: bool
+    loss: Literal["squares", "robust"]
+
+    @property
+    def count(self) -> int:
+        """Number of outputs."""
+        return int(np.max(self.outputs)) + 1
+
+    @property
+    def steady(self) -> bool:
+        """Whether weights do not depend on the residuals."""
+        return self.loss == "squares" and (self.known or self.count == 1)
+
+    def first(self) -> Weights:
+        """Weights before anything is fitted."""
+        return Weights.even(self.outputs.size)
+
+    def weights(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> Weights:
+        """Weights that the residuals (N,) with slopes (N, k) ask for; before: those they were fitted with."""
+        noise = before.noise if self.known else self._noise(errors, jacobian, before)
+        if self.loss == "squares":
+            return Weights(noise, before.huber)
+        return Weights(noise, huber_weights(errors / noise, 1.0))
+
+    def _noise(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> np.ndarray:
+        mine = [np.flatnonzero(self.outputs == g) for g in range(self.count)]
+        if self.loss == "robust":
+            found = [float(median_deviation(errors[rows])) for rows in mine]
+            return self._spread(np.maximum(found, LEAST))
+        told = _told(jacobian * before.roots[:, None])
+        freedom = np.array([rows.size - np.sum(told[rows]) for rows in mine])
+        sums = np.array([np.sum(errors[rows] ** 2) for rows in mine])
+        own = freedom >= FEWEST
+        others = np.sqrt(np.sum(sums) / max(np.sum(freedom), 1.0))
+        found = np.where(own, np.sqrt(sums / np.where(own, freedom, 1.0)), others)
+        return self._spread(np.maximum(found, LEAST))
+
+    def _spread(self, by_output: np.ndarray) -> np.ndarray:
+        return np.asarray(by_output)[self.outputs]
+
+
+def _told(slopes: np.ndarray) -> np.ndarray:
+    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the slopes."""
+    norms = np.linalg.norm(slopes, axis=0)
+    basis, singular, _ = np.linalg.svd(slopes / np.where(norms > 0, norms, 1.0), full_matrices=False)
+    return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)

@@ -1,0 +1,94 @@
+"""Estimates do not depend on the mesh: corners of inputs, refinement, and words for what a mesh costs."""
+
+import numpy as np
+import pytest
+
+from gantrytau import Input, Model, Parameter, Real, der
+from gantrytau_optimica import Free, Samples
+from gantrytau_optimica.estimation.estimate import estimate
+from gantrytau_optimica.estimation.experiments import Experiment
+
+TIMES = np.linspace(0.0, 2.0, 81)
+STEPS = np.where(TIMES % 0.8 < 0.4, 5.0, 0.0)  # V, joined by straight lines
+
+
+class Filter(Model):
+    """A resistor and a capacitor; optionally two stages, of which the current is measured."""
+
+    T = Parameter(0.05, unit="s", description="time constant")
+    u = Input(unit="V", description="input")
+    v = Real(unit="V", start=0.0, fixed=True, description="voltage")
+
+    def equations(self):
+        yield self.T * der(self.v) == self.u - self.v
+
+
+class Stages(Model):
+    """Two stages of resistors and capacitors in a row."""
+
+    R1 = Parameter(120.0)
+    C1 = Parameter(1e-3)
+    R2 = Parameter(300.0)
+    C2 = Parameter(5e-4)
+    u = Input()
+    v1 = Real(start=0.0, fixed=True)
+    v2 = Real(start=0.0, fixed=True)
+    i = Real()
+
+    def equations(self):
+        between = (self.v1 - self.v2) / self.R2
+        yield self.i == (self.u - self.v1) / self.R1
+        yield self.C1 * der(self.v1) == self.i - between
+        yield self.C2 * der(self.v2) == between
+
+
+def through_corners(a: np.ndarray, b: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """x' = a x + b u from x = 0 at the times of u, which is joined by straight lines: exact, by exponentials, (n, m)."""
+    from scipy.linalg import expm
+
+    m, found = b.size, [np.zeros(b.size)]
+    for k, step in enumerate(np.diff(times)):
+        whole = np.zeros((m + 2, m + 2))  # of x, u and its slope
+        whole[:m, :m], whole[:m, m], whole[m, m + 1] = a, b, 1.0
+        slope = (values[k + 1] - values[k]) / step
+        found.append((expm(whole * step) @ np.concatenate([found[-1], [values[k], slope]]))[:m])
+    return np.array(found)
+
+
+def filtered(T: float = 0.05) -> np.ndarray:
+    return through_corners(np.array([[-1 / T]]), np.array([1 / T]), TIMES, STEPS)[:, 0]
+
+
+def within(fit, truth: dict[str, float], deviations: float = 4.0) -> None:
+    for name, value in truth.items():
+        assert abs(fit.parameters[name] - value) < deviations * fit.deviations[name], name
+
+
+def test_inputs_with_corners_that_are_no_borders_of_the_default_mesh():
+    experiment = Experiment({"v": Samples(TIMES, filtered())}, inputs={"u": (TIMES, STEPS)})
+    fit = estimate(Filter, {"T": 0.1}, experiment)
+    assert fit.parameters["T"] == pytest.approx(0.05, rel=1e-7)
+    within(fit, {"T": 0.05})
+    assert "as those of computed values" in fit.warnings[0]
+
+
+def test_the_current_of_two_stages_tells_all_four_numbers():
+    truth = dict(R1=120.0, C1=1e-3, R2=300.0, C2=5e-4)
+    c1, c2 = 1e3, 2e3
+    a = np.array([[-c1 / 120 - c1 / 300, c1 / 300], [c2 / 300, -c2 / 300]])
+    current = (STEPS - through_corners(a, np.array([c1 / 120, 0.0]), TIMES, STEPS)[:, 0]) / 120
+    guesses = {n: Free(x, min=0.0) for n, x in dict(R1=100.0, C1=1.5e-3, R2=250.0, C2=6e-4).items()}
+    fit = estimate(Stages, guesses, Experiment({"i": Samples(TIMES, current)}, inputs={"u": (TIMES, STEPS)}))
+    assert [fit.parameters[n] for n in truth] == pytest.approx(list(truth.values()), rel=1e-6)
+    noise = 2e-4
+    noisy = current + np.random.default_rng(3).normal(0.0, noise, current.size)
+    experiment = Experiment({"i": Samples(TIMES, noisy, deviation=noise)}, inputs={"u": (TIMES, STEPS)})
+    within(estimate(Stages, guesses, experiment), truth)
+
+
+def test_what_a_chosen_mesh_costs_is_printed():
+    experiment = Experiment({"v": Samples(TIMES, filtered())}, inputs={"u": (TIMES, STEPS)})
+    fit = estimate(Filter, {"T": 0.1}, experiment, elements=4)
+    assert "the mesh is coarse: on twice the elements T moves by" in repr(fit)
+    assert repr(fit).split("Note: ")[1:] == [f"{w}\n" for w in fit.warnings[:-1]] + [fit.warnings[-1]]
+    within(fit, {"T": 0.05})  # the deviation holds what the mesh costs
