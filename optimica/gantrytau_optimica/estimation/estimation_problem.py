@@ -93,15 +93,10 @@ def _phase(model: Model, experiment: Experiment, noise: Mapping[str, float]) -> 
                 raise ModelError(
                     f"measured {name}: found samples of {columns} columns, expected {found.numel()}"
                 )
-<<<<<<< HEAD
             samples.check_shape(f"measured {name}", numpy_shape(found))
-            for one, column in zip(ca.vec(found).elements(), single_columns(samples), strict=True):
-                total = total + factor * sum_of_squares(one, column)
-=======
             given = noise.get(name)
             for one, column in zip(ca.vec(found).elements(), single_columns(samples, given), strict=True):
                 total = total + sum_of_squares(one, column)
->>>>>>> b8c5483 (Estimates stand on meshes that end at corners of inputs and are cut where they matter; print tells all warnings)
         return total
 
     begin, stop = experiment.horizon
