@@ -1,6 +1,6 @@
 """What a fit of rods found: parameters, how sure they are, and how well they predict poses that were held out."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -11,7 +11,7 @@ from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
-from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
 from gantrytau_optimica.calibration.fitting.named_parameters import (
     Named,
@@ -21,6 +21,7 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
 )
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.judging.device_frames import Motion
+from gantrytau_optimica.calibration.judging.link_systems import LinkSystem, link_systems
 from gantrytau_optimica.calibration.judging.plausibility import Misses
 from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
@@ -257,29 +258,13 @@ class FittedRods:
         """Rows that close worse than noise explains, seen by a fit without them."""
         return suspicion(self.fits, self.measurements, self.rows, self.held_out, self.nominal)
 
-    def systems(self, few: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-        """For each actuator its column in q, errors (N, m) of a group of m links at some fitted poses, their slopes by the
-        combinations of numbers that data hold and by those that were given (N, m, p), and by the actuator (N, m), zero for
-        links of others; by weights where a loss gave them.
+    def systems(self, most: int) -> tuple[np.ndarray, list[LinkSystem]]:
+        """Rows that were fitted or held out, at most so many, evenly spread, and their closure errors with all derivatives;
+        without those that a robust loss left without weight.
         """
-        data = self.measurements.select(self.rows[few])
-        for fit in self.fits:
-            weights = np.ones(len(few)) if fit.weights is None else fit.weights[few]
-            # what is known of all fitted poses is not worked out anew
-            here = fit.group if len(few) == len(self.rows) else fit.group.over(data.q, data.r, data.R)
-            every = replace(here, free=np.ones_like(here.free))
-            jacobian = [every.slopes(fit.x, k) for k in range(len(here.chains))]
-            if fit.minimum.rank < here.free.sum():  # what data do not hold explains nothing
-                held = np.zeros((fit.minimum.rank, len(fit.x)))
-                held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
-                known = np.vstack([held, np.eye(len(fit.x))[~here.free]]).T
-                jacobian = [one @ known for one in jacobian]
-            slopes = [link.by_actuator(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
-            errors = weights[:, None] * here.errors(fit.x)
-            jacobian = weights[:, None, None] * np.stack(jacobian, axis=1)
-            for column in sorted({column for one in slopes for column in one}):
-                by_one = [weights * one.get(column, np.zeros(len(few))) for one in slopes]
-                yield column, errors, jacobian, np.column_stack(by_one)
+        used = np.setdiff1d(np.union1d(self.rows, self.held_out), self.left_out)
+        rows = used[thinned(len(used), most)]
+        return rows, link_systems(self.fits, self.measurements.select(rows))
 
 
 def _mean(values: np.ndarray) -> np.float64:

@@ -12,6 +12,8 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from gantrytau_optimica.calibration.judging.link_systems import LinkSystem, freedom, variance
+
 SHARE = 0.5  # of the squares, that a step must explain, or two
 DEVIATIONS = 7.0  # of its own, that a step must have
 ROWS = 5  # at the least on each side of a step: fewer are outliers
@@ -28,25 +30,24 @@ class Slip:
     size: float
 
 
-def slip(errors: np.ndarray, jacobian: np.ndarray, slopes: np.ndarray, smooth: np.ndarray) -> Slip | None:
-    """Errors (N, m) of m links over N poses, jacobian (N, m, p) of their numbers, slopes (N, m) by the actuator, smooth
-    functions of the pose (N, s).
-    """
-    count, links = errors.shape
-    known = np.linalg.qr(jacobian.reshape(count * links, -1))[0]
-    freedom = count * links - known.shape[1] - 2
-    if freedom < FREEDOM:
+def slip(links: LinkSystem, slopes: np.ndarray, smooth: np.ndarray) -> Slip | None:
+    """Of links at N poses, by derivatives (N, m) of their errors by the actuator; smooth functions of the pose (N, s)."""
+    left, known = links.left.ravel(), links.known
+    remaining = left.size - known.shape[1] - 2
+    if remaining < FREEDOM:
         return None
-    left = errors.ravel() - known @ (known.T @ errors.ravel())
-    found, rest = _steps(left, known, slopes, freedom)
+    found, rest = _steps(left, known, slopes, remaining)
     if found is None:
         return None
-    columns = np.kron(np.eye(links), smooth[:, None, :]).reshape(count, links, -1)
-    wide = np.linalg.qr(np.column_stack([known, columns.reshape(count * links, -1)]))[0]
-    rival, rival_freedom = left - wide @ (wide.T @ left), count * links - wide.shape[1]
-    if rival_freedom < FREEDOM or float(rival @ rival) / rival_freedom < SMOOTHER * rest / freedom:
+    rival = links.beside(for_each_link(smooth, slopes.shape[1]))
+    if freedom([rival]) < FREEDOM or variance([rival]) < SMOOTHER * rest / remaining:
         return None
     return found
+
+
+def for_each_link(functions: np.ndarray, links: int) -> np.ndarray:
+    """Functions (N, s) for each of m links apart, (N, m, m s)."""
+    return np.kron(np.eye(links), functions[:, None, :]).reshape(len(functions), links, -1)
 
 
 def smooth_functions(r: np.ndarray) -> np.ndarray:

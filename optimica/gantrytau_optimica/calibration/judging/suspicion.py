@@ -8,13 +8,15 @@ widens as Student's distribution does.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.fitting.named_parameters import calibrated_arms, rod_links
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, fit_group, not_held
+from gantrytau_optimica.calibration.judging.link_systems import freedom, link_systems
+from gantrytau_optimica.calibration.judging.masked_rows import AGREEING, masked_rows
 from gantrytau_optimica.calibration.judging.plausibility import BETTER, NEAR, Misses
 from gantrytau_optimica.calibration.rods.forward import BLOCK, RodLink
 
@@ -22,7 +24,7 @@ CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearl
 OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
 CHANCE = 1e-6  # that noise of few poses exceeds the limit
 MANY = 2000  # poses, from which on h is negligible
-KEPT = 0.7  # of the poses that must be left: what is bad for so many is the model
+LOOKED_AT = 100  # poses fitted, and as many held out, among which masked ones are looked for
 LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
 
 
@@ -74,14 +76,17 @@ def suspicion(
     ).size:
         fits = [fit_group(fit.group, 1.0 - np.isin(fitted, coarse)) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
-    freedom = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
+    degrees = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
+    if (agreeing := agreeing_rows(fits, measurements, fitted, held_out)) is not None:
+        fits = [fit_group(fit.group, np.isin(fitted, agreeing).astype(float)) for fit in fits]
+        sizes, typical = relative_distances(fits, measurements, used, fitted)
     for _ in range(CLEANINGS):
-        fresh = used[sizes > limit(freedom)]
+        fresh = used[sizes > limit(degrees)]
         if np.array_equal(fresh, bad):
             break
         bad = fresh
         weights = 1.0 - np.isin(fitted, bad)
-        if weights.sum() < KEPT * len(weights):
+        if weights.sum() < AGREEING * len(weights):
             break
         fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
@@ -93,6 +98,29 @@ def suspicion(
     return Suspicion(bad, misses, typical)
 
 
+def agreeing_rows(
+    fits: Sequence[Fit], measurements: Measurements, fitted: np.ndarray, held_out: np.ndarray
+) -> np.ndarray | None:
+    """Some rows that agree with each other where so many do not that a fit follows these too, None where there are none."""
+    rows = np.union1d(*(each[thinned(len(each), LOOKED_AT)] for each in (fitted, held_out)))
+    data = measurements.select(rows)
+    # of turntables much is held hardly: wrong rows lead such fits astray, where nothing is linear any more
+    astray = any(fit.group.noise is not None or not fit.minimum.success for fit in fits)
+    begins = [fits, [started(fit) for fit in fits]] if astray else [fits]
+    for begin in begins:
+        systems = link_systems(begin, data)
+        links = sum(one.errors.shape[1] for one in systems)
+        bad = masked_rows(systems, data.r, limit(freedom(systems) / links))
+        if bad.any():
+            return rows[~bad]
+    return None
+
+
+def started(fit: Fit) -> Fit:
+    """The fit before its first step."""
+    return replace(fit, minimum=replace(fit.minimum, x=fit.group.x))
+
+
 def far_rows(nominal: Misses | None, measurements: Measurements, used: np.ndarray) -> np.ndarray:
     """Rows that nominal values miss by far more than the others; none where they miss most, or nothing is known."""
     if nominal is None:
@@ -101,7 +129,7 @@ def far_rows(nominal: Misses | None, measurements: Measurements, used: np.ndarra
     missed = nominal(data.q, data.r, data.R)
     usual = float(np.median(missed))
     far = used[missed > max(NEAR, BETTER * usual)]
-    return far if usual < NEAR and len(far) < (1 - KEPT) * len(used) else used[:0]
+    return far if usual < NEAR and len(far) < (1 - AGREEING) * len(used) else used[:0]
 
 
 def relative_distances(

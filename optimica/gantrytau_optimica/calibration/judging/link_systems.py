@@ -1,0 +1,92 @@
+"""Closure errors of all links at a minimum, linear in what may have gone wrong, and what identified numbers leave of them.
+
+    e = J dp + U d,    left = e - Q Q'e,    J = Q T,    columns X of a cause count by X - Q Q'X
+
+U are the derivatives by place and turn of the plate and by actuators. Links of other groups share no numbers, so that each
+group has its own J; a cause may move the links of all of them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSystem:
+    """m links that share numbers, at N poses.
+
+    errors: closure errors, (N, m) in m; numbers: their derivatives by the combinations of numbers that data hold and by
+    those that were given, (N, m, p); place, turn: by T and by a rotation vector of the plate in the world, (N, m, 3);
+    actuators: by columns of q, (N, m).
+    """
+
+    errors: np.ndarray
+    numbers: np.ndarray
+    place: np.ndarray
+    turn: np.ndarray
+    actuators: Mapping[int, np.ndarray]
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """Q, (N m, p)."""
+        return np.linalg.qr(self.numbers.reshape(self.errors.size, -1))[0]
+
+    @cached_property
+    def left(self) -> np.ndarray:
+        """What numbers leave of the errors, (N, m)."""
+        return self.across(self.errors[..., None])[..., 0]
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        """What numbers leave of columns (N, m, k)."""
+        flat = columns.reshape(self.errors.size, -1)
+        return (flat - self.known @ (self.known.T @ flat)).reshape(columns.shape)
+
+    def beside(self, columns: np.ndarray) -> "LinkSystem":
+        """The same where further columns (N, m, k) explain errors as numbers do."""
+        return replace(self, numbers=np.concatenate([self.numbers, columns], axis=2))
+
+    def of(self, rows: np.ndarray) -> "LinkSystem":
+        """The same at some of the poses."""
+        actuators = {column: slopes[rows] for column, slopes in self.actuators.items()}
+        return LinkSystem(self.errors[rows], self.numbers[rows], self.place[rows], self.turn[rows], actuators)
+
+
+def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
+    """The links of each fit at the poses of data, whether they were fitted or not."""
+    found = []
+    for fit in fits:
+        here = fit.group.over(data.q, data.r, data.R)
+        every = replace(here, free=np.ones_like(here.free))
+        numbers = np.stack([every.slopes(fit.x, k) for k in range(len(here.chains))], axis=1)
+        if fit.minimum.rank < here.free.sum():  # what data do not hold explains nothing
+            held = np.zeros((fit.minimum.rank, len(fit.x)))
+            held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
+            numbers = numbers @ np.vstack([held, np.eye(len(fit.x))[~here.free]]).T
+        by_pose = [link.by_pose(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
+        place, turn = (np.stack(each, axis=1) for each in zip(*by_pose, strict=True))
+        slopes = [link.by_actuator(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
+        # errors of links on straight guideways are squares of lengths: in m where T moves them by as much as itself
+        unit = np.median(np.linalg.norm(place, axis=2), axis=0)
+        actuators = {
+            column: np.column_stack([one.get(column, np.zeros(len(data))) for one in slopes]) / unit
+            for column in sorted({column for one in slopes for column in one})
+        }
+        errors = here.errors(fit.x) / unit
+        numbers, place, turn = (array / unit[:, None] for array in (numbers, place, turn))
+        found.append(LinkSystem(errors, numbers, place, turn, actuators))
+    return found
+
+
+def freedom(systems: Sequence[LinkSystem]) -> int:
+    """Errors more than numbers."""
+    return sum(one.errors.size - one.known.shape[1] for one in systems)
+
+
+def variance(systems: Sequence[LinkSystem]) -> float:
+    """Of a closure error that numbers leave, m2."""
+    return sum(float(np.sum(one.left**2)) for one in systems) / max(1, freedom(systems))
