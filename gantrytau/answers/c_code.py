@@ -11,8 +11,6 @@ KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main"
 )
-# what Newton's method is told where it is generated: the same as where it runs in CasADi
-NEWTON = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 100, "error_on_fail": True}
 NO_CODE = re.compile(r"#error Code generation not supported for (.*)")
 
 
@@ -51,7 +49,7 @@ def c_source(
             raise ModelError(
                 f"c_source: found {word}={count!r}, expected a number of directions, 0 for none; give an integer"
             )
-    base = _renamed(_with_code(function), name)
+    base = _renamed(function, name)
     functions = [base]
     functions += [base.jacobian()] if jacobian else []
     functions += [base.forward(forward)] if forward else []
@@ -83,27 +81,6 @@ def _renamed(function: ca.Function, name: str) -> ca.Function:
     return ca.Function(
         name, inside, function.call(inside, True, False), function.name_in(), function.name_out()
     )
-
-
-def _with_code(function: ca.Function) -> ca.Function:
-    """The same function with Newton iterations of the kind that CasADi has C code for."""
-    if function.class_name() == "Newton":
-        return ca.rootfinder(function.name(), "fast_newton", function.oracle(), NEWTON)
-    inside = [f.class_name() for f in function.find_functions()]
-    if not function.is_a("MXFunction") or "Newton" not in inside:
-        return function
-    x = function.mx_in()
-    old, new = [], []
-    for number in range(function.n_instructions()):
-        node = function.instruction_MX(number)
-        if not node.is_call():
-            continue
-        arguments = [node.dep(i) for i in range(node.n_dep())]
-        called = _with_code(node.which_function())
-        new += called.call(ca.graph_substitute(arguments, old, new) if old else arguments)
-        old += [node.get_output(i) for i in range(called.n_out())]
-    results = ca.graph_substitute(function.call(x, True, False), old, new)
-    return ca.Function(function.name(), x, results, function.name_in(), function.name_out())
 
 
 def _comment(header: str, functions: Sequence[ca.Function], spoken: dict[str, str]) -> str:

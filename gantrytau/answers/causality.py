@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import casadi as ca
 
-from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
-from gantrytau.compiler.blocks.pattern import block_pattern
-from gantrytau.compiler.blocks.solution import SolvedBlocks
+from gantrytau.answers.function_through import Question, function_through
+from gantrytau.answers.implicit_blocks import one_where
+from gantrytau.compiler.blocks.pattern import Pattern, block_pattern
 from gantrytau.compiler.request import Request, names
-from gantrytau.compiler.translated import Translated, solved
+from gantrytau.compiler.translated import Translated, carefully, solved
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -30,13 +30,13 @@ def function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.F
         known = _known(dae, given, columns)
         targets = [ca.vertcat(*(dae.expression(n) for n in dae.expand(name))) for name in find]
         dropped = _dropped(dae, given)
-        blocks = _blocks(dae, known, [*targets, dropped], find) if dropped.numel() else None
-        if blocks is not None:
-            whole = _compose(dae, blocks, known, [*targets, dropped], given, [*find, DROPPED], columns)
+        pattern = _pattern(dae, known, [*targets, dropped]) if dropped.numel() else None
+        if pattern is not None:
+            whole = _compose(dae, pattern, known, [*targets, dropped], given, [*find, DROPPED], columns)
             return _closed(whole)
-        blocks = _blocks(dae, known, targets, find)
-        if blocks is not None:
-            return _compose(dae, blocks, known, targets, given, find, columns)
+        pattern = _pattern(dae, known, targets)
+        if pattern is not None:
+            return _compose(dae, pattern, known, targets, given, find, columns)
         inputs = _sufficient_inputs(dae, known, targets) if inputs is None else inputs
     raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
 
@@ -54,9 +54,8 @@ def _closed(function: ca.Function) -> ca.Function:
     names = function.name_in()
     x = [ca.MX.sym(n, *function.size_in(n)) for n in names]
     *results, gap = function.call(x)
-    holds = ca.sumsqr(gap) <= OPEN**2
-    found = [ca.if_else(holds, r, ca.MX.nan(*r.shape)) for r in results]
-    return ca.Function("f", x, found, names, function.name_out()[:-1])
+    holds = one_where(ca.sumsqr(gap) <= OPEN**2)
+    return ca.Function("f", x, [holds * r for r in results], names, function.name_out()[:-1])
 
 
 def _translations(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Iterator[Translated]:
@@ -101,9 +100,7 @@ def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) ->
     return known
 
 
-def _blocks(
-    dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], find: Sequence[str]
-) -> SolvedBlocks | None:
+def _pattern(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX]) -> Pattern | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
     unknowns = [n for n in dae.symbols if n not in known]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
@@ -116,9 +113,7 @@ def _blocks(
             f"{dae.name}: the given names determine more than there is to choose; contradicted: {names}. "
             "Leave out one of the given names"
         )
-    if missing or pattern.undetermined:
-        return None
-    return solved(dae, pattern)
+    return None if missing or pattern.undetermined else pattern
 
 
 def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Translated:
@@ -177,7 +172,8 @@ def _whole(dae: Translated, scalars: Sequence[str]) -> list[str]:
     return list(left)
 
 
-def _compose(dae, blocks: SolvedBlocks, known, targets, given, find, columns) -> ca.Function:
+def _compose(dae, pattern: Pattern, known, targets, given, find, columns) -> ca.Function:
+    """The function through the blocks of a pattern, where pivots may vanish through careful ones."""
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
     definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
     definitions += [
@@ -191,21 +187,17 @@ def _compose(dae, blocks: SolvedBlocks, known, targets, given, find, columns) ->
         )
         for n, e in known.items()
     ]
-    implicit = blocks.implicit
-    expressions = [*(ca.vertcat(*b.residuals) for b in implicit), *targets]
-    expressions = blocks.after(definitions).inserted(expressions)
-    arguments = [ca.vertcat(*column) for column in columns]
     names_in = _legal(given, "i")
-    names_out = _legal(find, "o", names_in)
-    _refuse_time(expressions, dae)
-    if not implicit:
-        return ca.Function("f", arguments, expressions, names_in, names_out, {"cse": True})
-    parts = [
-        Implicit(block, residual, ca.DM([dae.start[y.name()] for y in block.tears]))
-        for block, residual in zip(implicit, expressions, strict=False)
-    ]
-    start = ca.DM(_start_of(dae, [n for name in given for n in dae.expand(name)]))
-    return solved_one_by_one("f", parts, expressions[len(parts) :], arguments, start, (names_in, names_out))
+    question = Question(
+        arguments=tuple(ca.vertcat(*column) for column in columns),
+        start=lambda: ca.DM(_start_of(dae, [n for name in given for n in dae.expand(name)])),
+        known=tuple(definitions),
+        targets=tuple(targets),
+        names=(names_in, _legal(find, "o", names_in)),
+    )
+    quick = solved(dae, pattern)
+    _refuse_time(question.inserted(quick), dae)
+    return function_through("f", question, quick, lambda: carefully(dae, quick), dae.start)
 
 
 def _start_of(dae: Translated, scalars: Sequence[str]) -> list[float]:
@@ -219,8 +211,8 @@ def _start_of(dae: Translated, scalars: Sequence[str]) -> list[float]:
     return found
 
 
-def _refuse_time(expressions, dae) -> None:
-    if any(ca.is_equal(leaf, dae.flat.time) for leaf in ca.symvar(ca.vertcat(*expressions))):
+def _refuse_time(expression: ca.SX, dae: Translated) -> None:
+    if any(ca.is_equal(leaf, dae.flat.time) for leaf in ca.symvar(expression)):
         raise StructureError(f"{dae.name} depends on time explicitly; name 'time' among the given")
 
 

@@ -9,10 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
+from gantrytau.compiler.blocks.pivots import Scales, extent
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.language.symbols import split_derivative
 
+SINGULAR = 1e-12  # of a matrix with rows and columns of size one: below, rounding decides on the solution
+SIGNS = np.array([1.0, -1.0, -1.0])
 STEPS = 16  # from the start to the arguments
 SOLVED = 1e-8  # residual above which an iteration found nothing
 NEWTON = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 50, "error_on_fail": False}
@@ -22,11 +26,13 @@ NEWTON = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 50, "error_on_fail":
 class Implicit:
     """A block that is left implicit, its residuals in the arguments and in unknowns of the blocks before it.
 
-    start: numbers of its unknowns where the model starts.
+    rows: extents of the equations of a linear block, in the same symbols; start: numbers of its unknowns where the model
+    starts.
     """
 
     block: Block
     residual: ca.SX
+    rows: ca.SX
     start: ca.DM
 
 
@@ -47,8 +53,8 @@ def solved_one_by_one(
     for number, part in enumerate(implicit):
         y = ca.vertcat(*part.block.tears)
         known, values = ca.vertcat(q, before), ca.vertcat(here, solved)
-        if part.block.kind == "linear":
-            found = _linear(part.residual, y, known, values)
+        if part.block.scales is not None:
+            found = _linear(part, part.block.scales, y, known, values)
         else:
             positions = all(split_derivative(n)[1] == 0 for n in part.block.unknowns)
             found = _newton(f"newton{number}", part, y, known, (begin, values), STEPS if positions else 1)
@@ -63,24 +69,36 @@ def solved_one_by_one(
     return ca.Function(name, x, found, list(inside), list(outside))
 
 
-def _linear(f: ca.SX, y: ca.SX, known: ca.SX, values: ca.MX) -> ca.MX:
-    parts = [ca.jacobian(f, y), ca.substitute(f, y, ca.SX.zeros(*y.shape))]
-    matrix, right = ca.Function("linear", [known], parts, {"cse": True})(values)
-    found = ca.solve(matrix, -right, "qr")
-    # a singular matrix leaves numbers of rounding, which do not satisfy the equations
-    # (sums of squares, as the largest of NaN and a number is the number)
-    left = ca.sumsqr(ca.mtimes(matrix, found) + right)
-    return ca.if_else(left <= 1e-12 * (1 + ca.sumsqr(right)), found, ca.MX.nan(*y.shape))
+def _linear(part: Implicit, scales: Scales, y: ca.SX, known: ca.SX, values: ca.MX) -> ca.MX:
+    """Solution of linear equations by orthogonal factors of the matrix in the sizes of its rows and columns.
+
+    A singular matrix leaves numbers of rounding. An arbitrary right-hand side beside that of the equations tells it: its
+    solution is as large as the inverse.
+    """
+    f, size = part.residual, y.numel()
+    matrix, right = ca.jacobian(f, y), -ca.substitute(f, y, ca.SX.zeros(size))
+    matrix = matrix @ ca.diag(1 / scales.columns)
+    rows = [1 / ca.fmax(extent(matrix[i, :], np.ones(size)), part.rows[i]) for i in range(size)]
+    sizes = ca.Function("sizes", [known], [ca.vertcat(*rows)], {"cse": True, "is_diff_out": [False]})
+    parts = ca.Function("linear", [known], [matrix, ca.densify(right)], {"cse": True})
+    (a, b), row = parts(values), sizes(values)
+    other = ca.DM(np.random.default_rng(0).uniform(0.5, 1.0, size) * SIGNS[np.arange(size) % len(SIGNS)])
+    both = ca.solve(ca.mtimes(ca.diag(row), a), ca.horzcat(row * b, other), "qr", {"eps": 0.0})
+    return both[:, 0] / scales.columns * one_where(ca.sumsqr(both[:, 1]) <= SINGULAR**-2)
+
+
+def one_where(condition: ca.MX) -> ca.MX:
+    """1, and NaN where a condition does not hold: a factor, so that derivatives are NaN there as well."""
+    return ca.if_else(condition, 1.0, ca.MX.nan())
 
 
 def _newton(name: str, part: Implicit, y: ca.SX, known: ca.SX, way: tuple[ca.DM, ca.MX], steps: int) -> ca.MX:
     residual = ca.Function("residual", [y, known], [part.residual], {"cse": True})
-    solve = ca.rootfinder(name, "newton", residual, NEWTON)
+    solve = ca.rootfinder(name, "fast_newton", residual, NEWTON)
     begin, end = way
     found = ca.MX(part.start)
     for step in range(1, steps + 1):
         share = step / steps
         values = end if step == steps else ca.MX(begin) + share * (end - begin)
         found = solve(found, values)
-    left = ca.sumsqr(residual(found, end))
-    return ca.if_else(left <= SOLVED**2, found, ca.MX.nan(*y.shape))
+    return found * one_where(ca.sumsqr(residual(found, end)) <= SOLVED**2)

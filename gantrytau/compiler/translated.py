@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
 from gantrytau.compiler.blocks.pattern import Pattern
 from gantrytau.compiler.blocks.pivots import Guide
-from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_blocks
+from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_anew, solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, Key
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.request import Request
@@ -216,6 +216,16 @@ class Translated:
 
 def solved(dae: Translated, pattern: Pattern) -> SolvedBlocks:
     """Blocks of its equations, solved in the order of a pattern."""
-    symbols = {n: dae.reduced.chains.named(n) for _, names in pattern.blocks for n in names}
     guide = Guide(dae.start, dae.parameter_values, dae.choice.states)
-    return solve_blocks(pattern.blocks, dae.indexed.residuals, symbols, guide)
+    return solve_blocks(pattern.blocks, dae.indexed.residuals, _symbols(dae, pattern.blocks), guide)
+
+
+def carefully(dae: Translated, quick: SolvedBlocks) -> SolvedBlocks:
+    """The same blocks, those that divide by what may vanish solved anew without."""
+    guide = Guide(dae.start, dae.parameter_values, dae.choice.states, careful=True)
+    symbols = _symbols(dae, [(b.equations, b.unknowns) for b in quick.blocks])
+    return solve_anew(quick, dae.indexed.residuals, symbols, guide)
+
+
+def _symbols(dae: Translated, blocks: Iterable[tuple[tuple[Key, ...], tuple[str, ...]]]) -> dict[str, ca.SX]:
+    return {n: dae.reduced.chains.named(n) for _, names in blocks for n in names}

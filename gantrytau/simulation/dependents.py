@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import values_at
-from gantrytau.compiler.blocks.tearing import switching_places, tear
+from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -47,7 +47,7 @@ def dependents(dae: Translated) -> list[tuple[int, str]]:
         relaxed=True,
         partner={},
         first={j for j, n in enumerate(columns) if n in states},
-        steady=dae.table.values,
+        barred=moving(jacobian, dae.table.values),
     )
     return [(rows[i], columns[j]) for i, j in torn.assignments]
 

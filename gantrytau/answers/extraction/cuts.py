@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
+from gantrytau.answers.function_through import Question, function_through, plain_function
 from gantrytau.compiler.alphabets import column, values_at
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.solution import Block, SolvedBlocks
 from gantrytau.compiler.index_reduction import Key
-from gantrytau.compiler.translated import Translated, solved
+from gantrytau.compiler.translated import Translated, carefully, solved
 from gantrytau.errors import StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -58,34 +58,39 @@ class Cut:
         dae = self.strata.dae
         known = [(dae.reduced.chains.named(n), e) for n, e in self.known.items()]
         (whole,) = self.blocks.after(known).inserted([column([*self.blocks.residuals, *expressions])])
-        found = ca.densify(whole).elements()
-        if any(leaf.name() == dae.flat.time.name() for e in found for leaf in ca.symvar(e)):
+        self._refuse_time(whole)
+        return list(ca.densify(whole).elements())
+
+    def _refuse_time(self, expression: ca.SX) -> None:
+        dae = self.strata.dae
+        if any(leaf.name() == dae.flat.time.name() for leaf in ca.symvar(expression)):
             raise StructureError(
                 f"{dae.name}: its equations depend on time explicitly, expected a mechanism whose equations do not; make "
                 "what varies an Input, which keeps its start value here"
             )
-        return list(found)
 
-    def function(self, name: str, expressions: Sequence[ca.SX]) -> ca.Function:
+    def function(self, name: str, expressions: Sequence[ca.SX], *, by_value: bool) -> ca.Function:
         """Expressions as a function of the known quantities, one vector each, and of the parameters p.
 
+        by_value: takes other pivots where those of the closed forms vanish; else these forms alone, as they are written.
         Where there is no solution its results are NaN.
         """
-        strata, found = self.strata, self.in_known(expressions)
-        arguments = [*(strata.columns[k] for k in self.kinds), strata.p]
-        inside = [*self.kinds, "p"]
-        value = column(found[len(found) - len(expressions) :])
-        if not self.implicit:
-            return ca.Function(name, arguments, [value], inside, ["value"], {"cse": True})
-        implicit: list[Implicit] = []
-        for block in self.implicit:
-            count, place = len(block.tears), sum(len(i.block.tears) for i in implicit)
-            begin = ca.DM([strata.dae.start[s.name()] for s in block.tears])
-            implicit.append(Implicit(block, ca.vertcat(*found[place : place + count]), begin))
-        start = ca.DM(
-            np.concatenate([*(strata.start(k) for k in self.kinds), np.array(strata.numbers).ravel()])
+        strata, dae = self.strata, self.strata.dae
+
+        def start() -> ca.DM:
+            return ca.DM(np.concatenate([*map(strata.start, self.kinds), np.array(strata.numbers).ravel()]))
+
+        question = Question(
+            arguments=(*(strata.columns[k] for k in self.kinds), strata.p),
+            start=start,
+            known=tuple((dae.reduced.chains.named(n), e) for n, e in self.known.items()),
+            targets=(column(list(expressions)),),
+            names=((*self.kinds, "p"), ("value",)),
         )
-        return solved_one_by_one(name, implicit, [value], arguments, start, (inside, ["value"]))
+        self._refuse_time(question.inserted(self.blocks))
+        if not by_value:
+            return plain_function(name, question, self.blocks, dae.start)
+        return function_through(name, question, self.blocks, lambda: carefully(dae, self.blocks), dae.start)
 
 
 class Strata:

@@ -22,7 +22,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Strata
+from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Cut, Strata
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat, translate_model
@@ -115,8 +115,10 @@ def extract_mechanism(
     refuse_events(dae.flat)
     roles = _roles(dae, {"T": tool, "q": joints, "f": forces})
     strata = Strata(_moved_by_tool(dae, roles), roles)
-    functions = _pieces(strata)
-    weights = _weights(strata, functions)
+    pieces = _pieces(strata)
+    functions = _functions(strata, pieces, by_value=True)
+    closed = _functions(strata, pieces, by_value=False)
+    weights = _weights(strata, closed)
     kind = ca.SX if _written_out(functions) else ca.MX
     arguments = {k: kind.sym(k, len(strata.names(k))) for k in EVERYTHING}
     systems = _systems(functions, {**arguments, "p": strata.numbers}, weights)
@@ -127,7 +129,7 @@ def extract_mechanism(
         for name, kinds in ARGUMENTS.items()
     }
     lists = {ROLES[k]: v for k, v in roles.items()}
-    return Mechanism(model=dae.name, **lists, **found, written=_written(strata, functions, weights))
+    return Mechanism(model=dae.name, **lists, **found, written=_written(strata, closed, weights))
 
 
 def _roles(dae: Translated, given: Mapping[str, str | Sequence[str]]) -> dict[str, tuple[str, ...]]:
@@ -177,8 +179,8 @@ def _moved_by_tool(dae: Translated, roles: Mapping[str, Sequence[str]]) -> Trans
         ) from error
 
 
-def _pieces(strata: Strata) -> dict[str, ca.Function]:
-    """Constraints, speeds, accelerations and balance, as functions of what is known and the parameters."""
+def _pieces(strata: Strata) -> dict[str, tuple[Cut, list[ca.SX]]]:
+    """Constraints, speeds, accelerations and balance: each a cut, and expressions of what is known and found there."""
     residuals, dae = strata.dae.indexed.residuals, strata.dae
     positions = strata.cut(("T", "q"))
     rows = {"constraints": (positions, [residuals[k] for k in positions.left] + list(positions.twins))}
@@ -197,13 +199,23 @@ def _pieces(strata: Strata) -> dict[str, ca.Function]:
     balance = strata.cut((*EVERYTHING, "s"))
     left = [k for k in balance.left if not dae.indexed.counts[k[0]]]  # no relation of positions
     rows["balance"] = (balance, [residuals[k] for k in left])
-    found = {name: cut.function(name, expressions) for name, (cut, expressions) in rows.items()}
+    return rows
+
+
+def _functions(
+    strata: Strata, pieces: Mapping[str, tuple[Cut, list[ca.SX]]], *, by_value: bool
+) -> dict[str, ca.Function]:
+    """The pieces as functions of what is known and the parameters; by_value: right where pivots vanish, too."""
+    found = {
+        name: cut.function(name, expressions, by_value=by_value)
+        for name, (cut, expressions) in pieces.items()
+    }
     n = len(strata.roles["T"])
     for name in ("constraints", "balance"):
         if found[name].size1_out(0) != n:
             raise StructureError(
-                f"{dae.name}: found {found[name].size1_out(0)} equations of {name} between tool and joints, expected {n}; "
-                "name the coordinates of one tool, the joints that move it, and the forces in these joints"
+                f"{strata.dae.name}: found {found[name].size1_out(0)} equations of {name} between tool and joints, "
+                f"expected {n}; name the coordinates of one tool, the joints that move it, and the forces in these joints"
             )
     return found | {"balance": _with_passive(found["balance"], found.pop("passive"))}
 

@@ -5,6 +5,7 @@ points are consistent as far as the blocks before have closed forms.
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,9 @@ import numpy as np
 from gantrytau.compiler.alphabets import Substitution, values_at
 
 COUNT = 12
+TRUSTED = (
+    1e-3  # of what a pivot is at the start, relative to its row: with less it costs more than three digits
+)
 SPREAD = (
     0.5  # of the points about the start, relative to the values there, or absolute in SI where they are small
 )
@@ -23,14 +27,25 @@ class Guide:
     start: numbers of all symbols; parameters: names among them that stay as they are; states: their rates
     are what equations of motion are solved for in the end (names in `rates`). partners: by equation
     the variable that it was solved for at a lower derivative, "" if in a block without closed order. The
-    pivot at all higher derivatives is the same, so dividing by it again adds no singularity.
+    pivot at all higher derivatives is the same, so dividing by it again adds no singularity. firm: those of
+    these equations whose pivot does not vanish where the equations still determine their unknowns.
+    careful: divide only by pivots that do not vanish, and leave the others to be chosen by value.
     """
 
-    def __init__(self, start: Mapping[str, float], parameters: Collection[str], states: Sequence[str]):
+    def __init__(
+        self,
+        start: Mapping[str, float],
+        parameters: Collection[str],
+        states: Sequence[str],
+        *,
+        careful: bool = False,
+    ):
         self.start = start
         self.parameters = parameters
+        self.careful = careful
         self.rates = frozenset(f"der({name})" for name in states)
         self.partners: dict[int, str] = {}
+        self.firm: set[int] = set()
         self._solved: list[tuple[ca.SX, ca.SX]] = []
 
     def define(self, solved: Sequence[tuple[ca.SX, ca.SX]]) -> None:
@@ -53,6 +68,51 @@ class Guide:
         found = np.array(function.map(COUNT)(points)).T.reshape(COUNT, *expression.shape[::-1])
         found = found.transpose(0, 2, 1)[np.isfinite(found).all(axis=(1, 2))]  # the others are out of reach
         return np.concatenate([self.at_start(expression)[None], found])
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What pivots of a matrix are measured by, which rows and columns may have in any unit.
+
+    columns: their sizes, (n,); rows: sums of the elements without their signs, over the sizes of their columns, (n,), as
+    expressions; start: numbers of these.
+    """
+
+    columns: np.ndarray
+    rows: tuple[ca.SX, ...]
+    start: np.ndarray
+
+    @classmethod
+    def of(cls, matrix: ca.SX, numbers: np.ndarray) -> "Scales":
+        """Those of a matrix with numbers at the start and around it, (points, n, n)."""
+        largest = np.abs(numbers).max(axis=(0, 2))
+        scaled = np.abs(numbers) / np.where(largest > 0, largest, 1.0)[None, :, None]
+        sizes = scaled.max(axis=(0, 1), initial=0.0)
+        sizes = np.where(sizes > 0, sizes, 1.0)
+        rows = tuple(extent(matrix[i, :], sizes) for i in range(matrix.shape[0]))
+        return cls(sizes, rows, (np.abs(numbers[0]) / sizes).sum(axis=1))
+
+    def at(self, rows: Sequence[int], columns: Sequence[int]) -> "Scales":
+        """The same of some rows, as whole as they were, and columns."""
+        return Scales(self.columns[list(columns)], tuple(self.rows[i] for i in rows), self.start[list(rows)])
+
+    def left(self, row: Sequence[ca.SX], numbers: np.ndarray, columns: Sequence[int]) -> "Scales":
+        """With what elimination left of a row in some columns in the place of all rows."""
+        sizes = self.columns[list(columns)]
+        whole = extent(ca.horzcat(*(row[j] for j in columns)), sizes)
+        start = np.sum(np.abs(numbers[list(columns)]) / sizes)
+        return Scales(self.columns, (whole,) * len(self.rows), np.full(len(self.rows), start))
+
+    def margin(self, i: int, j: int, pivot: ca.SX, number: float) -> ca.SX:
+        """Positive while a pivot is large enough in its row; number: of the pivot at the start."""
+        share = min(abs(number) / self.columns[j] / self.start[i], 1.0)
+        return ca.fabs(pivot) / self.columns[j] - TRUSTED * share * self.rows[i]
+
+
+def extent(row: ca.SX, sizes: np.ndarray) -> ca.SX:
+    """The sum of the elements of a row without their signs, over the sizes of the columns."""
+    entries = zip(row.sparsity().get_triplet()[1], row.nonzeros(), strict=True)
+    return sum((ca.fabs(e) / sizes[j] for j, e in entries), ca.SX(0))
 
 
 def reliable(entries: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ Numbers guide the symbolic choices: pivots are accepted by their values at sampl
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,9 +14,9 @@ import numpy as np
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pieces import PieceChoice, in_pieces
-from gantrytau.compiler.blocks.pivots import Guide, reliable
+from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
-from gantrytau.compiler.blocks.tearing import switching_places, tear
+from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import split_derivative
@@ -30,7 +30,8 @@ class Block:
 
     kind: "explicit", "linear", "quadratic", "spheres", "piecewise" or "nonlinear"; tears: symbols found from
     `residuals` first; inner: the other unknowns as (symbol, expression of tears and earlier unknowns), in order;
-    solution: the tears in closed form, or None; root: the square root among them, or None; pieces: of a piecewise one.
+    solution: the tears in closed form, or None; root: the square root among them, or None; pieces: of a piecewise one;
+    margins: positive where all pivots that were divided by are large enough, of those that may vanish.
     """
 
     kind: str
@@ -43,6 +44,9 @@ class Block:
     root: QuadraticRoot | None = None
     pieces: PieceChoice | None = None
     pairs: tuple[tuple[Key, str], ...] = ()  # equations solved for one unknown each
+    margins: tuple[ca.SX, ...] = ()
+    firm: tuple[Key, ...] = ()  # equations of pairs whose pivots do not vanish
+    scales: Scales | None = None  # of linear blocks with several unknowns
 
     @property
     def definitions(self) -> list[tuple[ca.SX, ca.SX]]:
@@ -55,6 +59,7 @@ class Block:
         guide.define(self.definitions)
         partners = {equation: split_derivative(name)[0] for (equation, _), name in self.pairs}
         guide.partners.update({equation: partners.get(equation, "") for equation, _ in self.equations})
+        guide.firm.update(equation for equation, _ in self.firm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +83,17 @@ class SolvedBlocks:
         """The equations that are left for it."""
         return [r for b in self.implicit for r in b.residuals]
 
+    @property
+    def extents(self) -> list[ca.SX]:
+        """How large these were before tearing, where they are linear; else 1."""
+        known = ((b.scales.rows if b.scales else [ca.SX(1)] * len(b.tears)) for b in self.implicit)
+        return [e for rows in known for e in rows]
+
+    @property
+    def margins(self) -> list[ca.SX]:
+        """Positive where the closed forms lose few digits."""
+        return [m for b in self.blocks for m in b.margins]
+
     def after(self, known: Iterable[tuple[ca.SX, ca.SX]]) -> Substitution:
         """All symbols in terms of what `known` is written in, and of the tears that are left."""
         return Substitution((*known, *(pair for b in self.blocks for pair in b.definitions)))
@@ -98,6 +114,19 @@ def solve_blocks(
     return SolvedBlocks(tuple(found))
 
 
+def solve_anew(
+    quick: SolvedBlocks, residuals: Mapping[Key, ca.SX], symbols: Mapping[str, ca.SX], guide: Guide
+) -> SolvedBlocks:
+    """Blocks of which those that divide by what may vanish are solved as a careful guide says."""
+    found: list[Block] = []
+    for block in quick.blocks:
+        if block.margins:
+            block = solve_block(block.equations, block.unknowns, residuals, symbols, guide)
+        block.enter(guide)
+        found.append(block)
+    return SolvedBlocks(tuple(found))
+
+
 def solve_block(
     equations: tuple[Key, ...],
     unknowns: tuple[str, ...],
@@ -112,43 +141,69 @@ def solve_block(
     jacobian = ca.jacobian(smooth.expressions[0], x)
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     if len(unknowns) == 1:
-        return _finish(equations, unknowns, (x,), (f,), (), guide, ((equations[0], unknowns[0]),))
-    numbers = guide.around(ca.densify(with_modes(smooth, [jacobian])[0]))
+        block = _finish(equations, unknowns, (x,), (f,), (), guide, None)
+        return replace(block, pairs=((equations[0], unknowns[0]),), firm=equations)
+    (present,) = with_modes(smooth, [jacobian])
+    numbers = guide.around(ca.densify(present))
     barred = switching_places(smooth, x)
     partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
     partner = {i: places.get(name, -1) for i, name in partners.items()}
     first = {j for j, name in enumerate(unknowns) if name in guide.rates}
     # pivots of parameters alone can vanish nowhere: where they serve as well, they are taken
+    changing = moving(jacobian, guide.parameters)
+    doubtful = {at for at in changing if partner.get(at[0]) != at[1] or equations[at[0]][0] not in guide.firm}
     ways: list[dict[str, Any]] = [
-        dict(first=set(), steady=guide.parameters),
-        dict(first=first, steady=guide.parameters),
-        dict(first=first),
+        dict(first=set(), barred=changing | barred),
+        dict(first=first, barred=changing | barred),
+        dict(first=first, barred=doubtful | barred if guide.careful else barred),
     ]
     tried = []
     for way in ways:
-        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, barred=barred, **way))
+        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way))
         if len(tried[-1].tears) <= max(len(first), 1):
             break
     torn = min(tried, key=lambda one: len(one.tears))
-    inner: list[tuple[ca.SX, ca.SX]] = []
     rows, columns = ca.vertsplit(f), ca.vertsplit(x)
-    for i, j in torn.assignments:
-        slope = jacobian[i, j]
-        rest = ca.substitute(rows[i], columns[j], ca.SX(0))
-        inner.append((columns[j], -rest / slope))
+    inner = [
+        (columns[j], -ca.substitute(rows[i], columns[j], ca.SX(0)) / jacobian[i, j])
+        for i, j in torn.assignments
+    ]
     tears = tuple(columns[j] for j in torn.tears)
     left = [rows[i] for i in torn.residuals]
     left = Substitution(tuple(inner)).inserted(left)
-    pairs = tuple((equations[i], unknowns[j]) for i, j in torn.assignments)
-    return _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, pairs)
+    whole = Scales.of(present, numbers)
+    scales = whole.at(torn.residuals, torn.tears) if linear and not smooth.switches else None
+    block = _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, scales)
+    divided = sorted(doubtful.intersection(torn.assignments))
+    margins = (whole.margin(i, j, present[i, j], numbers[0, i, j]) for i, j in divided)
+    return replace(
+        block,
+        pairs=tuple((equations[i], unknowns[j]) for i, j in torn.assignments),
+        firm=tuple(equations[i] for i, j in torn.assignments if (i, j) not in doubtful),
+        margins=(*margins, *block.margins),
+    )
 
 
-def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block:
+def _finish(equations, unknowns, tears, residuals, inner, guide, scales: Scales | None) -> Block:
     """Closed form for what is left after tearing, if there is one."""
 
-    def block(kind: str, solution=None, root=None, pieces=None) -> Block:
-        return Block(kind, equations, unknowns, tears, residuals, inner, solution, root, pieces, pairs)
+    def block(kind: str, solution=None, root=None, pieces=None, margins=()) -> Block:
+        return Block(
+            kind,
+            equations,
+            unknowns,
+            tears,
+            residuals,
+            inner,
+            solution,
+            root,
+            pieces,
+            (),
+            margins,
+            (),
+            scales,
+        )
 
     if not tears:
         return block("explicit", ())
@@ -159,12 +214,12 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block
         return block("nonlinear") if found is None else block("piecewise", found[0], pieces=found[1])
     jacobian = ca.jacobian(f, y)
     if not ca.depends_on(jacobian, y):
-        if len(tears) == 1:
-            return block("explicit" if not inner else "linear", (-_at_zero(f, y) / jacobian,))
-        if len(tears) > LARGEST_CLOSED_FORM:
+        if scales is None:
+            return block("explicit", (-_at_zero(f, y) / jacobian,))
+        if len(tears) > LARGEST_CLOSED_FORM or guide.careful:
             return block("linear")
-        found = eliminate(jacobian, -_at_zero(f, y), guide)
-        return block("linear", None if found is None else tuple(found))
+        found = eliminate(jacobian, -_at_zero(f, y), guide, scales)
+        return block("linear") if found is None else block("linear", found[0], margins=found[1])
     curvature = ca.jacobian(ca.vec(ca.densify(jacobian)), y)
     if len(tears) == 1 and not ca.depends_on(curvature, y):
         root = quadratic_root(f, tears[0], guide)
@@ -173,21 +228,27 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, pairs) -> Block
     return block("nonlinear") if found is None else block("spheres", tuple(found))
 
 
-def eliminate(matrix: ca.SX, right: ca.SX, guide: Guide) -> list[ca.SX] | None:
-    """Solution of a small linear system by elimination, or None if it is singular at the start.
+def eliminate(
+    matrix: ca.SX, right: ca.SX, guide: Guide, scales: Scales
+) -> tuple[tuple[ca.SX, ...], tuple[ca.SX, ...]] | None:
+    """Solution of a small linear system by elimination, and the margins of its pivots; None if singular at the start.
 
-    Pivots are chosen by their numbers at the sample points.
+    Pivots are chosen by their numbers at the sample points. A pivot that is small in what is left of its row
+    makes others grow; the last one, the only one left, is small in its equation where the equations depend on each other.
     """
     n = matrix.shape[0]
     a = [[matrix[i, j] for j in range(n)] + [right[i]] for i in range(n)]
     numbers = guide.around(matrix)
     pivots: list[tuple[int, int]] = []
+    margins: list[ca.SX] = []
     rows, columns = list(range(n)), list(range(n))
     for _ in range(n):
         pivot = _pivot(a, numbers, rows, columns)
         if pivot is None:
             return None
         p, q = pivot
+        left = scales if len(columns) == 1 else scales.left(a[p], numbers[0, p], columns)
+        margins.append(left.margin(p, q, a[p][q], numbers[0, p, q]))
         rows.remove(p)
         columns.remove(q)
         pivots.append((p, q))
@@ -206,7 +267,7 @@ def eliminate(matrix: ca.SX, right: ca.SX, guide: Guide) -> list[ca.SX] | None:
         for _, other in pivots[place + 1 :]:
             total = total - a[p][other] * x[other]
         x[q] = total / a[p][q]
-    return x
+    return tuple(x), tuple(margins)
 
 
 def _pivot(a, numbers: np.ndarray, rows: list[int], columns: list[int]) -> tuple[int, int] | None:

@@ -32,15 +32,13 @@ def tear(
     relaxed: bool,
     partner: Mapping[int, int],
     first: Set[int],
-    steady: Collection[str] | None = None,
-    barred: Collection[tuple[int, int]] = (),
+    barred: Set[tuple[int, int]],
 ) -> Torn:
     """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
 
     relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
     partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
-    first: columns that are torn before others; steady: if given, only pivots of these symbols are accepted;
-    barred: places that are no pivots.
+    first: columns that are torn before others; barred: places that are not divided by.
     """
     largest = np.abs(numbers).max(axis=2, keepdims=True)
     sizes = reliable(numbers, largest)
@@ -49,8 +47,7 @@ def tear(
     solvable: set[tuple[int, int]] = set()
     for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
         incidence[i].add(j)
-        moves = steady is not None and not all(leaf.name() in steady for leaf in ca.symvar(entry))
-        if moves or (i, j) in barred:
+        if (i, j) in barred:
             large = False
         elif i in partner:
             large = partner[i] == j and sizes[i, j] > 0
@@ -80,6 +77,13 @@ def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
         if ca.depends_on(slope, modes):
             found.add((i, j))
     return found
+
+
+def moving(jacobian: ca.SX, parameters: Collection[str]) -> set[tuple[int, int]]:
+    """Places of a Jacobian that do not depend on parameters alone."""
+    rows, columns = jacobian.sparsity().get_triplet()
+    entries = zip(rows, columns, jacobian.nonzeros(), strict=True)
+    return {(i, j) for i, j, e in entries if any(leaf.name() not in parameters for leaf in ca.symvar(e))}
 
 
 def _search(
