@@ -1,6 +1,9 @@
 """Everything the toolkit raises on purpose. Each message says path, found, expected, remedy."""
 
 import difflib
+import linecache
+import re
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -86,11 +89,29 @@ def in_words(error: Exception) -> str:
         names = [n for n in dir(error.obj) if not n.startswith("_")]
         owner = getattr(error.obj, "__name__", type(error.obj).__name__)
         return f"{owner} has no '{error.name}'{did_you_mean(error.name, names)}"
+    if isinstance(error, (IndexError, RuntimeError)) and re.search("out of (range|bounds)", str(error), re.I):
+        return _index_in_words(error)
     lines = [line for line in str(error).splitlines() if line.strip()] or [repr(error)]
     if "Assertion" in lines[0] and len(lines) > 1:
         lines = lines[1:]
     words = lines[0].split(": ", 1)[-1] if ".cpp:" in lines[0] or ".hpp:" in lines[0] else lines[0]
     return "; ".join([words.rstrip("."), *(text for key, text in HINTS.items() if key in str(error))][:2])
+
+
+def _index_in_words(error: Exception) -> str:
+    """An index out of an array: as the array and the index are written, and what there is."""
+    sliced = re.search(r"start=(-?\d+), stop=(-?\d+).*supplied length of (\d+)", str(error))
+    words = "out of bounds; expected an index below the length, from 0"
+    if sliced:
+        start, stop, length = map(int, sliced.groups())
+        index = f"{start}" if stop == start + 1 else f"{start}:{stop}"
+        words = f"out of bounds with supplied length of {length}: found the index {index}, expected 0 to {length - 1}"
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        line = linecache.getline(frame.filename, frame.lineno or 0).encode()  # columns are those of bytes
+        written = line[frame.colno or 0 : frame.end_colno or 0].decode(errors="replace")
+        if "site-packages" not in frame.filename and written.endswith("]"):
+            return f"`{written}` is {words}"
+    return words
 
 
 def told(place: str, evaluate: Callable[[], Any], within: str | None = None) -> Any:

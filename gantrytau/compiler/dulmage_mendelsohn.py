@@ -4,10 +4,12 @@ A. L. Dulmage and N. S. Mendelsohn, Canadian J. Math. 10, 1958, as CasADi comput
 Linear Systems, SIAM 2006, section 7.4).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+
+from gantrytau.language.symbols import Derivative
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,19 @@ class Decomposition:
     overdetermined: tuple[int, ...]
     free: tuple[int, ...]
     undetermined: tuple[int, ...]
+
+
+def signature(incidence: Sequence[Iterable[Derivative]], unknowns: Sequence[str]) -> list[dict[int, int]]:
+    """For each equation the highest derivative of each unknown in it, by number."""
+    place = {name: j for j, name in enumerate(unknowns)}
+    rows: list[dict[int, int]] = []
+    for occurring in incidence:
+        row: dict[int, int] = {}
+        for name, order in occurring:
+            if name in place:
+                row[place[name]] = max(order, row.get(place[name], 0))
+        rows.append(row)
+    return rows
 
 
 def decompose(rows: Sequence[Collection[int]], width: int) -> Decomposition:

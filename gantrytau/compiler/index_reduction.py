@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.dulmage_mendelsohn import largest_sum
+from gantrytau.compiler.dulmage_mendelsohn import largest_sum, signature
 from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.consistency import Level
 from gantrytau.flattening.flat_model import FlatModel
@@ -83,41 +83,28 @@ def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) 
 
     StructureError if equations and unknowns do not match.
     """
-    signature = _signature(reduced)
+    rows = signature(reduced.incidence, reduced.unknowns)
     if len(reduced.residuals) != len(reduced.unknowns):
-        raise unbalanced(reduced, signature, flat)
-    counts, tops = _offsets(reduced, signature, _mentioned(reduced, flat, wanted), flat)
+        raise unbalanced(reduced, rows, flat)
+    counts, tops = _offsets(reduced, rows, _mentioned(reduced, flat, wanted), flat)
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     names = tuple(e.name for e in reduced.equations)
     return Indexed(residuals, names, tuple(int(c) for c in counts), orders)
 
 
-def _signature(reduced: Reduced) -> list[dict[int, int]]:
-    """For each equation the highest derivative of each unknown in it."""
-    place = {name: j for j, name in enumerate(reduced.unknowns)}
-    rows: list[dict[int, int]] = []
-    for occurring in reduced.incidence:
-        row: dict[int, int] = {}
-        for name, order in occurring:
-            if name in place:
-                row[place[name]] = max(order, row.get(place[name], 0))
-        rows.append(row)
-    return rows
-
-
-def _offsets(reduced: Reduced, signature: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):
-    n = len(signature)
-    matched = largest_sum(signature)
+def _offsets(reduced: Reduced, rows: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):
+    n = len(rows)
+    matched = largest_sum(rows)
     if matched is None:
-        raise unbalanced(reduced, signature, flat)
+        raise unbalanced(reduced, rows, flat)
     counts = np.zeros(n, dtype=int)
     while True:
         tops = mentioned.copy()
-        for i, row in enumerate(signature):
+        for i, row in enumerate(rows):
             for j, order in row.items():
                 tops[j] = max(tops[j], order + counts[i])
-        new = np.array([tops[j] - signature[i][j] for i, j in enumerate(matched)], dtype=int)
+        new = np.array([tops[j] - rows[i][j] for i, j in enumerate(matched)], dtype=int)
         if np.array_equal(new, counts):
             return counts, tops
         counts = new

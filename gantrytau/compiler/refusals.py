@@ -1,20 +1,23 @@
 """What the compiler cannot do with a model, in the words of the model: errors with what was found, expected and to do."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.dulmage_mendelsohn import decompose
+from gantrytau.compiler.aliases import Reduced, eliminate_aliases
+from gantrytau.compiler.dulmage_mendelsohn import decompose, signature
 from gantrytau.errors import InitializationError, ModelError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
+MOST_SUSPECTS = 12  # inputs that are tried as unknowns, where equations are too many
 
-def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatModel) -> StructureError:
-    """Which unknowns stay undetermined, and which equations are too many."""
-    found = decompose(signature, len(reduced.unknowns))
+
+def unbalanced(reduced: Reduced, rows: list[dict[int, int]], flat: FlatModel) -> StructureError:
+    """Which unknowns stay undetermined, and which equations are too many; rows: what `signature` says of them."""
+    found = decompose(rows, len(reduced.unknowns))
     n, m = (
         sum(len(v.elements) for v in flat.variables) - len(reduced.known),
         len(flat.equations) - len(reduced.redundant),
@@ -25,8 +28,74 @@ def unbalanced(reduced: Reduced, signature: list[dict[int, int]], flat: FlatMode
             [reduced.unknowns[j] for j in found.undetermined], len(found.free), reduced, flat
         )
     if found.surplus:
-        text += _overdetermined(found.overdetermined, len(found.surplus), reduced, signature)
+        causes = "".join(f" {words}." for words in _causes(reduced, flat))
+        text += causes + _overdetermined(found.overdetermined, len(found.surplus), reduced, rows, not causes)
     return StructureError(text)
+
+
+def _causes(reduced: Reduced, flat: FlatModel) -> list[str]:
+    """What makes equations too many, in words: modifications, inputs and given names without which they are fewer."""
+    inputs = set(flat.inputs)
+    bound: dict[str, list[Equation]] = {}
+    for equation in flat.equations:
+        if equation.model == "binding" and flat.vectors[equation.path].kind != "input":
+            bound.setdefault(equation.path, []).append(equation)
+    found = []
+    for name, equations in bound.items():
+        if _helps(reduced, flat, without=equations):
+            values = ", ".join(str(e.right) for e in equations)
+            value = f"[{values}]" if flat.vectors[name].shape else values
+            own = name.rpartition(".")[2]
+            found.append(
+                f"{name} is set by the modification {own}={value}, which is an equation; a start value is "
+                f"{own}=Start({value}), one that must hold {own}=Fixed({value})"
+            )
+    for name, equations in _setters(flat).items():
+        if len(equations) > 1 and _helps(reduced, flat, without=equations[-1:]):
+            places = " and by ".join(_quoted(e) for e in equations)
+            found.append(f"{name}, an input, is driven more than once, by {places}; leave one out")
+    known = [n for n in reduced.known if n not in flat.event_names]
+    given = [n for n in known if n not in inputs and _helps(reduced, flat, open=n)]
+    if given:
+        found.append(f"More is given than can be chosen; leave out {' or '.join(sorted(given)[:6])}")
+    inner = [
+        v.name
+        for v in flat.variables
+        if v.kind == "input" and v.owner and inputs & set(v.elements) & set(known)
+    ]
+    open_inputs = [n for n in inner[:MOST_SUSPECTS] if _helps(reduced, flat, open=n)]
+    if open_inputs:
+        several = len(open_inputs) > 1
+        found.append(
+            f"{', '.join(open_inputs[:6])} {'are open inputs and count' if several else 'is an open input and counts'} as "
+            f"known from outside: to drive {'one' if several else 'it'} from here, write an equation with "
+            f"{open_inputs[0]} alone on one side, in place of another"
+        )
+    return found
+
+
+def _setters(flat: FlatModel) -> dict[str, list[Equation]]:
+    """By input, the equations outside of its component that have it alone on one side."""
+    owners = {n: v.owner for v in flat.variables if v.kind == "input" for n in v.elements}
+    found: dict[str, list[Equation]] = {}
+    for equation in flat.equations:
+        for side in (equation.left,) if equation.model == "binding" else (equation.left, equation.right):
+            name = side.name() if side.is_symbolic() else ""
+            if name in owners and equation.path != owners[name]:
+                found.setdefault(name, []).append(equation)
+    return found
+
+
+def _helps(reduced: Reduced, flat: FlatModel, without: Sequence[Equation] = (), open: str = "") -> bool:
+    """Whether fewer equations are too many without some of them, or with something known as an unknown."""
+
+    def surplus(model: FlatModel, known: frozenset[str]) -> int:
+        other = eliminate_aliases(model, reduced.table, known)
+        return len(decompose(signature(other.incidence, other.unknowns), len(other.unknowns)).surplus)
+
+    left = replace(flat, equations=tuple(e for e in flat.equations if e not in without))
+    opened = reduced.known - set(flat.expand(open)) if open else reduced.known
+    return surplus(left, opened) < surplus(flat, reduced.known)
 
 
 def _undetermined(unknowns: Sequence[str], count: int, reduced: Reduced, flat: FlatModel) -> str:
@@ -41,24 +110,33 @@ def _undetermined(unknowns: Sequence[str], count: int, reduced: Reduced, flat: F
     if names[0] in inputs:
         return f"{text}. Name {first} among the given, or add {count} equation{'s' if count > 1 else ''}."
     where = first.rpartition(".")[0] or "the model"
+    for name, equations in _setters(flat).items():
+        if reduced.aliases[name].root in unknowns:
+            text += f". {name}, an input, counts as set by {_quoted(equations[0])}"
     return (
         f"{text}. Add {count} equation{'s' if count > 1 else ''} for it in {where}, declare it an Input, or "
         "connect a component that determines it."
     )
 
 
+def _quoted(equation: Equation) -> str:
+    """Where an equation stands, and what it says unless it is long."""
+    text = equation.text
+    return f"{equation.name} `{text if len(text) <= 80 else text[:77] + '...'}`"
+
+
 def _overdetermined(
-    rows: Sequence[int], count: int, reduced: Reduced, signature: list[dict[int, int]]
+    rows: Sequence[int], count: int, reduced: Reduced, sides: list[dict[int, int]], remedy: bool
 ) -> str:
     lines = []
     for i in rows[:4]:
-        found = "" if signature[i] else ", whose variables all follow from other equations"
-        lines.append(f"{reduced.equations[i].name} `{reduced.equations[i].text[:80]}`{found}")
+        found = "" if sides[i] else ", whose variables all follow from other equations"
+        lines.append(_quoted(reduced.equations[i]) + found)
     more = f"; and {len(rows) - 4} others" if len(rows) > 4 else ""
     return (
         f" Overdetermined by {count}: these equations contradict or repeat each other: "
-        f"{'; '.join(lines)}{more}. "
-        "Remove one of them, or let one more variable be unknown."
+        f"{'; '.join(lines)}{more}."
+        + (" Remove one of them, or let one more variable be unknown." if remedy else "")
     )
 
 
@@ -107,7 +185,7 @@ def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, lea
     """Constraints whose Jacobian, a row each, has not their number as its rank; least: expected singular value."""
     left, values, _ = np.linalg.svd(matrix)
     weak = [i for i in np.argsort(-np.abs(left[:, -1]))[:4] if abs(left[i, -1]) > 0.1]
-    names = "; ".join(f"{equations[i].name} `{equations[i].text[:80]}`" for i in sorted(weak))
+    names = "; ".join(_quoted(equations[i]) for i in sorted(weak))
     return StructureError(
         f"{title}: constraints depend on each other at the start (smallest singular value {values[-1]:.2g}, expected "
         f"above {least:g}): {names}. Start from another pose, or remove the constraint that repeats another"

@@ -41,7 +41,7 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
         )
     try:
         found = joined(evaluate(value, leaf.scope))
-    except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError) as error:
+    except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError, IndexError) as error:
         why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
         raise ModelError(
             f"{placed.name}: {attribute} is {leaf.value!r}, expected a number, an array or an expression of "

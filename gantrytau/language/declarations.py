@@ -38,6 +38,12 @@ class Formula:
         """The value of the formula where `scope` is the instance whose class body holds it."""
         return self._function(*(evaluate(argument, scope) for argument in self._arguments))
 
+    def __repr__(self) -> str:
+        names = [getattr(one, "name", "") or repr(one) for one in self._arguments]
+        if self._function is operator.getitem:
+            return f"{names[0]}[{names[1]}]"
+        return f"{getattr(self._function, '__name__', 'a function')}({', '.join(names)})"
+
     def __add__(self, other: Any) -> Any:
         return Formula(operator.add, self, other)
 
@@ -155,6 +161,8 @@ class Quantity(Formula):
         self.undetermined = undetermined
         self.name = ""
         self.owner = ""
+
+    __repr__ = object.__repr__
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name, self.owner = name, owner.__name__
