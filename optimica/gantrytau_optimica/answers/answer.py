@@ -92,10 +92,11 @@ class Answer(ABC):
     def result(self) -> Result:
         """All variables of the model over `time`, to plot and save."""
         self._only  # noqa: B018 - with phases there is none
-        return next(iter(self._results.values()))
+        return next(iter(self.by_phase.values()))
 
     @cached_property
-    def _results(self) -> dict[str, Result]:
+    def by_phase(self) -> dict[str, Result]:
+        """All variables of every phase over its own time, by the name of the phase; "" where there is only one."""
         units, words = self._labels()
         found = {}
         for path, phase in self.phases.items():
@@ -108,7 +109,7 @@ class Answer(ABC):
     @property
     def names(self) -> tuple[str, ...]:
         """All variables and free numbers; vectors, derivatives and parameters can be asked for as well."""
-        return (*(n for result in self._results.values() for n in result.names), *self.free)
+        return (*(n for result in self.by_phase.values() for n in result.names), *self.free)
 
     def __repr__(self) -> str:
         size = sum(phase.time.size for phase in self.phases.values())
@@ -116,7 +117,7 @@ class Answer(ABC):
         return f"<{kind} {self.name}: {self.status}, objective {self.objective:.8g}, {size} times>"
 
     def __contains__(self, name: object) -> bool:
-        return name in self.free or any(name in result for result in self._results.values())
+        return name in self.free or any(name in result for result in self.by_phase.values())
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -125,7 +126,7 @@ class Answer(ABC):
         chosen = self._chosen(name)
         if chosen is not None:
             return chosen
-        result = self._results[self.path_of(self._elements(name)[0])]
+        result = self.by_phase[self.path_of(self._elements(name)[0])]
         return result[name] if name in result else self.signal(name)(result.time)
 
     def final(self, name: str) -> Any:

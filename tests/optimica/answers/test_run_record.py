@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, ModelError, Parameter, SolveError
-from gantrytau_optimica import optimize, prepare
+from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, SolveError, Start, between, der
+from gantrytau_optimica import Free, Optimization, Samples, final, optimize, prepare, sum_of_squares
 from gantrytau_optimica.answers.archive.run_record import compare_records, hashes, run_record, write_record
 from tests.optimica.problems import FastestMass, LaunchedMass, LinearQuadratic, Mass
 
@@ -157,3 +157,139 @@ def test_what_a_playback_finds_is_in_the_verdict():
     optimum = solved()
     object.__setattr__(optimum, "__dict__", {**optimum.__dict__, "playback": Played})
     assert run_record(optimum)["verdict"]["between_points"] == 0.25
+
+
+class Tracked(Optimization):
+    """Samples of a position are followed by a limited force."""
+
+    mass = Mass(x=Fixed(0.0), v=Fixed(0.0))
+    samples = Samples([0.0, 0.5, 1.0], [0.0, 0.1, 0.2])
+    most, gain = 1.0, 2.0
+
+    def objective(self):
+        return self.gain * sum_of_squares(self.mass.x, self.samples)
+
+    def constraints(self):
+        yield between(-1.0, self.mass.u, self.most)
+
+
+def changed(**attributes) -> type[Tracked]:
+    return type("Tracked", (Tracked,), attributes)
+
+
+TIMES, VALUES = [0.0, 0.5, 1.0], [0.0, 0.1, 0.2]
+LEAST = 2.0**-52  # the last bit of a number
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        dict(samples=Samples(TIMES, VALUES, deviation=0.1)),
+        dict(samples=Samples(TIMES, VALUES, deviation=[[1.0], [1.0], [2.0]])),
+        dict(samples=Samples(TIMES, VALUES, deviation=1.0)),  # told, not assumed
+        dict(samples=Samples(TIMES, VALUES, kind="constant")),
+        dict(samples=Samples(TIMES, VALUES, largest_gap=5.0)),
+        dict(samples=Samples(TIMES, [0.0, 0.1, 0.2 * (1 + LEAST)])),
+        dict(most=1.0 + LEAST),
+        dict(gain=2.0 * (1 + LEAST)),
+        dict(final_time=1.0 + LEAST),
+        dict(integrand=lambda self: 1e-300 * self.mass.u**2),
+        dict(mass=Mass(x=Fixed(LEAST), v=Fixed(0.0))),
+        dict(mass=Mass(x=dict(start=0.0, fixed=True, nominal=2.0), v=Fixed(0.0))),
+    ],
+    ids=str,
+)
+def test_all_that_changes_the_answer_changes_the_hash(change):
+    base, other = hashes(solved(Tracked)), hashes(solved(changed(**change)))
+    assert other["problem"] != base["problem"]
+    assert other["equations"] == base["equations"]
+    assert hashes(solved(changed())) == base
+
+
+def test_numbers_in_equations_count_to_their_last_bit():
+    class Pushed(Model):
+        x = Real(start=0.0, fixed=True)
+        u = Input(min=-1.0, max=1.0)
+        gain = 1.0
+
+        def equations(self):
+            yield der(self.x) == self.gain * (self.u + 0.1 * self.x)
+
+    def of(gain):
+        kind = type("Pushed", (Pushed,), {"gain": gain})
+
+        class Far(Optimization):
+            model = kind()
+
+            def objective(self):
+                return -final(self.model.x)
+
+        return hashes(solved(Far))["equations"]
+
+    assert of(3.0) == of(3.0)
+    assert of(3.0) != of(3.0 * (1 + LEAST))
+
+
+def test_known_inputs_count_whatever_they_are():
+    def of(**more):
+        class Driven(Optimization):
+            mass = Mass(x=Fixed(0.0), v=Start(Free(0.0)))
+            inputs = {"mass.u": Samples(TIMES, VALUES, **more)}
+
+            def objective(self):
+                return (final(self.mass.x) - 1) ** 2
+
+        return hashes(solved(Driven))["problem"]
+
+    assert len({of(), of(kind="constant"), of(kind="constant", largest_gap=3.0)}) == 3
+
+
+def test_held_parameters_count_as_they_are_for_the_solve():
+    prepared = prepare(Shorter, elements=4, parameters=["half"])
+    found = [hashes(prepared.solve({"half": x}))["problem"] for x in (0.5, 0.75, 0.5)]
+    assert found[0] == found[2] != found[1]
+
+
+def test_options_are_told_apart():
+    optimum, finer = solved(), optimize(FastestMass, elements=7)
+
+    def options(**given):
+        return run_record(optimum, options=given)["options"]
+
+    guesses = [
+        {"mass.x": lambda t: 0.5 * t},
+        {"mass.x": lambda t: 0.25 * t},
+        {"mass.x": lambda t, gain=0.5: gain * t},
+        {"mass.x": lambda t, gain=0.75: gain * t},
+        optimum,
+        finer,
+        optimum.result,
+        finer.result,
+        np.zeros(100),
+        np.ones(100),
+    ]
+    told = [json.dumps(options(guess=g)) for g in guesses]
+    assert len(set(told)) == len(told)
+    assert options(guess=guesses[0]) == options(guess={"mass.x": lambda t: 0.5 * t})
+
+
+@pytest.mark.parametrize("record", [None, 3, "a.json", [], {}, {"problem": 1}, {"problem": {"name": 2}}])
+def test_what_is_no_record_is_refused(record, tmp_path):
+    whole = run_record(solved())
+    for call in (
+        lambda: compare_records(record, whole),
+        lambda: compare_records(whole, record),
+        lambda: write_record(record, tmp_path),
+    ):
+        with pytest.raises(ModelError, match="expected a record: what run_record returns"):
+            call()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_optimum_or_no_place_is_refused():
+    with pytest.raises(ModelError, match="run_record: found None, expected what optimize returned"):
+        run_record(None)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(
+        ModelError, match=r"write_record: found path=3, expected a folder or the name of a \.json"
+    ):
+        write_record(solved(), 3)  # pyright: ignore[reportArgumentType]

@@ -8,12 +8,14 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Result
 from gantrytau.whole_files import replacing
+from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.fingerprint import hash_of, hashes, plain, versions
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
@@ -37,6 +39,10 @@ def run_record(
     read_time: s spent on reading the problem. What is not given is None. Keys always come in the same order; numbers
     that JSON lacks are the words "inf", "-inf" and "nan".
     """
+    if not isinstance(optimum, Optimum):
+        raise ModelError(
+            f"run_record: found {optimum!r}, expected what optimize returned or its SolveError has as .optimum"
+        )
     program = optimum.program
     return plain(
         {
@@ -69,7 +75,12 @@ def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[s
     optimum: an Optimum, with `details` as keywords of run_record, or a record. A file in a folder is named after
     the problem and the time, and never replaces another; a file that is named is replaced when the new one is complete.
     """
-    record = run_record(optimum, **details) if isinstance(optimum, Optimum) else dict(optimum)
+    if isinstance(optimum, Optimum):
+        record = run_record(optimum, **details)
+    else:
+        record = _record("write_record", optimum)
+    if not isinstance(path, (str, os.PathLike)):
+        raise ModelError(f"write_record: found path={path!r}, expected a folder or the name of a .json file")
     path = Path(path)
     text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
     if path.is_dir():
@@ -105,7 +116,19 @@ def compare_records(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
 
     Numbers within 1e-9 of each other are the same. Start times and durations are left out.
     """
-    return "\n".join(f"{where}: {first} -> {second}" for where, first, second in _differences("", a, b))
+    first, second = _record("compare_records", a), _record("compare_records", b)
+    return "\n".join(f"{where}: {one} -> {other}" for where, one, other in _differences("", first, second))
+
+
+def _record(verb: str, record: Any) -> dict[str, Any]:
+    """A record as it was given; ModelError for what is none."""
+    named = isinstance(record, Mapping) and isinstance(record.get("problem"), Mapping)
+    if not named or not isinstance(record["problem"].get("name"), str):
+        raise ModelError(
+            f"{verb}: found {_short(record)[:80]}, expected a record: what run_record returns, or json.load reads of a file "
+            "of write_record"
+        )
+    return dict(record)
 
 
 def _problem(optimum: Optimum, problem: Any) -> dict[str, Any]:
@@ -184,9 +207,27 @@ def _as_given(value: Any) -> Any:
         return {str(k): _as_given(v) for k, v in value.items()}
     if isinstance(value, np.ndarray) and value.size > 32:
         return f"array of shape {value.shape}, hash {hash_of(np.ascontiguousarray(value).tobytes())}"
+    if isinstance(value, (Result, Answer)):
+        results = [value] if isinstance(value, Result) else [*value.by_phase.values()]
+        return (
+            f"{value!r}, hash {hash_of(b''.join(_bytes(r[n]) for r in results for n in ('time', *r.names)))}"
+        )
     if callable(value):
-        return f"function {getattr(value, '__qualname__', type(value).__name__)}"
+        name, code = getattr(value, "__qualname__", type(value).__name__), getattr(value, "__code__", None)
+        return f"function {name}" + (f", hash {hash_of(_written(value, code))}" if code else "")
     return value if isinstance(value, (str, np.ndarray, list, tuple)) else plain(value)
+
+
+def _bytes(values: Any) -> bytes:
+    return np.ascontiguousarray(values, dtype=float).tobytes()
+
+
+def _written(function: Any, code: CodeType) -> str:
+    """What a function of Python does, wherever it stands: instructions, constants, defaults, and what it closes over."""
+    constants = [_written(None, c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
+    cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    outer = [_as_given(value) for value in (*(getattr(function, "__defaults__", None) or ()), *cells)]
+    return f"{code.co_code.hex()} {code.co_names} {constants} {outer}"
 
 
 def _reserved(folder: Path, record: Mapping[str, Any]) -> Path:
