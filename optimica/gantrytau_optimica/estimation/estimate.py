@@ -15,7 +15,6 @@ from typing import Any, Literal, Unpack
 import numpy as np
 
 from gantrytau import Model, ModelError, SolveError
-from gantrytau.interruption import heeding_interrupts
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
@@ -26,7 +25,6 @@ from gantrytau_optimica.estimation.experiments import Experiment, expected_noise
 from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, descended, fit_on_mesh, solution_at
 from gantrytau_optimica.estimation.mesh_error import with_corners
 from gantrytau_optimica.estimation.refined_fit import (
-    Budget,
     RefinedFit,
     TimeOver,
     fit_on,
@@ -36,15 +34,17 @@ from gantrytau_optimica.estimation.refined_fit import (
 from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
 from gantrytau_optimica.estimation.weights import Weighing, Weights
 from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
-from gantrytau_optimica.prepared import Prepared
+from gantrytau_optimica.prepared import LEAST_TIME, Prepared
+from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
+from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import WORDS, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_jumps
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.scheme import collocation
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-HALTED = (WORDS["User_Requested_Stop"], WORDS["Maximum_WallTime_Exceeded"])
-MOST_STEPS, SHARE = 30, 0.2  # steps from the first guesses, and the part of the time that they may take
+SOLVED = WORDS["Solve_Succeeded"]
+MOST_STEPS, SHARE = 30, 0.8  # steps from the first guesses, and the part of the time that they leave
 EXPLAINED = 0.3  # of the spread of each measured course: what a fit from the first guesses may leave
 AT_FIRST = 50  # elements or a few more, on which a first answer is looked for from far away
 
@@ -72,20 +72,20 @@ def estimate(
     known = next(iter(trials[0].measured.values())).weighted
     read = plan(model, parameters, trials, {} if known else expected_noise(trials))
     _check_amount(read, known)
-    work = _Work(read, _built(read), known, loss, asked, "elements" in policy, Budget(begin + asked.max_time))
-    optimum = work.first(begin)
-    try:
-        with heeding_interrupts():
+    reached = BestSoFar(Clock(asked.max_time - (time.perf_counter() - begin), asked.progress))
+    built = _built(read)
+    spent = time.perf_counter() - begin
+    work = _Work(read, built, known, loss, asked, "elements" in policy, reached, spent)
+    with reached.kept():
+        optimum = work.first()
+        reached.keep(optimum)
+        try:
             return work.finished(optimum)
-    except (KeyboardInterrupt, TimeOver) as end:
-        last = work.optimum(optimum)
-        found = ", ".join(f"{n.name} = {last.numbers[n.name]:.6g}" for n in read.numbers)
-        why = (
-            "interrupted" if isinstance(end, KeyboardInterrupt) else f"max_time={asked.max_time:g} s is over"
-        )
-        raise SolveError(
-            f"{read.read.name}: {why}; what was solved until then is in .optimum: {found}", optimum=last
-        ) from None
+        except (KeyboardInterrupt, TimeOver) as end:
+            reached.keep(work.optimum(optimum))
+            if isinstance(end, KeyboardInterrupt):
+                raise
+            raise reached.stopped(LATE) from None
 
 
 def _check(parameters: Any, loss: Any, policy: Policy) -> None:
@@ -165,31 +165,30 @@ class _Work:
     loss: Literal["squares", "robust"]
     asked: Policy
     chosen: bool  # whether the caller chose the elements
-    budget: Budget
+    reached: BestSoFar
+    build_time: float  # s
     solved: list[MeshFit] = field(default_factory=list)
-    steps: list[float] = field(default_factory=list)  # sums of squares
 
     @property
     def settings(self) -> SolverSettings:
         """Those of Ipopt, with the time that is left."""
-        return replace(self.asked.solver, max_time=self.budget.left)
+        return replace(self.asked.solver, max_time=max(self.reached.clock.left, LEAST_TIME))
 
-    def first(self, begin: float) -> Optimum:
+    def first(self) -> Optimum:
         """The answer on the mesh to begin with, from the first guesses. Raises SolveError, ModelError."""
         scheme = collocation("radau", 1) if self.read.static else self.asked.collocation
         program = transcribe(self.built.problem, self._meshes(), scheme)
         check_determined(residuals(program), _without_start(self.read))
-        spent = time.perf_counter() - begin
         from_guess = self._from_the_guess(program)
         if from_guess is not None and self._explains(from_guess, program):
-            return self._solved(program, from_guess, spent)
+            return self._optimum(program, from_guess, SOLVED)
         try:
-            return Prepared(self.built, program, Solver(program, self.settings), {}, spent).solve()
-        except SolveError as error:
-            halted = error.optimum is None or error.optimum.status in HALTED
-            if from_guess is None or halted:
+            solver = Solver(program, self.settings)
+            return Prepared(self.built, program, solver, {}, self.build_time, reached=self.reached).search()
+        except SolveError:
+            if from_guess is None or not self.reached.clock.left:
                 raise
-        return self._solved(program, from_guess, spent)
+        return self._optimum(program, from_guess, SOLVED)
 
     def _from_the_guess(self, program: Program) -> np.ndarray | None:
         """Unknowns of the best fit by steps from the motion with the first guesses; None if they lead nowhere.
@@ -197,10 +196,10 @@ class _Work:
         Much quicker than Ipopt from afar, but its motion must exist for all numbers on the way.
         """
         found, steps = residuals(program), iter(range(min(MOST_STEPS, self.asked.max_iterations)))
-        end = time.perf_counter() + SHARE * self.budget.left
+        end = SHARE * self.reached.clock.left
 
         def step(cost: float) -> None:
-            if next(steps, None) is None or time.perf_counter() > end:
+            if next(steps, None) is None or self.reached.clock.left < end:
                 raise TimeOver
             self._step(cost)
 
@@ -208,6 +207,9 @@ class _Work:
             return descended(found, first_guess(program), Weights.even(found.total), step)
         except TimeOver:
             return None
+        except KeyboardInterrupt:
+            self.reached.keep(self._optimum(program, first_guess(program), INTERRUPTED))
+            raise
 
     def _explains(self, w: np.ndarray, program: Program) -> bool:
         """Whether a fit leaves little of how the values spread, so that it is not a minimum far from the best one."""
@@ -218,16 +220,19 @@ class _Work:
             np.linalg.norm(a) <= EXPLAINED * np.linalg.norm(b) for a, b in zip(left, spread, strict=True)
         )
 
-    def _solved(self, program: Program, w: np.ndarray, spent: float) -> Optimum:
-        plain = Solver(program, self.settings).unsolved(program, w)
-        solution = replace(solution_at(program, w, plain), success=True, status=WORDS["Solve_Succeeded"])
-        return Optimum(self.read.read.name, self.built, program, solution, spent)
+    def _optimum(self, program: Program, w: np.ndarray, status: str) -> Optimum:
+        """Unknowns that Ipopt has not seen; solved ones with their multipliers."""
+        solution = Solver(program, self.settings).unsolved(program, w)
+        if status == SOLVED:
+            solution = replace(solution_at(program, w, solution), success=True)
+        solution = replace(solution, status=status)
+        return Optimum(self.read.read.name, self.built, program, solution, self.build_time)
 
     def _step(self, cost: float) -> None:
-        self.steps.append(cost)
-        self.budget.check()
-        if self.asked.progress is not None:
-            self.asked.progress(len(self.steps), cost)
+        clock = self.reached.clock
+        if not clock.left:
+            raise TimeOver
+        clock.tell(clock.last[0] + 1, cost)
 
     def _meshes(self) -> list[Mesh]:
         """Elements: borders where inputs jump or bend, and for static models one at every sample."""
@@ -243,12 +248,12 @@ class _Work:
         return [with_corners(with_jumps(mesh, phase), phase) for phase in self.built.problem.phases]
 
     def solve(self, found: Residuals, w: np.ndarray, weights: Weights) -> np.ndarray | None:
-        """Unknowns by Ipopt from unknowns near them; None where it finds none. KeyboardInterrupt as it is pressed."""
-        self.budget.check()
+        """Unknowns by Ipopt from unknowns near them; None where it finds none. Raises TimeOver."""
         program = _weighted(found.program, weights)
-        solution = Solver(program, replace(self.settings, near=True)).solve(program, w)
-        if solution.status == WORDS["User_Requested_Stop"]:
-            raise KeyboardInterrupt
+        solver = Solver(program, replace(self.settings, near=True))
+        solution = solver.solve(program, w, self.reached.clock)
+        if not self.reached.clock.left:
+            raise TimeOver
         return solution.w if solution.success else None
 
     def finished(self, optimum: Optimum) -> Estimate:

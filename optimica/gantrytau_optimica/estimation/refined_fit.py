@@ -1,6 +1,5 @@
 """A fit on better and better meshes, until what it says no longer depends on them."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -31,23 +30,6 @@ Ended = Literal["", "time", "lost", "elements"]
 
 class TimeOver(Exception):
     """No time is left; what was solved before stands."""
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Time until which all is to be done, of time.perf_counter in s."""
-
-    end: float
-
-    @property
-    def left(self) -> float:
-        """s, above 0."""
-        return max(self.end - time.perf_counter(), 1e-3)
-
-    def check(self) -> None:
-        """TimeOver if there is none left."""
-        if time.perf_counter() > self.end:
-            raise TimeOver
 
 
 @dataclass(frozen=True, eq=False)

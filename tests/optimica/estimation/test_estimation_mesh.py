@@ -1,9 +1,12 @@
 """Estimates do not depend on the mesh: corners of inputs, refinement, and words for what a mesh costs."""
 
+import signal
+import time
+
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, der
+from gantrytau import Input, Model, Parameter, Real, SolveError, der
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -92,3 +95,31 @@ def test_what_a_chosen_mesh_costs_is_printed():
     assert "the mesh is coarse: on twice the elements T moves by" in repr(fit)
     assert repr(fit).split("Note: ")[1:] == [f"{w}\n" for w in fit.warnings[:-1]] + [fit.warnings[-1]]
     within(fit, {"T": 0.05})  # the deviation holds what the mesh costs
+
+
+@pytest.mark.parametrize("step", [1, 8, 12])
+def test_an_interruption_keeps_what_was_solved(step):
+    """In the steps from the first guesses, of the fit on the first mesh, and of those that refine it."""
+    experiment = Experiment({"v": Samples(TIMES, filtered())}, inputs={"u": (TIMES, STEPS)})
+
+    def press(iteration: int, objective: float):
+        if iteration == step:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(SolveError, match="interrupted") as caught:
+        estimate(Filter, {"T": 0.1}, experiment, progress=press)
+    assert caught.value.optimum.success == (step > 1)
+    assert caught.value.optimum.numbers["T"] == pytest.approx(0.05 if step > 1 else 0.1, rel=1e-3)
+
+
+def test_the_time_is_that_of_all_meshes():
+    experiment = Experiment({"v": Samples(TIMES, filtered())}, inputs={"u": (TIMES, STEPS)})
+
+    def wait(iteration: int, objective: float):
+        if iteration == 8:
+            time.sleep(3.1)
+
+    fit = estimate(Filter, {"T": 0.1}, experiment, progress=wait, max_time=3.0)
+    assert "raise max_time=" in repr(fit)
+    with pytest.raises(SolveError, match="time limit reached"):
+        estimate(Filter, {"T": 0.1}, experiment, max_time=1e-3)
