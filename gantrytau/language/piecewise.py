@@ -141,7 +141,7 @@ class _Walk:
         for old in self.switches:
             if old.closed == closed and old.counts == counts and ca.is_equal(old.margin, margin, 3):
                 return old.mode
-        new = Turn(ca.SX.sym(f"mode[{len(self.switches)}]"), margin, closed, counts)
+        new = Turn(ca.SX.sym(f"(mode {len(self.switches)})"), margin, closed, counts)
         self.switches.append(new)
         return new.mode
 

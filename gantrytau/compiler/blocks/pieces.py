@@ -2,23 +2,23 @@
 
 Between its switches a block is linear (or one quadratic): with chosen modes its unknowns follow outright. A choice is
 consistent if the margins, at the unknowns that follow, have the signs that were chosen. Of several consistent ones that
-is taken which differs least from the start. Modes have no derivatives, so those of the solution are of its own piece.
+is taken which differs least from the start. Of what counts, one floor of a margin, the numbers that can be follow from the
+slope of the margin. Modes have no derivatives, so those of the solution are of its own piece.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import casadi as ca
-import numpy as np
 
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.quadratics import root_of
 from gantrytau.language.piecewise import Switched, Turn, with_modes
 from gantrytau.language.term_sizes import term_sizes
 
-MOST_SWITCHES = 6
-MOST_CANDIDATES = 24
+MOST_SWITCHES = 7
+MOST_CANDIDATES = 96
 MOST_UNKNOWNS = 4
 LARGEST = 1e300  # of an unknown: more is a division by zero
 ROUNDING = 1e-11  # of a residual relative to its terms, at a border where no piece is strictly consistent
@@ -65,7 +65,7 @@ class _Candidate:
     sound: whether it counts at all, where it agrees with its margins.
     """
 
-    modes: ca.DM
+    modes: ca.SX
     side: ca.SX
     y: ca.SX
     sound: ca.SX
@@ -74,7 +74,7 @@ class _Candidate:
 def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...], PieceChoice] | None:
     """The unknowns y of residuals with modes, and what is known of the choice; None if they have too many pieces."""
     turns = found.switches
-    if any(t.counts for t in turns) or len(turns) > MOST_SWITCHES or y.numel() > MOST_UNKNOWNS:
+    if len(turns) > MOST_SWITCHES or y.numel() > MOST_UNKNOWNS:
         return None
     forms = _forms(found, y)
     candidates = [] if forms is None else _candidates(forms, found, y, guide)
@@ -87,9 +87,11 @@ def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...
         count += missing * agrees if last else agrees
         taken[k % len(candidates)] += missing * agrees
         missing = missing * (1 - agrees)
-    modes = sum(t * c.modes for t, c in zip(taken, candidates, strict=True))
-    side = sum(t * c.side for t, c in zip(taken, candidates, strict=True))
-    solution = forms.at(ca.SX(modes)).solution(ca.SX(side)) + ca.if_else(missing, ca.SX.nan(), 0)
+    modes, side = (
+        sum((ca.if_else(t, e, 0) for t, e in zip(taken, of, strict=True)), start=ca.SX(0))
+        for of in ([c.modes for c in candidates], [c.side for c in candidates])
+    )
+    solution = forms.at(modes).solution(side) + ca.if_else(missing, ca.SX.nan(), 0)
     number = sum((k + 1) * t for k, t in enumerate(taken))
     return tuple(solution.elements()), PieceChoice(count, ca.SX(number))
 
@@ -99,9 +101,14 @@ def _forms(found: Switched, y: ca.SX) -> _Forms | None:
     residual, modes = ca.vertcat(*found.expressions), ca.vertcat(*(t.mode for t in found.switches))
     matrix, zero = ca.densify(ca.jacobian(residual, y)), ca.SX.zeros(*y.shape)
     constant = ca.substitute(residual, y, zero)
+    counting = [t for t in found.switches if t.counts]
+    for turn in counting:
+        straight = ca.vertcat(ca.vec(matrix), ca.gradient(turn.margin, y), ca.jacobian(constant, turn.mode))
+        if len(counting) > 1 or ca.depends_on(straight, ca.vertcat(y, turn.mode)):
+            return None
     if not ca.depends_on(matrix, y):
         return _Forms(modes, ca.SX(0), matrix, constant)
-    if y.numel() > 1:
+    if y.numel() > 1 or counting:
         return None
     curvature = ca.densify(ca.jacobian(matrix, y))
     if ca.depends_on(curvature, y):
@@ -115,14 +122,14 @@ def _candidates(forms: _Forms, found: Switched, y: ca.SX, guide: Guide) -> list[
     slope = ca.SX(0) if forms.curvature.is_zero() else forms.matrix + forms.curvature * y
     start, slope = (guide.at_start(e) for e in with_modes(found, [modes, slope]))
     side = ca.SX(1.0 if float(slope[0, 0]) >= 0 else -1.0)
-    choices = np.array(list(product((0.0, 1.0), repeat=len(turns))))
-    choices = choices[np.argsort(np.abs(choices - start.ravel()).sum(axis=1), kind="stable")]
+    start = start.ravel().tolist()
+    options = [(b,) if t.counts else (0.0, 1.0) for t, b in zip(turns, start, strict=True)]
+    choices = sorted(product(*options), key=lambda c: sum(abs(a - b) for a, b in zip(c, start, strict=True)))
     candidates: list[_Candidate] = []
-    for choice in choices:
-        values = ca.DM(choice)
+    for values in _counted(choices, forms, turns, y):
         if _contradicts(values, turns, modes):
             continue
-        piece = forms.at(ca.SX(values))
+        piece = forms.at(values)
         if not piece.curvature.is_zero():
             here, there = piece.solution(side), piece.solution(-side)
             candidates.append(_Candidate(values, side, here, ca.SX(1)))
@@ -133,21 +140,57 @@ def _candidates(forms: _Forms, found: Switched, y: ca.SX, guide: Guide) -> list[
     return candidates
 
 
-def _contradicts(values: ca.DM, turns: Sequence[Turn], modes: ca.SX) -> bool:
+def _counted(
+    choices: Sequence[Sequence[float]], forms: _Forms, turns: Sequence[Turn], y: ca.SX
+) -> Iterator[ca.SX]:
+    """The choices, and for what counts the numbers that can be: the nearest to the start, and its neighbours.
+
+    With the other modes chosen the margin is a + b * mode, and 0 <= a - (1 - b) * mode < 1.
+    """
+    place = next((k for k, t in enumerate(turns) if t.counts), None)
+    for choice in choices:
+        values = ca.SX(ca.DM(choice))
+        if place is None:
+            yield values
+            continue
+        mode = turns[place].mode
+        values[place] = mode
+        piece = forms.at(values)
+        if ca.sprank(ca.sparsify(piece.matrix)) < y.numel():
+            continue
+        old, new = ca.vertcat(y, forms.modes), ca.vertcat(piece.solution(ca.SX(0)), values)
+        margin = ca.substitute(turns[place].margin, old, new)
+        a, b = ca.substitute(margin, mode, 0), ca.substitute(margin, mode, 1)
+        slope = 1 - (b - a)
+        ends = [a / slope, (a - 1) / slope]
+        low, high = ca.ceil(ca.fmin(*ends)), ca.floor(ca.fmax(*ends))
+        middle = ca.fmin(ca.fmax(low, choice[place]), high)
+        for number in (middle, middle - 1, middle + 1):  # at a border it is a matter of rounding
+            values[place] = number
+            yield ca.SX(values)
+
+
+def _contradicts(values: ca.SX, turns: Sequence[Turn], modes: ca.SX) -> bool:
     """Whether no unknowns can lead to these modes."""
     margins = [ca.substitute(t.margin, modes, values) for t in turns]
     for k, (turn, margin) in enumerate(zip(turns, margins, strict=True)):
+        if turn.counts:
+            continue
         mode = float(values[k])
         if margin.is_constant() and float(Turn(margin, margin, turn.closed).value) != mode:
             return True
         for m, other in enumerate(margins[:k]):
-            if ca.is_equal(margin, -other, 3) or ca.is_equal(-margin, other, 3):
+            if not turns[m].counts and _opposite(margin, other):
                 both = mode + float(values[m])
                 if (both == 2 and not (turn.closed and turns[m].closed)) or (
                     both == 0 and (turn.closed or turns[m].closed)
                 ):
                     return True
     return False
+
+
+def _opposite(a: ca.SX, b: ca.SX) -> bool:
+    return ca.is_equal(a, -b, 3) or ca.is_equal(-a, b, 3)
 
 
 def _agrees(candidate: _Candidate, turns: Sequence[Turn], modes: ca.SX, y: ca.SX) -> ca.SX:
@@ -158,8 +201,8 @@ def _agrees(candidate: _Candidate, turns: Sequence[Turn], modes: ca.SX, y: ca.SX
         agrees = agrees * (ca.fabs(element) <= LARGEST)
     for k, turn in enumerate(turns):
         margin = ca.substitute(turn.margin, old, new)
-        holds = Turn(turn.mode, margin, turn.closed).value
-        agrees = agrees * (holds if float(candidate.modes[k]) else 1 - holds)
+        value = Turn(turn.mode, margin, turn.closed, turn.counts).value
+        agrees = agrees * (value == candidate.modes[k])
     return agrees
 
 

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.errors import InitializationError
+from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.term_sizes import term_sizes
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
@@ -28,6 +29,7 @@ SPREAD = 0.3  # of the first of them
 NOISE = (
     1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
 )
+MOST_PIECES = 60  # that are tried
 LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 
 
@@ -110,7 +112,11 @@ def solve_levels(
             try:  # starts that fit together are held
                 _solve(level, free, values, started, title)
             except InitializationError:
-                (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
+                try:
+                    (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
+                except InitializationError:
+                    if not _solve_switching(level, moving, values, started, title):
+                        raise
     return values
 
 
@@ -133,6 +139,47 @@ def _solve_anyhow(level: Level, moving: Sequence[str], values: dict[str, float],
         values.update(other)
         return None
     raise first
+
+
+def _solve_switching(
+    level: Level, moving: Sequence[str], values: dict[str, float], started: frozenset[str], title: str
+) -> bool:
+    """Try the pieces of equations that switch on what moves, one after another: where steps go to and fro between them.
+
+    A piece is left for the one in which its solution lies, or for one that differs in a single switch from it.
+    """
+    found = switched(level.residuals, set(moving))
+    if not found.switches:
+        return False
+    names = [s.mode.name() for s in found.switches]
+    leaves = ca.vertcat(*ca.symvar(ca.vertcat(*level.residuals)))
+    modes = ca.Function("modes", [leaves], with_modes(found, [ca.vertcat(*(s.mode for s in found.switches))]))
+
+    def read(numbers: Mapping[str, float]) -> tuple[float, ...]:
+        return tuple(np.array(modes([numbers[n] for n in level.leaves])).ravel().tolist())
+
+    smooth = Level(found.expressions, level.names, level.unknowns)
+    waiting, seen = [read(values)], set[tuple[float, ...]]()
+    while waiting and len(seen) < MOST_PIECES:
+        chosen = waiting.pop(0)
+        if chosen in seen or not np.all(np.isfinite(chosen)):
+            continue
+        seen.add(chosen)
+        trial = {**values, **dict(zip(names, chosen, strict=True))}
+        try:
+            _solve(smooth, moving, trial, started, title)
+        except InitializationError:
+            continue
+        there = read(trial)
+        if there == chosen:
+            values.update((n, trial[n]) for n in moving)
+            return True
+        waiting.append(there)
+        for k, (old, new) in enumerate(zip(chosen, there, strict=True)):
+            if old != new:  # of what counts, the next number
+                step = old + float(np.sign(new - old))
+                waiting.append((*chosen[:k], step, *chosen[k + 1 :]))
+    return False
 
 
 def _solve(
