@@ -114,7 +114,7 @@ def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", wanted: Wante
     except KeyboardInterrupt:
         if wanted.save is not None and not files:
             with suppress(KeyboardInterrupt, GantryTauError):  # pressed once more, it is written nevertheless
-                result_output.save(optimum.result, wanted.save)
+                result_output.save(optimum, wanted.save)
                 files.append(str(wanted.save))
         words = f"; written: {', '.join(files)}" if files else "; nothing was written"
         fail(f"Interrupted{words}", INTERRUPTED, wanted.json)
@@ -177,7 +177,7 @@ def _written(optimum: "Optimum", wanted: Wanted, files: list[str]) -> str:
     """Write the files of a solution, named in `files`; why some are not written, which does not cost the answer."""
     wrong: list[str] = []
     try:
-        files += result_output.save(optimum.result, wanted.save)
+        files += result_output.save(optimum, wanted.save)
     except GantryTauError as error:
         wrong.append(str(error))
     try:
@@ -197,7 +197,7 @@ def _leave(error: SolveError, chosen: Chosen, save: Path | None, json: bool) -> 
     if save is not None and (optimum.success or optimum.iterations > 0):
         kept = save.with_name(f"{save.stem}.unfinished{save.suffix}")  # a solution saved before stays
         try:
-            files = result_output.save(optimum.result, kept)
+            files = result_output.save(optimum, kept)
             message += f"\nWhat was reached until then is in {kept}"
             if kept.suffix.lower() in FORMATS and (
                 optimum.success or pressed or "limit reached" in optimum.status

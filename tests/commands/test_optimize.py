@@ -20,7 +20,7 @@ FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 PROBLEMS = '''\
 """Problems of a user."""
 from gantrytau import Input, Model, Parameter, Real, der
-from gantrytau_optimica import Free, Optimization, final
+from gantrytau_optimica import Free, Optimization, final, link
 
 print("loading")
 
@@ -63,6 +63,21 @@ class Divided(Fastest):
 class Misspelt(Fastest):
     def objective(self):
         return self.end_time
+
+class Back(Fastest):
+    cart = Cart(x=dict(fixed=False), v=dict(fixed=False))
+    start_time = Free(2.0, unit="s")
+    final_time = Free(4.0, unit="s")
+
+class ThereAndBack(Optimization):
+    out = Fastest()
+    back = Back(distance=0.0)
+
+    def objective(self):
+        return self.back.final_time
+
+    def constraints(self):
+        yield link(self.out, self.back)
 
 class Needy(Fastest):
     def __init__(self, way):
@@ -201,6 +216,34 @@ def test_the_motion_is_saved_and_drawn(run, move, tmp_path):
     assert values["time [s]"][-1] == pytest.approx(fastest(), abs=1e-5)  # as above
     assert values["cart.x [m]"][-1] == pytest.approx(1.0, abs=1e-6)  # a hundred times the tolerance
     assert len(np.unique(plt.imread(picture).reshape(-1, 4), axis=0)) > 20  # paper, axes, the lines' colours
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_phases_are_saved_drawn_and_gone_on_from(run, answer, moves, tmp_path, suffix, monkeypatch):
+    table, picture = tmp_path / f"moves{suffix}", tmp_path / "moves.png"
+    problem, drawn = f"{moves}:ThereAndBack", "out.cart.x,back.cart.x,der(back.cart.v[0]),back.final_time"
+    arguments = ("optimize", problem, "--elements", "10", "--save", table, "--plot", drawn, "--to", picture)
+    found = run(*arguments)
+    assert found.exit_code == 0, found.output
+    assert f"Written: {table}\nWritten: {picture}" in found.stdout
+    assert len(np.unique(plt.imread(picture).reshape(-1, 4), axis=0)) > 20  # as above
+    printed = json.loads(run(*arguments, "--json").stdout)
+    assert printed["final_time"] == pytest.approx(2 * fastest(), abs=1e-4)
+    if suffix == ".csv":
+        values = columns(table)
+        time, out, back = (values[n] for n in ("time [s]", "out.cart.x [m]", "back.cart.x [m]"))
+        middle = np.argmin(np.abs(time - fastest()))
+        assert (time[0], time[-1]) == pytest.approx((0.0, 2 * fastest()), abs=1e-4)
+        assert np.all(np.isfinite(out) | np.isfinite(back))
+        assert np.all(np.isnan(out[middle + 2 :]))
+        assert np.all(np.isnan(back[: middle - 1]))
+        assert np.nanmax(out) == pytest.approx(1.0, abs=1e-6)
+    given = {}
+    solve = gantrytau_optimica.optimize
+    monkeypatch.setattr(gantrytau_optimica, "optimize", lambda p, **k: solve(p, **(given.update(k) or k)))
+    again = answer("optimize", problem, "--elements", "10", "--guess", table)
+    assert "guess" in given
+    assert again["final_time"] == pytest.approx(2 * fastest(), abs=1e-4)
 
 
 def test_what_cannot_be_drawn_does_not_cost_the_answer(run, fails, move, tmp_path):

@@ -9,6 +9,7 @@ from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import Result
+    from gantrytau_optimica import Optimum
 
 
 def rehearse(file: Path | None) -> None:
@@ -28,7 +29,7 @@ def rehearse(file: Path | None) -> None:
                 trial.unlink(missing_ok=True)
 
 
-def save(result: "Result", file: Path | None) -> list[str]:
+def save(result: "Result | Optimum", file: Path | None) -> list[str]:
     """Write the result, if a file is named; the files written."""
     if file is None:
         return []

@@ -106,6 +106,24 @@ class Answer(ABC):
             found[path] = Result(phase.time, rows, units=units, descriptions=words, title=title)
         return found
 
+    @cached_property
+    def _whole(self) -> Result:
+        """All variables over the times of all phases; outside of its phase a variable has no value, which is NaN."""
+        if len(self.by_phase) == 1:
+            return self.result
+        times = np.unique(np.concatenate([result.time for result in self.by_phase.values()]))
+        units, words = self._labels()
+        rows = {n: self._over(n, times) for result in self.by_phase.values() for n in result.names}
+        return Result(times, rows, units=units, descriptions=words, title=self.name)
+
+    def _over(self, name: str, times: np.ndarray) -> np.ndarray:
+        """A scalar at times (n,), NaN outside of its phase."""
+        own = self.time_of(name)
+        inside = (times >= own[0]) & (times <= own[-1])
+        values = np.full(times.shape, np.nan)
+        values[inside] = self.signal(name)(times[inside])
+        return values
+
     @property
     def names(self) -> tuple[str, ...]:
         """All variables and free numbers; vectors, derivatives and parameters can be asked for as well."""
@@ -158,22 +176,22 @@ class Answer(ABC):
         return value
 
     def plot(self, *names: str, file: Any = None):
-        """Variables over time, as Result.plot; derivatives and free numbers, too."""
-        result, (units, words) = self.result, self._labels()
+        """Variables over time, as Result.plot, those of a phase over its own; derivatives and free numbers, too."""
+        result, (units, words) = self._whole, self._labels()
         more = [n for name in names for n in self._elements(name) if n not in result and n != "time"]
         if more:
-            values = {n: result[n] for n in result.names} | {n: self._drawn(n) for n in more}
+            values = {n: result[n] for n in result.names} | {n: self._drawn(n, result.time) for n in more}
             result = Result(result.time, values, units=units, descriptions=words, title=result.title)
         return result.plot(*names, file=file)
 
-    def _drawn(self, name: str) -> Any:
+    def _drawn(self, name: str, times: np.ndarray) -> Any:
         try:
-            return self[name]
+            return self[name] if name in self.free else self._over(name, times)
         except ModelError as error:  # of derivatives that the problem does not hold
             raise ModelError(
                 f"{name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
             ) from error
 
     def save(self, path: Any):
-        """Save all variables over time, as Result.save."""
-        return self.result.save(path)
+        """Save all variables over time, as Result.save; outside of its phase a variable is NaN."""
+        return self._whole.save(path)

@@ -175,7 +175,8 @@ class _Stretched(Stretched):
 
 
 def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> dict[str, Any]:
-    """Guesses from another solution by name: signals, their time stretched onto the new horizon, and free numbers.
+    """Guesses from another solution by name: signals, their time stretched onto the new horizon, and free numbers. In a
+    result of several phases a signal is NaN outside of its own.
 
     component: path of the component that the solution is of. What the solution does not have keeps its default guess;
     ModelError if it has no variable of the model at all.
@@ -192,10 +193,13 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
             f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the "
             "same model, or write guess={'component': solution} with the component that it is of"
         )
-    found: dict[str, Any] = {
-        n: _Stretched((t - t[0]) / (t[-1] - t[0]), np.asarray(source[n[len(before) :]]))
-        for n, t in times.items()
-    }
+    found: dict[str, Any] = {}
+    for name, every in times.items():
+        values = np.asarray(source[name[len(before) :]])
+        known = np.isfinite(values)
+        if np.any(known):
+            t = every[known]
+            found[name] = _Stretched((t - t[0]) / (t[-1] - t[0]), values[known])
     numbers = {before + n: x for n, x in getattr(source, "free", {}).items()}
     return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
 

@@ -1,5 +1,6 @@
 """An answer just found and the same one read from its file answer every question alike."""
 
+import csv
 from functools import cache
 from typing import Any
 
@@ -201,6 +202,28 @@ def test_two_phases(answer):
         moves.signal("onward.cart.r")(middle), original.signal("onward.cart.r")(middle), atol=CLOSE
     )
     assert repr(moves).startswith(f"<{type(moves).__name__} TwoMoves: solved, objective 0.4")
+
+
+def test_phases_are_drawn_and_saved_in_one_table(answer, tmp_path):
+    moves = answer(TwoMoves)
+    first, onward = moves.phases["first"], moves.phases["onward"]
+    moves.save(tmp_path / "moves.csv")
+    with (tmp_path / "moves.csv").open() as file:
+        header, *rows = list(csv.reader(file))
+    table = dict(zip([name.split(" ")[0] for name in header], np.array(rows, float).T, strict=True))
+    time = table["time"]
+    for path, phase in (("first", first), ("onward", onward)):
+        inside = (time >= phase.time[0]) & (time <= phase.time[-1])
+        position = table[f"{path}.cart.r[0]"]
+        np.testing.assert_array_equal(np.isfinite(position), inside)
+        own = np.isin(time, phase.time)
+        np.testing.assert_allclose(position[own], moves[f"{path}.cart.r"][:, 0], atol=CLOSE)
+    names = ("first.cart.r", "onward.cart.r", "der(onward.cart.r)", "first.final_time")
+    figure = moves.plot(*names, file=tmp_path / "moves.png")
+    lines = {line.get_label(): line for axis in figure.axes for line in axis.get_lines()}
+    drawn = lines["onward.cart.r[0]"]
+    shown = np.asarray(drawn.get_xdata(), float)[np.isfinite(np.asarray(drawn.get_ydata(), float))]
+    assert (shown[0], shown[-1]) == (onward.time[0], onward.time[-1])
 
 
 def test_it_is_a_guess_for_the_component_that_it_is_of(answer):
