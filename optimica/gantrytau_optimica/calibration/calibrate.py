@@ -1,7 +1,7 @@
 """`calibrate`: the parameters of a robot from measured poses."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
 from gantrytau_optimica.calibration.judging.device_frames import Motion
@@ -91,6 +92,8 @@ def calibrate(
         frame=frame,
         motion=None if there is None else Motion.of(there),
     )
+    if constraints:
+        found = replace(found, constraints=tuple(read_constraints(constraints, found.names)))
     told = [] if there is None or start == "linear" else [in_words(there, rows)]
     return found.with_findings([*findings, *told, *judged(found)])
 

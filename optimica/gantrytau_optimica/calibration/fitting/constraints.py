@@ -16,6 +16,8 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 
+AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
+
 
 @dataclass(frozen=True)
 class ParameterConstraint:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import SolveError
-from gantrytau_optimica.calibration.fitting.constraints import read_constraints
+from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, read_constraints
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.least_squares import problem
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, noise_of, not_held
@@ -18,7 +18,7 @@ from gantrytau_optimica.calibration.rods.groups import Group
 TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
 ROUNDED = 1e-6  # the same of closure errors of turntables, whose roundings leave 5e-7
 LEAST = 1e-9  # m2 or m, of the noise: rounding of closure errors is far below it
-AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
+LEAST_STEP = 1e-6  # the same where numbers are led to a limit, in steps of their deviations
 # where rounding ends the descent before the gradient is that small
 AT_ROUNDING = ("Search_Direction_Becomes_Too_Small", "Solved_To_Acceptable_Level")
 OPTIONS = {
@@ -39,11 +39,11 @@ def solve(fit: Fit) -> Fit:
     where Ipopt finds no minimum.
     """
     group, free = fit.group, np.flatnonzero(fit.group.free)
-    steps = _steps(fit)
+    noise = max(noise_of(fit.minimum, fit.group), LEAST)
+    steps = _steps(fit, noise)
     unknown = ca.MX.sym("x", len(free))
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
-    noise = noise_of(fit.minimum, fit.group)
     rows, held = _residuals(fit, x, noise), unknown[fit.minimum.rank :]
     solver = _solver(rows, unknown, held, bool(group.arms), OPTIONS)
     start = np.linalg.solve(steps, group.x[free] - fit.x[free])
@@ -67,7 +67,7 @@ def _residuals(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
         rows.append(ca.vec(e if fit.weights is None else ca.repmat(ca.DM(fit.weights), 1, e.shape[1]) * e))
     for i, (value, deviation) in fit.group.prior.items():
         rows.append(noise / deviation * (x[i] - value))
-    return ca.vertcat(*rows) / max(noise, LEAST)
+    return ca.vertcat(*rows) / noise
 
 
 def _solver(rows: ca.MX, unknown: ca.MX, kept: ca.MX, arms: bool, options: dict[str, Any]) -> ca.Function:
@@ -94,9 +94,9 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     whole = _merged(fits)
     group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
     constraints = read_constraints(given, whole.free_names)
-    noise = noise_of(whole.minimum, group)
+    noise = max(noise_of(whole.minimum, group), LEAST_STEP)
     unknown = ca.MX.sym("x", len(free))
-    steps, begin = _steps(whole), minimum.x[free]
+    steps, begin = _steps(whole, noise), minimum.x[free]
     numbers_of = ca.DM(begin) + ca.DM(steps) @ unknown
     x = ca.MX(ca.DM(group.x))
     x[free.tolist()] = numbers_of
@@ -121,13 +121,12 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     return [_constrained(whole, numbers, slopes[active], int(stats["iter_count"]))]
 
 
-def _steps(fit: Fit) -> np.ndarray:
+def _steps(fit: Fit, noise: float) -> np.ndarray:
     """One deviation of the numbers along each direction, of those that data do not hold by tape, in columns, (n, n).
 
     In these steps the curvature of the cost is the same along all directions.
     """
     minimum = fit.minimum
-    noise = max(noise_of(minimum, fit.group), LEAST)
     sizes = np.full(len(minimum.directions), fit.group.tape)
     sizes[: minimum.rank] = noise / minimum.singular[: minimum.rank]
     return minimum.directions.T * sizes * fit.group.scale[fit.group.free][:, None]

@@ -12,6 +12,7 @@ from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
+from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
 from gantrytau_optimica.calibration.fitting.named_parameters import (
     Named,
@@ -39,7 +40,7 @@ class FittedRods:
     numbers, at their minima; rows: those of the measurements that were fitted; held_out: those that validate; findings:
     what was noticed on the way; nominal: how nominal values in the frame of the measurements miss them, None if they were
     not used; frame: as it was asked for; motion: from the frame of the measurements to the base of the robot, None where
-    they are the same or nothing is known of it.
+    they are the same or nothing is known of it; constraints: that numbers keep.
     """
 
     nominal_rods: NominalRods
@@ -55,6 +56,7 @@ class FittedRods:
     nominal: Misses | None = None
     frame: str = "fitted"
     motion: Motion | None = None
+    constraints: tuple[ParameterConstraint, ...] = ()
 
     def __repr__(self) -> str:
         return (

@@ -18,6 +18,7 @@ from gantrytau_optimica.calibration.judging.plausibility import (
     misses_of,
     swapped_carts,
 )
+from gantrytau_optimica.calibration.judging.pulls import pulls
 from gantrytau_optimica.calibration.judging.slips import Slip, slip, smooth_functions
 from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
@@ -29,6 +30,7 @@ LEFT_OUT = ("nan", "duplicates", "stuck")
 STILL = 1e-4  # m, over which a cart must move to be calibrated
 MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
 EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
+SHOWN = 3  # priors or constraints that are named
 LOOKED_AT = 1000  # poses, in which a slip or a drift is looked for
 ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
@@ -189,7 +191,36 @@ def judged(found: FittedRods) -> list[Finding]:
         )
         findings.append(Finding("outliers", others, words))
     findings += _ordered(found)
-    return [*findings, *_misfit(found, seen, findings), *_far(found), *_in_doubt(found)]
+    return [*findings, *_misfit(found, seen, findings), *_pulled(found), *_far(found), *_in_doubt(found)]
+
+
+def _pulled(found: FittedRods) -> Iterator[Finding]:
+    """Priors and constraints that data contradict, and limits that are reached."""
+    each = [pull for fit in found.fits for pull in pulls(fit, found.constraints)]
+    for kind, told, advice in (
+        (
+            "prior",
+            "data want {name} at {wanted:.7g}, the prior {held:.7g} +- {deviation:.3g} holds it {far} deviations off",
+            "look at its value, or give it a larger deviation",
+        ),
+        (
+            "equation",
+            "data want {name} at {wanted:.7g}, a constraint holds it at {held:.7g}, {far} deviations off",
+            "look at its value, or leave it free",
+        ),
+        (
+            "limit",
+            "{name} stands at its limit {held:.7g}, data want {wanted:.7g}, {far} deviations beyond",
+            "widen the limit, or look whether measurements and units are right",
+        ),
+    ):
+        those = [pull for pull in each if pull.kind == kind]
+        if those:
+            shown = "; ".join(
+                told.format(**vars(pull), far=f"{pull.deviations:.3g}") for pull in those[:SHOWN]
+            )
+            more = f"; and {len(those) - SHOWN} more" if len(those) > SHOWN else ""
+            yield Finding(kind, found.rows, f"{shown}{more}; the other numbers are pulled along; {advice}")
 
 
 def _far(found: FittedRods) -> Iterator[Finding]:
