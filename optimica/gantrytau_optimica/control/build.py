@@ -24,8 +24,9 @@ from gantrytau_optimica.control.control_problem import (
     PointValue,
     Signal,
 )
-from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess, typical_size
-from gantrytau_optimica.control.limits import check_symbols, limit_rows, signal_limits, with_limits
+from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess
+from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
+from gantrytau_optimica.control.sizes import with_sizes
 from gantrytau_optimica.problem.model_words import algebraic_words
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
 
@@ -86,7 +87,7 @@ def build(
     names = [a.name for a in system.algebraics if a.closed is not None]
     forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
     built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
-    return replace(built, problem=_with_sizes(with_guesses(built, guess)))
+    return replace(built, problem=with_sizes(with_guesses(built, guess)))
 
 
 def _check_courses(read: SymbolicProblem, number: int, phase: Phase) -> None:
@@ -123,13 +124,6 @@ def with_guesses(built: Built, guess: Mapping[str, Any]) -> ControlProblem:
     """The control problem with first guesses along its free and held numbers as they are."""
     guesses = first_guesses(built, guess)
     return built.problem.with_signals(lambda _, signal: replace(signal, guess=guesses[signal.name]))
-
-
-def _with_sizes(draft: ControlProblem) -> ControlProblem:
-    bounds = {name: ends for phase in draft.phases for name, ends in signal_limits(phase, draft.name).items()}
-    return draft.with_signals(
-        lambda _, signal: replace(signal, nominal=typical_size(draft, signal, bounds[signal.name]))
-    )
 
 
 @dataclass(frozen=True, eq=False)

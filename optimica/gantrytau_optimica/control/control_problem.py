@@ -62,7 +62,7 @@ class Course:
 class FreeNumber:
     """A number that is chosen, or held at its guess for one solve and changed for the next.
 
-    nominal: its typical size, where the guess does not tell it.
+    nominal: its typical size, by the guess where it is not given.
     """
 
     name: str
@@ -72,6 +72,11 @@ class FreeNumber:
     guess: float
     held: bool = False
     nominal: float | None = None
+
+    @property
+    def size(self) -> float:
+        """Its typical size."""
+        return self.nominal or abs(self.guess) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,19 +104,24 @@ class SampleSum:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """lower <= expression <= upper, scalar; on a path an expression of signals, else of points and numbers."""
+    """lower <= expression <= upper, scalar; on a path an expression of signals, else of points and numbers.
+
+    size: how much it changes when what stands in it changes by its typical size.
+    """
 
     expression: ca.SX
     lower: float
     upper: float
     name: str
+    size: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Phase:
     """A stretch of time with equations, limits and a clock of its own; `name` is "" where there is only one.
 
-    ode, residuals: one row per state and algebraic, expressions of time, signals, courses and free numbers.
+    ode, residuals: one row per state and algebraic, expressions of time, signals, courses and free numbers;
+    residual_sizes: how much they change when what stands in them changes by its typical size.
     """
 
     name: str
@@ -128,6 +138,7 @@ class Phase:
     path_limits: tuple[Limit, ...] = ()
     points: tuple[PointValue, ...] = ()
     sums: tuple[SampleSum, ...] = ()
+    residual_sizes: tuple[float, ...] = ()
 
     @property
     def signals(self) -> tuple[Signal, ...]:

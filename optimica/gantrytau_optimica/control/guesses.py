@@ -12,7 +12,7 @@ from gantrytau import Dae, ModelError, Result
 from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, Signal
+from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase
 from gantrytau_optimica.control.limits import value_at
 from gantrytau_optimica.problem.optimization import Point
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
@@ -325,14 +325,3 @@ class _Closed:
             found = np.maximum(found, LEAST_ROOT * (np.max(found) or 1.0))
         self.last = (fraction, found)
         return found
-
-
-def typical_size(problem: ControlProblem, signal: Signal, bounds: tuple[float, float]) -> float:
-    """A typical magnitude: declared, else from limits, else from the guess."""
-    if np.isfinite(signal.nominal):
-        return signal.nominal
-    finite = [abs(b) for b in bounds if np.isfinite(b) and b != 0.0]
-    size = max(finite) if finite else float(np.max(np.abs(signal.guess(np.linspace(0.0, 1.0, 11)))))
-    algebraic = {a.name for phase in problem.phases for a in phase.algebraics}
-    least = 1e-6 if signal.name in algebraic else 1e-14  # what rounding leaves of a zero is no size
-    return size if least < size < 1e15 else 1.0

@@ -214,7 +214,7 @@ def _binding(program: Program, solution: Solution, trajectory: Trajectory) -> li
         if group.kind != "path" or group.phase != number:
             continue
         for word, bound in (("lower", group.lower), ("upper", group.upper)):
-            reached = _reached(solution.constraints[group.rows], np.full(group.rows.size, bound))
+            reached = _reached(solution.constraints[group.rows] * group.size, np.full(group.rows.size, bound))
             if np.any(reached):
                 found.append(f"`{group.name}` at its {word} limit {intervals(reached, times)}")
     return found

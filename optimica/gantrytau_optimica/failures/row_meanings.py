@@ -118,4 +118,4 @@ def row_sizes(program: Program, w: np.ndarray) -> np.ndarray:
     value = np.abs(np.array(jacobian.nonzeros()))
     found = np.zeros(program.assembled.rows)
     np.maximum.at(found, row, np.where(np.isfinite(value), value, 0.0))
-    return np.where(found > 1e-9, found, 1.0)
+    return np.where(found > 0, found, 1.0)

@@ -29,6 +29,8 @@ WORDS = {
 NOT_BEGUN = "not begun: an expression is not finite at the first guess"
 PUSH = 1e-2  # Ipopt's bound_push and bound_frac: how far a guess is moved inside of its limits
 
+UNLIMITED = 1e200
+
 FAR = 1e5  # typical sizes that an unknown moves from its guess when it runs away
 
 # From a solution nearby the barrier begins low: begun high, it may lead to another branch.
@@ -40,8 +42,9 @@ NEAR = {
     "slack_bound_push": 1e-5,
 }
 
-SLOPE = 1e-4  # of the objective by a scaled unknown: steepest slopes at the guess are scaled up to it
-MOST_SCALED = 1e4
+SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
+STEEP = 1e2  # slopes by one unknown are scaled down to this
+FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by accident
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,9 @@ class Solver:
                 "tol": settings.tolerance,
                 "max_iter": settings.max_iterations,
                 "max_wall_time": settings.max_time,
+                # in units of their own objectives may be of any size: what is scaled decides
+                "dual_inf_tol": UNLIMITED,
+                "compl_inf_tol": UNLIMITED,
             },
         }
         if settings.near:
@@ -185,12 +191,35 @@ def finite(program: Program, w: np.ndarray) -> bool:
     return all(np.all(np.isfinite(np.array(part.nonzeros()))) for part in parts)
 
 
-def _objective_scale(program: Program) -> float:
-    """A factor for an objective whose slopes at the guess are so small that Ipopt would take any point for its optimum."""
+def objective_size(program: Program) -> float:
+    """By how much the objective changes when all unknowns change by their sizes from the guess, to first order;
+    from beside the guess, where its slopes vanish there.
+    """
+    return float(np.sum(_objective_slopes(program)[1]))
+
+
+def _objective_slopes(program: Program) -> tuple[np.ndarray, np.ndarray]:
+    """Finite slopes of the objective by scaled unknowns at the guess, and those that tell its size."""
     x = first_guess(program) / program.places.scale
-    slopes = np.abs(np.array(program.assembled.grad_f(x, ca.DM(0, 1))[1].nonzeros()))
-    steepest = float(np.max(slopes[np.isfinite(slopes)], initial=0.0))
-    return min(SLOPE / steepest, MOST_SCALED) if 0.0 < steepest < SLOPE else 1.0
+    beside = np.clip(x + 0.5 * np.sin(1.0 + 7.3 * np.arange(x.size)), program.lbw, program.ubw)
+    at_guess, near = (
+        np.abs(found[np.isfinite(found)])
+        for found in (np.array(program.assembled.grad_f(w, ca.DM(0, 1))[1]).ravel() for w in (x, beside))
+    )
+    return at_guess, at_guess if np.sum(at_guess) > FLAT * np.sum(near) else near
+
+
+def _objective_scale(program: Program) -> float:
+    """A factor that makes an objective neither so flat that any point is taken for its optimum, nor so steep that none is.
+
+    Ipopt by itself scales down what is steep at the guess, by no more than 1e8.
+    """
+    at_guess, slopes = _objective_slopes(program)
+    size, steepest = float(np.sum(slopes)), float(np.max(slopes, initial=0.0))
+    if size <= 0.0:
+        return 1.0
+    wanted = max(SLOPE / size, 1.0) * min(STEEP / steepest, 1.0)
+    return wanted / max(min(STEEP / max(np.max(at_guess, initial=0.0), 1e-300), 1.0), 1e-8)
 
 
 class Watch(ca.Callback):

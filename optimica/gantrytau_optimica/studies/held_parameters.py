@@ -9,6 +9,7 @@ from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
+from gantrytau_optimica.control.control_problem import Limit
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
 from gantrytau_optimica.studies.kkt import stationarity
 from gantrytau_optimica.transcription.program import Program
@@ -58,7 +59,23 @@ def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
         value = float(values.get(number.name, number.guess))
         ends = {"min": value, "max": value} if number.held else {}
         numbers.append(replace(number, guess=value, **ends))
-    return replace(built, problem=replace(sized, free=tuple(numbers)))
+    phases = tuple(
+        replace(
+            phase,
+            residual_sizes=before.residual_sizes,
+            path_limits=_sized(phase.path_limits, before.path_limits),
+        )
+        for phase, before in zip(sized.phases, old.problem.phases, strict=True)
+    )
+    boundary = _sized(sized.boundary, old.problem.boundary)
+    return replace(built, problem=replace(sized, phases=phases, boundary=boundary, free=tuple(numbers)))
+
+
+def _sized(limits: Sequence[Limit], old: Sequence[Limit]) -> tuple[Limit, ...]:
+    """Limits with the sizes that they had, if they are the same."""
+    if [limit.name for limit in limits] != [limit.name for limit in old]:
+        return tuple(limits)
+    return tuple(replace(limit, size=before.size) for limit, before in zip(limits, old, strict=True))
 
 
 def _carried(old: Program, new: Program, solution: Solution, w: np.ndarray) -> Solution | None:

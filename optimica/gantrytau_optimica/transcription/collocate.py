@@ -96,8 +96,10 @@ def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], s
         groups.append(Rows("continuity", state.name, number, rows, borders, 0.0, 0.0, state.nominal))
     linear.append(jumps)
     begin = stop = stop + jumps.shape[0]
-    for name in phase.residual_names[: layout.begin.size]:
-        groups.append(Rows("algebraic", name, number, np.array([stop]), np.zeros(1), 0.0, 0.0))
+    for name, size in zip(phase.residual_names, phase.residual_sizes, strict=True):
+        if not layout.begin.size:
+            break
+        groups.append(Rows("algebraic", name, number, np.array([stop]), np.zeros(1), 0.0, 0.0, size))
         stop += 1
     linear.append(sparse.csr_matrix((stop - begin, places.size)))
     for signal, chain in layout.chains.items():
@@ -122,8 +124,9 @@ def _rows_at_points(
     """Dynamics, algebraic equations and path limits at every point, and the slopes of the states as linear part."""
     phase, fractions = layout.phase, layout.fractions
     meaning = [("dynamics", s.name, 0.0, 0.0, s.nominal) for s in phase.states]
-    meaning += [("algebraic", name, 0.0, 0.0, 1.0) for name in phase.residual_names]
-    meaning += [("path", limit.name, limit.lower, limit.upper, 1.0) for limit in path]
+    sizes = zip(phase.residual_names, phase.residual_sizes, strict=True)
+    meaning += [("algebraic", name, 0.0, 0.0, size) for name, size in sizes]
+    meaning += [("path", limit.name, limit.lower, limit.upper, limit.size) for limit in path]
     per_point, points = len(meaning), fractions.size
     at_points = start + per_point * np.arange(points)
     groups = [
@@ -157,9 +160,8 @@ def _point_term(places: Places, layout: Layout, path: list[Limit], start: int, t
     slopes = phase.ode * (run.horizon * run.width)
     values = ca.vertcat(slopes, phase.residuals, *(limit.expression for limit in path))
     element, place = layout.points
-    per_point = values.numel()
-    factor = np.ones((element.size, per_point))
-    factor[:, : len(phase.states)] = -1.0 / np.array([s.nominal for s in phase.states])
+    sizes = [*(-s.nominal for s in phase.states), *phase.residual_sizes, *(limit.size for limit in path)]
+    factor = np.tile(1.0 / np.array(sizes), (element.size, 1))
     index = np.arange(factor.size)
     scatter = sparse.csr_matrix((factor.ravel(), (start + index, index)), shape=(total, index.size))
     return run.term(values, element, place, scatter)
@@ -169,7 +171,8 @@ def _begin_term(places: Places, layout: Layout, start: int, total: int) -> Term:
     """The equations of the algebraics at the start of a phase."""
     run, nx, nz = running(places, layout), len(layout.phase.states), layout.begin.size
     rows = np.arange(nz)
-    scatter = sparse.csr_matrix((np.ones(nz), (start + rows, rows)), shape=(total, nz))
+    sizes = np.array(layout.phase.residual_sizes)
+    scatter = sparse.csr_matrix((1.0 / sizes, (start + rows, rows)), shape=(total, nz))
     term = run.term(layout.phase.residuals, np.zeros(1, int), np.zeros(1), scatter)
     exact = places.pick([rows], [layout.begin], [np.ones(nz)], nz)
     gather = sparse.vstack([term.gather[:nx], exact, term.gather[nx + nz :]]).tocsr()

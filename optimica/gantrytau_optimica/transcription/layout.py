@@ -186,7 +186,7 @@ def lay_out(problem: ControlProblem, meshes: tuple[Mesh, ...], scheme: Collocati
     """Number the unknowns: free numbers, then element after element, so that what belongs together stands together."""
     layouts: list[Layout] = []
     size = len(problem.free)
-    scales = [np.array([n.nominal or max(abs(n.guess), 1e-3) for n in problem.free])]
+    scales = [np.array([n.size for n in problem.free])]
     for phase, mesh in zip(problem.phases, meshes, strict=True):
         layout = _lay_out(phase, mesh, scheme, size)
         size += layout.size

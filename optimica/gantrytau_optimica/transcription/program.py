@@ -110,13 +110,23 @@ def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[l
     boundary = places.problem.boundary
     rows = start + np.arange(len(boundary))
     groups = [
-        Rows("boundary", limit.name, -1, np.array([row]), np.array([np.nan]), limit.lower, limit.upper)
+        Rows(
+            "boundary",
+            limit.name,
+            -1,
+            np.array([row]),
+            np.array([np.nan]),
+            limit.lower,
+            limit.upper,
+            limit.size,
+        )
         for row, limit in zip(rows, boundary, strict=True)
     ]
     if not boundary:
         return groups, []
     shape = (start + rows.size, rows.size)
-    scatter = sparse.csr_matrix((np.ones(rows.size), (rows, rows - start)), shape=shape)
+    factor = [1.0 / limit.size for limit in boundary]
+    scatter = sparse.csr_matrix((factor, (rows, rows - start)), shape=shape)
     return groups, [single_term(places, where, [limit.expression for limit in boundary], scatter)]
 
 

@@ -176,7 +176,7 @@ def _places(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Shooting) -
     """Number the unknowns."""
     layouts: list[Layout] = []
     size = len(problem.free)
-    scales = [np.array([n.nominal or max(abs(n.guess), 1e-3) for n in problem.free])]
+    scales = [np.array([n.size for n in problem.free])]
     for phase, mesh in zip(problem.phases, meshes, strict=True):
         layouts.append(_lay_out(_held(phase, scheme.steps), mesh, scheme, size))
         size += layouts[-1].size
@@ -229,7 +229,9 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Shooting, first: int) -> Shooting
 def _path_groups(layout: ShootingLayout, number: int, path: list[Limit], start: int) -> list[Rows]:
     count, moments = layout.mesh.borders.size, layout.fractions
     rows = start + len(path) * np.arange(count)
-    return [Rows("path", x.name, number, rows + i, moments, x.lower, x.upper) for i, x in enumerate(path)]
+    return [
+        Rows("path", x.name, number, rows + i, moments, x.lower, x.upper, x.size) for i, x in enumerate(path)
+    ]
 
 
 def _terms(
@@ -243,8 +245,8 @@ def _terms(
         values = ca.vertcat(phase.ode * (run.horizon * run.width), phase.residuals)
         if not values.numel():
             continue
-        factor = np.ones((n, values.numel()))
-        factor[:, : len(phase.states)] = -1.0 / np.array([s.nominal for s in phase.states])
+        sizes = np.array([*(-s.nominal for s in phase.states), *phase.residual_sizes])
+        factor = np.tile(1.0 / sizes, (n, 1))
         rows = start + (4 * steps[:, None] + j) * values.numel() + np.arange(values.numel())
         found.append(run.term(values, steps, np.full(n, place), _scatter(factor, rows, total)))
     if path:
@@ -254,9 +256,8 @@ def _terms(
             (layout, steps[-1:], np.ones(1), np.array([n])),
         ):
             rows = stop + len(path) * border[:, None] + np.arange(len(path))
-            found.append(
-                running(places, one).term(limits, element, place, _scatter(np.ones(rows.shape), rows, total))
-            )
+            factor = np.tile([1.0 / limit.size for limit in path], (border.size, 1))
+            found.append(running(places, one).term(limits, element, place, _scatter(factor, rows, total)))
     return found
 
 

@@ -181,7 +181,7 @@ def _at_points(optimum: ProgramAnswer, phases: list[Replayed]) -> tuple[float, f
     for limit, value, multiplier, size in zip(problem.boundary, found[1:], multipliers, small, strict=True):
         amount = value - limit.upper if value > limit.upper else min(value - limit.lower, 0.0)
         defects.append(Defect(limit.name, float(amount), float(size)))
-        error += multiplier * amount
+        error += multiplier * amount / limit.size
     return float(found[0] + running[0]), float(summed), defects, float(error)
 
 
