@@ -19,11 +19,11 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
+from gantrytau_optimica.estimation.corners import with_corners
 from gantrytau_optimica.estimation.estimation import Estimate, estimated
 from gantrytau_optimica.estimation.estimation_problem import Plan, plan, sample_times
 from gantrytau_optimica.estimation.experiments import Experiment, expected_noise, named
 from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, descended, fit_on_mesh, solution_at
-from gantrytau_optimica.estimation.mesh_error import with_corners
 from gantrytau_optimica.estimation.refined_fit import (
     RefinedFit,
     TimeOver,
@@ -245,7 +245,8 @@ class _Work:
         return self._with_borders(begun)
 
     def _with_borders(self, mesh: Mesh) -> list[Mesh]:
-        return [with_corners(with_jumps(mesh, phase), phase) for phase in self.built.problem.phases]
+        problem = self.built.problem
+        return [with_corners(with_jumps(mesh, phase), problem, phase) for phase in problem.phases]
 
     def solve(self, found: Residuals, w: np.ndarray, weights: Weights) -> np.ndarray | None:
         """Unknowns by Ipopt from unknowns near them; None where it finds none. Raises TimeOver."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau_optimica.control.control_problem import Phase
+from gantrytau_optimica.estimation.corners import corners
 from gantrytau_optimica.estimation.fit_on_mesh import RANK, MeshFit, bounded_step
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.layout import Layout
-from gantrytau_optimica.transcription.mesh import Mesh, with_borders
+from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.trajectory import Trajectory
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -25,9 +25,6 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
 FINE = 1e-7  # of its size
 CANCELLED = 5.0  # times that: what elements may contribute that cancel each other
-BENT = (
-    1e-9  # of the range of an input: a change of its slope, times the distance of samples, that is a corner
-)
 MOST_OF = 0.6  # of the elements: where as many are cut, all are
 MUCH = 200.0  # times its share, from which on an element is cut twice
 INNER = 0.02  # of an element, off its ends: where it is cut at a corner
@@ -55,21 +52,6 @@ class MeshError:
         """Whether the mesh hardly matters."""
         whole = np.sum([np.sum(np.abs(part), axis=0) for part in self.parts], axis=0)
         return bool(np.all(np.abs(self.shift) <= self.allowed) and np.all(whole <= CANCELLED * self.allowed))
-
-
-def corners(phase: Phase) -> np.ndarray:
-    """Times in s at which known inputs of a phase jump or bend."""
-    found = [np.zeros(0)]
-    for course in phase.courses:
-        kinks = course.kinks
-        if not kinks.size:
-            continue
-        gaps = np.diff(kinks) if kinks.size > 1 else np.ones(1)
-        step = np.minimum(np.append(gaps[0], gaps), np.append(gaps, gaps[-1])) / 2
-        before, here, after = (course.value(kinks + shift) for shift in (-step, 0.0, step))
-        bends = np.abs(after - 2 * here + before)
-        found.append(kinks[bends > BENT * np.max(np.abs([before, here, after]))])
-    return np.unique(np.concatenate(found))
 
 
 def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
@@ -136,33 +118,24 @@ def _by_element(finer: Residuals, layouts: Sequence[Layout], parts: np.ndarray) 
 
 def better_meshes(fit: MeshFit, error: MeshError) -> list[Mesh]:
     """The meshes with those elements cut that contribute more than their share of what is allowed."""
-    layouts = fit.residuals.program.places.layouts
+    problem, layouts = fit.residuals.program.problem, fit.residuals.program.places.layouts
     total = sum(layout.mesh.elements for layout in layouts)
     meshes = []
     for layout, part in zip(layouts, error.parts, strict=True):
         excess = np.max(np.abs(part) / np.where(error.allowed > 0, error.allowed, np.inf), axis=1) * total
         cuts = np.where(excess > 1.0, 1, 0) + np.where(excess > MUCH, 1, 0)
-        meshes.append(_cut(layout.mesh, cuts, _corners_as_shares(layout.phase)))
+        meshes.append(_cut(layout.mesh, cuts, corners(problem, layout.phase)))
     cut = sum(mesh.elements for mesh in meshes) - total
     return meshes if cut < MOST_OF * total else halved(fit)
 
 
-def with_corners(mesh: Mesh, phase: Phase) -> Mesh:
-    """The mesh with borders at all corners of inputs, if these are not more than elements."""
-    shares = _corners_as_shares(phase)
-    return with_borders(mesh, shares) if 0 < shares.size <= mesh.elements else mesh
-
-
-def _corners_as_shares(phase: Phase) -> np.ndarray:
-    start, final = float(phase.start_time), float(phase.final_time)
-    found = (corners(phase) - start) / (final - start)
-    return found[(found > 0) & (found < 1)]
-
-
 def halved(fit: MeshFit) -> list[Mesh]:
     """The meshes with every element cut into two."""
-    layouts = fit.residuals.program.places.layouts
-    return [_cut(la.mesh, np.ones(la.mesh.elements, int), _corners_as_shares(la.phase)) for la in layouts]
+    program = fit.residuals.program
+    return [
+        _cut(one.mesh, np.ones(one.mesh.elements, int), corners(program.problem, one.phase))
+        for one in program.places.layouts
+    ]
 
 
 def _cut(mesh: Mesh, cuts: np.ndarray, corners: np.ndarray) -> Mesh:

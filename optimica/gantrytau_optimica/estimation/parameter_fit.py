@@ -10,7 +10,7 @@ from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, told_twice
-from gantrytau_optimica.estimation.robust_weights import median_deviation
+from gantrytau_optimica.estimation.weights import median_deviation
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
 COMPUTED = 1e-6  # of the data: residuals that no measurement leaves

@@ -4,7 +4,8 @@
 
 Without deviations, outputs of different units have no common noise. Their variances are estimated with the parameters,
 each from the degrees of freedom that its values keep (restricted maximum likelihood; Harville (1977), J. American
-Statistical Association 72, 320). A robust fit takes medians instead.
+Statistical Association 72, 320). A robust fit takes medians instead, and weighs strays down: Huber (1981), Robust
+Statistics, chapter 7.
 """
 
 from dataclasses import dataclass
@@ -12,12 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from gantrytau_optimica.estimation.robust_weights import huber_weights, median_deviation
-
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
 FEWEST = (
     2  # degrees of freedom from which the noise of an output is estimated; below, it is that of the others
 )
+HUBER = (
+    1.345  # standard deviations beyond which errors count linearly: 95 % as efficient where noise is normal
+)
+NORMAL = 1.4826  # standard deviation over median deviation of a normal distribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,3 +92,13 @@ def _told(slopes: np.ndarray) -> np.ndarray:
     norms = np.linalg.norm(slopes, axis=0)
     basis, singular, _ = np.linalg.svd(slopes / np.where(norms > 0, norms, 1.0), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)
+
+
+def median_deviation(errors: np.ndarray) -> np.ndarray:
+    """The standard deviation by the median of the amounts of errors (N, ...), which stray values do not move."""
+    return NORMAL * np.median(np.abs(errors), axis=0)
+
+
+def huber_weights(errors: np.ndarray, deviation: float | np.ndarray) -> np.ndarray:
+    """Weights at most 1 of the squares of errors (N, ...) with this standard deviation."""
+    return np.minimum(1.0, HUBER * deviation / np.maximum(np.abs(errors), 1e-300))

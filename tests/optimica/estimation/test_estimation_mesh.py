@@ -6,7 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, SolveError, der
+from gantrytau import Input, Model, Parameter, Real, SolveError, between, der, if_else, sin
+from gantrytau import time as now
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -123,3 +124,62 @@ def test_the_time_is_that_of_all_meshes():
     assert "raise max_time=" in repr(fit)
     with pytest.raises(SolveError, match="time limit reached"):
         estimate(Filter, {"T": 0.1}, experiment, max_time=1e-3)
+
+
+class Pushed(Model):
+    """A mass with a damper."""
+
+    m = Parameter(2.0, unit="kg")
+    d = Parameter(0.7, unit="N.s/m")
+    f = Input(unit="N")
+    x = Real(unit="m", start=0.0, fixed=True)
+    v = Real(unit="m/s", start=0.0, fixed=True)
+
+    def equations(self):
+        yield der(self.x) == self.v
+        yield self.m * der(self.v) == self.f - self.d * self.v
+
+
+@pytest.mark.parametrize("told", ["samples", "function"])
+def test_a_pulse_within_an_element_tells_mass_and_damper(told):
+    """A hundredth of a second in ten, between borders of the default mesh; exact by its closed form."""
+    begin, end, force = 1.003, 1.013, 100.0
+    m, d = 2.0, 0.7
+    times = np.linspace(0.0, 10.0, 101)
+    since = np.maximum(times - end, 0.0)
+    speed = force / d * (1 - np.exp(-d / m * (end - begin)))
+    way = force / d * (end - begin) - m / d * speed
+    x = np.where(times > begin, way + m / d * speed * (1 - np.exp(-d / m * since)), 0.0)
+    inputs = {
+        "samples": Samples([0.0, begin, end], [0.0, force, 0.0], kind="constant", largest_gap=99.0),
+        "function": lambda t: if_else(between(begin, t, end), force, 0.0),
+    }
+    fit = estimate(
+        Pushed,
+        {"m": Free(1.0, min=0.0), "d": Free(0.3, min=0.0)},
+        Experiment({"x": Samples(times, x)}, inputs={"f": inputs[told]}),
+    )
+    # a millionth: of sizes, ten times what the mesh may cost
+    assert fit.parameters == pytest.approx({"m": m, "d": d}, rel=1e-6)
+
+
+def test_an_input_that_switches_with_a_clock_of_its_own():
+    """A square wave sin(7 t) > 0 as a condition of the model on time."""
+
+    class Clocked(Model):
+        T = Parameter(0.5, unit="s")
+        y = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield self.T * der(self.y) == if_else(sin(7.0 * now) > 0, 1.0, 0.0) - self.y
+
+    times = np.linspace(0.0, 3.0, 31)
+    edges = np.arange(0, 7) * np.pi / 7.0
+    y, T = np.zeros(times.size), 0.31
+    for k, a in enumerate(edges[::2]):
+        b = edges[2 * k + 1] if 2 * k + 1 < edges.size else np.inf
+        y += np.where(
+            times > a, np.exp(-np.maximum(times - b, 0) / T) - np.exp(-np.maximum(times - a, 0) / T), 0
+        )
+    fit = estimate(Clocked, {"T": 0.5}, Experiment({"y": Samples(times, y)}))
+    assert fit.parameters["T"] == pytest.approx(T, rel=1e-6)
