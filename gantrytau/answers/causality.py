@@ -67,7 +67,10 @@ def _translations(dae: Translated, given: Sequence[str], find: Sequence[str]) ->
         parameters = [n for name in given for n in dae.expand(name) if n in dae.table.symbols]
         request = Request((*dae.inputs, *parameters), tuple(find), dae.request.states)
         yield translate_flat(dae.flat, request, dae.start)
-    yield _flipped(dae, given, find)
+    if dae.inputs or not any(
+        split_derivative(n)[0] in dae.reduced.aliases for name in given for n in dae.expand(name)
+    ):
+        yield _flipped(dae, given, find)  # where nothing can be chosen, nothing more can be given
 
 
 def _with_parameters(dae: Translated, given: Sequence[str]) -> Translated:
@@ -143,6 +146,9 @@ def _undetermined(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX]
             ways.append(", ".join(_whole(dae, more)))
             break
     ways += [", ".join(_whole(dae, inputs))] if inputs else []
+    states = [n for n in dae.choice.states if n in unknowns]
+    if not ways and _suffices(dae, known, targets, states):
+        ways = [", ".join(_whole(dae, [dae.spoken(n) for n in states]))]
     return f"{text} Give also {', or '.join(dict.fromkeys(ways)) or 'states, inputs or derivatives'}."
 
 

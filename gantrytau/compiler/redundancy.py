@@ -24,6 +24,9 @@ from gantrytau.language.statements import Equation
 RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
 CLOSED = 1e-12  # residual of a pose beyond which ranks seen there are not trusted
 POSES = 8  # besides the start
+FIRM = 1e4  # weight of equations that hold where it is told how far a loop is from closed
+EXACT = 1e-14  # of that
+TRIES = 6  # from other positions, the nearest to closed being told
 STEP = 0.6  # of a move to the next pose, in rad, or relative to the size of the coordinates
 
 
@@ -73,7 +76,7 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
-        raise open_loops(flat, error) from None
+        raise open_loops(flat, error, _nearest(constraints, guess)) from None
     matrices = [_matrix(constraints, closed)]
     matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, flat.name)]
     kept = _independent(matrices, constraints.firm)
@@ -124,6 +127,36 @@ def _close(
         title=title,
         thorough=True,
     )
+
+
+def _nearest(constraints: Constraints, guess: StartValues) -> dict[str, float]:
+    """What is left of the closing equations, by name, where they are nearest to closed and all others hold."""
+    from scipy.optimize import least_squares
+
+    level = constraints.level
+    place = [level.leaves.index(n) for n in constraints.moving if n not in guess.fixed]
+    start = np.array([guess.values[n] for n in level.leaves])
+    weights = np.ones(len(level.residuals))
+    weights[: constraints.firm] = FIRM
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        return weights * level.look(_at(start, place, x))[0]
+
+    def slopes(x: np.ndarray) -> np.ndarray:
+        return weights[:, None] * level.jacobian(level.look(_at(start, place, x))[1])[:, place]
+
+    random, found = np.random.default_rng(0), residuals(start[place])
+    for attempt in range(TRIES if place else 0):
+        x = start[place] + (random.uniform(-np.pi, np.pi, len(place)) if attempt else 0.0)
+        reached = least_squares(residuals, x, slopes, x_scale="jac", ftol=EXACT, xtol=EXACT, gtol=EXACT).fun
+        found = min(found, reached, key=np.linalg.norm)
+    return dict(zip(level.names[constraints.firm :], found[constraints.firm :].tolist(), strict=True))
+
+
+def _at(numbers: np.ndarray, place: Sequence[int], values: np.ndarray) -> np.ndarray:
+    found = numbers.copy()
+    found[list(place)] = values
+    return found
 
 
 def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:

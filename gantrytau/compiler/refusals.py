@@ -1,6 +1,6 @@
 """What the compiler cannot do with a model, in the words of the model: errors with what was found, expected and to do."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
+CLOSED = 1e-6  # m or rad by which a loop that can be closed may be missed, where the nearest place is sought
 MOST_SUSPECTS = 12  # inputs that are tried as unknowns, where equations are too many
 
 
@@ -209,28 +210,33 @@ def differentiated(name: str, what: str, place: str) -> ModelError:
     )
 
 
-def open_loops(flat: FlatModel, error: InitializationError) -> InitializationError:
-    """Which loops stay open and by how much, where the failure is one of closing."""
+def open_loops(
+    flat: FlatModel, error: InitializationError, nearest: Mapping[str, float]
+) -> InitializationError:
+    """Which loops stay open and by how much, where the failure is one of closing.
+
+    nearest: what is left of the closing equations, by name, where the loops are nearest to closed.
+    """
     words = []
     for loop in flat.loops:
         place = f"{loop.a} - {loop.b}, "
         gaps = {
-            kind: np.linalg.norm([v for n, v in error.residuals.items() if n.startswith(place + kind)])
+            kind: np.linalg.norm([v for n, v in nearest.items() if n.startswith(place + kind)])
             for kind in ("position", "orientation")
         }
-        # least squares leave a share of the gap in every part of the loop
-        for member in loop.members:
-            shares = [v for n, v in error.residuals.items() if n.startswith(f"{member} (")]
-            gaps["position"] += np.linalg.norm(shares)
-        if any(gaps.values()):
+        if any(gap > CLOSED for gap in gaps.values()):
             # the residual of orientation is 2 tan(angle / 2)
             angle = np.degrees(2 * np.arctan(gaps["orientation"] / 2))
             words.append(
                 f"the loop through {', '.join(loop.members)} stays open between {loop.a} and {loop.b}, by "
-                f"{gaps['position']:.3g} m and {angle:.3g} deg"
+                f"{gaps['position']:.3g} m and {angle if angle > 0.01 else 0:.3g} deg"
             )
     if not words:
-        return error
+        return InitializationError(
+            f"{flat.name}: the loops can be closed, but no way leads there from the start values; give start values of the "
+            f"joints nearer to a pose that is closed. {error}",
+            residuals=error.residuals,
+        )
     return InitializationError(
         f"{flat.name}: {'; '.join(words)}. Expected frames that meet: correct lengths, offsets or joint axes, or, if it "
         "can be closed, give start values of its joints nearer to that",

@@ -55,10 +55,11 @@ class LineForce(TwoFrames):
     Connect it between flange_a and flange_b, whose distance is that of the frames.
     """
 
-    s = Real(
-        unit="m",
-        description="distance between the origins",
-        start=1.0,
+    s = Real(unit="m", description="distance between the origins", start=1.0)
+    f = Real(
+        3,
+        unit="N",
+        description="force on frame_a, resolved in the world",
         undetermined="the two frames coincide, so the line has no direction",
     )
     flange_a = translational.Flange()
@@ -67,11 +68,12 @@ class LineForce(TwoFrames):
     def equations(self):
         a, b = self.frame_a, self.frame_b
         line = b.r - a.r
-        along = line / self.s
         yield self.s == norm_2(line)
         yield self.flange_a.s == 0
         yield self.flange_b.s == self.s
-        yield a.f == along * self.flange_b.f
-        yield b.f == -along * self.flange_b.f
+        # not divided by s, so that nothing is said of the force where the line has no direction
+        yield self.f * self.s == line * self.flange_b.f
+        yield a.f == self.f
+        yield b.f == -self.f
         yield a.t == 0
         yield b.t == 0

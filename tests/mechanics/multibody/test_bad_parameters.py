@@ -93,9 +93,6 @@ def test_an_axis_of_length_zero():
     )
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the spring force is 0/0 there; the start shows an acceleration all the same"
-)
 def test_a_line_force_between_points_that_coincide():
     class Line(Model):
         world, line, spring = World(), LineForce(), translational.Spring()
@@ -141,9 +138,6 @@ def test_a_causality_that_leaves_a_motion_open_says_what_is_missing():
         translate(Driven()).function(["hinge.phi", "hinge.w"], ["source.tau"])
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the other causality is tried, and its error names an overdetermined body"
-)
 def test_a_model_without_inputs_asks_for_its_state():
     class Damped(Swing):
         damper = rotational.Damper(d=0.2)
