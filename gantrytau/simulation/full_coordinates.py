@@ -14,6 +14,7 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
+from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
@@ -29,8 +30,8 @@ class Coordinates:
 
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
-    inputs, their slopes, values of the held variables); substitution: all symbols in terms of (t, x, z, w);
-    renewed: what the held variables become at an instant.
+    inputs, their slopes, values of the held variables, modes of the switches); substitution: all symbols in terms of
+    (t, x, z, w), as the model writes them, without modes; renewed: what the held variables become at an instant.
     """
 
     dae: Translated
@@ -49,6 +50,7 @@ class Coordinates:
     known: Mapping[str, ca.SX]
     substitution: Substitution
     pivots: ca.SX
+    switches: Switches
     dropped: ca.Function
     renewed: ca.Function
     conditioning: Conditioning
@@ -61,7 +63,7 @@ class Coordinates:
     @property
     def stepwise(self) -> bool:
         """Whether there are signals that are known interval by interval."""
-        return bool(self.sampled or self.held)
+        return bool(self.sampled or self.held or len(self.switches))
 
     def integrator(
         self, count: int, tolerance: float, *, size: float = 1.0, steps: int = 100_000, compiled: bool = False

@@ -1,34 +1,32 @@
-"""One run of the integrator over a grid: in chunks, held to the constraints, watched for singular poses."""
+"""One run over a grid: in chunks, held to the constraints, from event to event, watched for singular poses."""
 
-import contextlib
-import io
 from collections.abc import Mapping
-from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
+from gantrytau.simulation import run_ends
+from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
+from gantrytau.simulation.events.switches import Margins
+from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.instants_on_mesh import instants
-from gantrytau.simulation.signals import PiecewiseLinear, Signal
+from gantrytau.simulation.integrators import Integrators
+from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
+from gantrytau.simulation.track import LEAST_STEPS, Track
 
-CHUNK = 10  # output intervals between two projections onto the constraints
-LEAST_STEPS = 500  # of the mesh on which singular poses are looked for, however few points are asked for
-MOST_STEPS = 100_000  # of the integrator between two ends
-WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
-REASONS = {
-    "TOO_MUCH_WORK": "the steps became too small",
-    "ERR_FAIL": "the steps became too small",
-    "CONV_FAIL": "the equations of a step found no solution",
-    "RHSFUNC": "the equations are not finite",
-    "RES_FAIL": "the equations are not finite",
-    "LSETUP_FAIL": "the equations of a step are singular",
-    "LSOLVE_FAIL": "the equations of a step are singular",
-}
+CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
+GROWTH = 10  # of a stretch in which nothing has switched
+STEPS_BETWEEN = (
+    8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
+)
+STARTING = 60  # steps of the integrator after it starts anew
+REFINED = 50  # intervals ahead that are divided as well
+SAME_INSTANT = 50  # events within SHORT of the run: chattering
+SHORT = 1e-9
+MOST_EVENTS = 500  # in a 500th of the run
 
 
 class Run:
@@ -37,243 +35,251 @@ class Run:
     def __init__(
         self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, tolerance: float
     ):
-        self.coordinates, self.tolerance = coordinates, tolerance
-        samples = {n: s for n, s in signals.items() if isinstance(s, PiecewiseLinear)}
-        self.samples = [samples[n] for n in coordinates.sampled]
-        knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
-        knots = knots[(knots > grid[0]) & (knots < grid[-1])]
-        parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
-        fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
-        fine[::parts] = grid
-        mesh = np.unique(np.concatenate([fine if coordinates.conditioning.needed else grid, knots]))
-        table, events = coordinates.dae.table, coordinates.dae.flat.sampled
-        periods = np.array([table.number(s.period) for s in events])
-        self.instants = instants(mesh, coordinates.held, periods)
-        self.mesh = self.instants.mesh
-        self.kept = np.searchsorted(self.mesh, grid)
-        self.x = np.full((self.mesh.size, len(coordinates.states)), np.nan)
-        self.z = np.full((self.mesh.size, len(coordinates.algebraics)), np.nan)
-        self.held = np.full((self.mesh.size, len(coordinates.held)), np.nan)  # from each place on
-        self.held[0] = [coordinates.dae.start[n] for n in coordinates.held]
+        self.coordinates, self.integrators = coordinates, Integrators(coordinates, tolerance)
+        self.span = float(grid[-1] - grid[0])
+        self.track = Track(coordinates, signals, grid)
         self.done = 0
-        self.seen = -1  # the last interval of the mesh that was looked at closely
-        self.integrators: dict[tuple[int, int], ca.Function] = {}
-        self.size = 1.0  # of algebraics, below which their errors do not count
+        self.seen = -1  # the last interval that was looked at closely
+        self.events: list[float] = []  # times at which states made something switch
+        self.by_time = TimeEvents(coordinates.switches, coordinates.w, float(grid[0]), float(grid[-1]))
+        self.sizes = np.ones(len(coordinates.states))  # of states
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics and held variables at the output points that were reached."""
-        kept = self.kept[self.kept <= self.done]
-        return self.mesh[kept], self.x[kept], self.z[kept], self.held[kept]
+        track = self.track
+        kept = track.kept[track.kept <= self.done]
+        return track.t[kept], track.x[kept], track.z[kept], track.held[kept, : len(self.coordinates.held)]
 
     def go(self) -> None:
-        self.x[0], self.z[0] = self.coordinates.start(self.mesh[0], self._inputs(0))
+        track = self.track
+        track.x[0], track.z[0] = self.coordinates.start(track.t[0], track.inputs(0))
         self._renew(0)
-        last = self.mesh.size - 1
+        self._turn()
         pressed: list[bool] = []
-        with Progress(self.mesh[0], self.mesh[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
-            size = CHUNK if self.coordinates.constrained or self.coordinates.stepwise else last
-            size = min(size, max(CHUNK, last // 50))
-            while self.done < last:
-                count = min(size, int(self.instants.stretch[self.done]))
+        with Progress(track.t[0], track.t[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
+            size = most = self._longest()
+            while self.done < track.last:
+                count = min(size, track.stretch(self.done))
                 try:
-                    self._advance(count)
+                    turned = self._advance(count)
                 except RuntimeError as error:
-                    if "IDACalcIC" in str(error) and self._rounded():
+                    if "IDACalcIC" in str(error) and self.integrators.rounded(track.z[self.done]):
                         continue
                     if count == 1:
                         raise self._stopped(error) from error
-                    size = 1
+                    size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
-                self._renew(self.done)
-                progress.at(self.mesh[self.done])
+                size = min(CHUNK if turned else size * GROWTH, most)
+                if track.stops[self.done] or turned:
+                    self._renew(self.done)
+                    self._turn(by_states=turned)
+                progress.at(track.t[self.done])
                 if pressed:
                     raise KeyboardInterrupt
 
-    def _inputs(self, k: int) -> np.ndarray:
-        """Values and slopes of the sampled inputs, and what is held, on the k-th interval of the mesh."""
-        t = self.mesh[k]
-        h = self.mesh[min(k + 1, self.mesh.size - 1)] - t
-        values = np.array([np.interp(t, s.times, s.values) for s in self.samples])
-        after = np.array([np.interp(t + h, s.times, s.values) for s in self.samples])
-        slopes = (after - values) / h if h > 0 else 0.0 * values
-        return np.concatenate([values, slopes, self.held[k]])
+    def _longest(self) -> int:
+        """The most intervals that are integrated at once."""
+        coordinates, last = self.coordinates, self.track.last
+        if coordinates.constrained or coordinates.sampled or coordinates.held:
+            return min(CHUNK, last)
+        if len(coordinates.switches):
+            return CHUNK * GROWTH
+        return min(last, max(CHUNK, last // 50))
 
     def _renew(self, k: int) -> None:
-        """Give new values to what is sampled at a place of the mesh, all from the values just before."""
-        due = self.instants.due[k]
+        """Give new values to what is sampled at a place, all from the values just before."""
+        track = self.track
+        due = track.due[k]
         if not due.any():
             return
-        t = float(self.mesh[k])
-        new = np.array(self.coordinates.renewed(self.x[k], self.z[k], t, t, self._inputs(k))).ravel()
-        bad = [
-            n
-            for n, value, now in zip(self.coordinates.held, new, due, strict=True)
-            if now and not np.isfinite(value)
-        ]
-        if bad:
-            raise SolveError(
-                f"{self.coordinates.dae.name}: {bad[0]} is sampled at t = {t:.6g} s, and its new value is not finite; "
-                ".result holds the motion up to there: look for a division by zero or a root of a negative number",
-                time=t,
-                equations=[],
-            )
-        self.held[k, due] = new[due]
-        places = slice(k, k + 1)
-        inputs = self._inputs(k)[None]
-        self.z[places] = self.coordinates.settle(self.x[places], self.z[places], self.mesh[places], inputs)
+        t = float(track.t[k])
+        new = np.array(self.coordinates.renewed(track.x[k], track.z[k], t, t, track.inputs(k))).ravel()
+        for name, value, now in zip(self.coordinates.held, new, due, strict=True):
+            if now and not np.isfinite(value):
+                raise run_ends.sampled_badly(self.coordinates.dae, t, name)
+        track.held[k, : due.size][due] = new[due]
+        track.z[k] = self._settled(k)
+
+    def _settled(self, k: int) -> np.ndarray:
+        """The algebraics of a place."""
+        places, track = slice(k, k + 1), self.track
+        w = track.inputs(k)[None]
+        return self.coordinates.settle(track.x[places], track.z[places], track.t[places], w)[0]
+
+    def _turn(self, *, by_states: bool = False) -> None:
+        """Find the modes that hold from the last place on, and lay a second place there if they are others."""
+        switches, track, k = self.coordinates.switches, self.track, self.done
+        if not len(switches):
+            return
+        first, own = self._modes(k), slice(track.held.shape[1] - len(switches), None)
+        margins = self._margins(*self._columns(np.array([k])))
+        modes, tried = switches.following(margins), [first]
+        if k == 0:
+            tried = []
+        elif not np.array_equal(modes, first):
+            track.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
+            self.done = k = k + 1
+        while not np.array_equal(modes, self._modes(k)):
+            if any(np.array_equal(modes, old) for old in tried):
+                raise self._chattering(modes, tried[-1])
+            tried.append(modes)
+            track.held[k, own] = modes
+            places = slice(k, k + 1)
+            track.x[k] = self.coordinates.project(track.x[places], track.t[places], track.inputs(k)[None])[0]
+            track.z[k] = self._settled(k)
+            modes = switches.following(self._margins(*self._columns(np.array([k]))))
+        if by_states:
+            self._count(modes, first)
+        end = self.by_time.next(float(track.t[k]), track.inputs(k))
+        if end is not None:
+            track.stop_at(end, k)
+
+    def _count(self, modes: np.ndarray, before: np.ndarray) -> None:
+        """SolveError if states made something switch too often."""
+        t, events = float(self.track.t[self.done]), self.events
+        events.append(t)
+        for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
+            if len(events) > many and t - events[-many] < share * self.span:
+                raise self._chattering(modes, before)
+
+    def _modes(self, k: int) -> np.ndarray:
+        return self.track.held[k, self.track.held.shape[1] - len(self.coordinates.switches) :]
+
+    def _columns(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """States, algebraics, times and inputs at places."""
+        track = self.track
+        return track.x[places], track.z[places], track.t[places], track.rows(places)
+
+    def _margins(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Margins:
+        return self.coordinates.switches.look(x, z, t, w, self.sizes)
+
+    def _advance(self, count: int) -> bool:
+        """Integrate some intervals, or up to where something switches; whether it does."""
+        track, here = self.track, self.done
+        track.held[here + 1 : here + count + 1] = track.held[here]
+        ahead = np.arange(here, here + count + 1)
+        courses = self._courses(here, count) if self.coordinates.stepwise else None
+        x, z = self.integrators.over(track.x[here], track.z[here], track.t[ahead], courses)
+        if self._too_wide(count):
+            return False
+        reached = ahead[1:]
+        inputs = track.rows(reached)
+        try:
+            track.x[reached] = self.coordinates.project(x, track.t[reached], inputs)
+        except SolveError as error:  # perhaps only for want of shorter stretches
+            raise RuntimeError("the constraints cannot be met any more") from error
+        track.z[reached] = self.coordinates.settle(track.x[reached], z, track.t[reached], inputs)
+        found = self._crossing(ahead)
+        self.done = here + count if found is None else here + found.place
+        self._watch(here, self.done)
+        opened = self.coordinates.opened(track.x[reached], track.t[reached], inputs)
+        if opened is not None and here + opened[0] < self.done:
+            self.done = here + opened[0]
+            raise run_ends.opened(self.coordinates.dae, float(track.t[self.done]), opened[1])
+        return found is not None and self._cross(found)
+
+    def _too_wide(self, count: int) -> bool:
+        """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
+        if not len(self.coordinates.switches):
+            return False
+        parts = (self.integrators.steps - STARTING) // (STEPS_BETWEEN * count)
+        if parts < 2:
+            return False
+        track, here = self.track, self.done
+        for k in reversed(range(here, min(here + max(count, REFINED), track.last))):
+            times = np.linspace(track.t[k], track.t[k + 1], int(parts) + 1)[1:-1]
+            if np.all(np.diff(times, prepend=track.t[k], append=track.t[k + 1]) > SHORT**2 * self.span):
+                track.insert(k, times)
+        return True
 
     def _courses(self, here: int, count: int) -> np.ndarray:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
-        h = np.diff(self.mesh[here : here + count + 1])
-        if not self.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
-            length = (self.mesh[here + count] - self.mesh[here]) / count
-            return np.repeat(np.array([[self.mesh[here], length, 0, *self.held[here]]]).T, count, axis=1)
-        inputs = np.array([self._inputs(here + k) for k in range(count)]).T
-        return np.vstack([self.mesh[here : here + count], h, np.arange(count), inputs])
+        track = self.track
+        h = np.diff(track.t[here : here + count + 1])
+        if not track.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
+            length = (track.t[here + count] - track.t[here]) / count
+            return np.repeat(np.array([[track.t[here], length, 0, *track.held[here]]]).T, count, axis=1)
+        inputs = track.rows(np.arange(here, here + count)).T
+        return np.vstack([track.t[here : here + count], h, np.arange(count), inputs])
 
-    def _advance(self, count: int) -> None:
-        here = self.done
-        stepwise = self.coordinates.stepwise
-        self.held[here + 1 : here + count + 1] = self.held[here]
-        found = self._integrate(
-            count,
-            MOST_STEPS,
-            x0=self.x[here] if self.coordinates.states else 0.0,
-            z0=self.z[here],
-            p=[] if stepwise else [self.mesh[here], self.mesh[here + 1] - self.mesh[here]],
-            u=self._courses(here, count) if stepwise else [],
-        )
-        x, z = np.array(found["xf"]).T, np.array(found["zf"]).T.reshape(count, -1)
-        x = x if self.coordinates.states else np.zeros((count, 0))
-        if not np.all(np.isfinite(x)):
-            raise RuntimeError("the solution is not finite")
-        reached = slice(here + 1, here + count + 1)
-        inputs = np.array([self._inputs(k) for k in range(here + 1, here + count + 1)])
-        try:
-            self.x[reached] = self.coordinates.project(x, self.mesh[reached], inputs)
-        except SolveError as error:  # perhaps only for want of shorter stretches
-            raise RuntimeError("the constraints cannot be met any more") from error
-        self.z[reached] = self.coordinates.settle(self.x[reached], z, self.mesh[reached], inputs)
-        self.done = here + count
-        self._watch(here, here + count)
-        opened = self.coordinates.opened(self.x[reached], self.mesh[reached], inputs)
-        if opened is not None:
-            self.done = here + opened[0]
-            raise self._opened(opened[1])
+    def _crossing(self, places: np.ndarray) -> Crossing | None:
+        """The first interval between successive places in which something switches."""
+        switches = self.coordinates.switches
+        if not len(switches):
+            return None
+        gaps = switches.gaps(self._margins(*self._columns(places)), self._modes(places[0]))
+        return first_crossing(self.track.t[places], gaps)
+
+    def _cross(self, found: Crossing) -> bool:
+        """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
+        track, k, switches = self.track, self.done, self.coordinates.switches
+        low, modes = self._point(k), self._modes(k).copy()
+
+        def look(point: Point) -> Margins:
+            x, z, t, w = point
+            return switches.gaps(self._margins(x[None], z[None], np.array([t]), w[None]), modes)
+
+        if found.certain:
+            there = located(low, float(track.t[k + 1]), found.guess, self.integrators.step, look)
+        else:
+            there = self.integrators.step(low, found.guess - low[2])
+            gaps = look(there)
+            if np.any(gaps.values < -gaps.noise):
+                there = located(low, found.guess, found.guess, self.integrators.step, look)
+        track.insert(k, np.array([there[2]]))
+        track.x[k + 1], track.z[k + 1] = there[:2]
+        self.done = k + 1
+        gaps = look(there)
+        return bool(np.any(gaps.values < -gaps.noise))
+
+    def _point(self, k: int) -> Point:
+        return self.track.x[k], self.track.z[k], float(self.track.t[k]), self.track.inputs(k)
 
     def _watch(self, first: int, last: int) -> None:
-        """SolveError if a singular pose lies between two places of the mesh; `done` is then the last before it."""
+        """SolveError if a singular pose lies between two places; `done` is then the last before it."""
         if not self.coordinates.conditioning.needed:
             return
+        track = self.track
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
-        inputs = np.array([self._inputs(k) for k in range(first, last + 1)])
-        places = slice(first, last + 1)
-        look = self._look(self.x[places], self.z[places], self.mesh[places], inputs)
-        for k in first + np.flatnonzero(doubtful(self.mesh[places], look)):
+        places = np.arange(first, last + 1)
+        places = places[np.append(np.diff(track.t[places]) > 0, True)]
+        look = self._look(*self._columns(places))
+        for k in places[:-1][doubtful(track.t[places], look)]:
             if k <= self.seen:
                 continue
             self.done = self.seen = int(k)
             found = self._approach()
             if found.singular or (not found.arrived and self._weakest(found.point)):
-                raise self._singular_pose(found.point, found.zero)
+                raise self._singular_pose(found)
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
 
-    def _opened(self, name: str) -> SolveError:
-        t = float(self.mesh[self.done])
-        return SolveError(
-            f"{self.coordinates.dae.name}: after t = {t:.6g} s the loop opens: {name} was left out because it repeated "
-            "other constraints at the start, and it does not any more. Start nearer to that pose, where another "
-            "choice is made; .result holds the motion up to there",
-            time=t,
-            equations=[name],
-        )
-
-    def _look(self, x, z, t, inputs) -> Look:
-        return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], inputs.T)
-
-    def _singular_pose(self, point: Point, t: float) -> SolveError:
-        """What to say of a singular pose at time t, just behind a point."""
-        weakest = self._weakest(point)
-        redundant = self.coordinates.dae.redundant
-        doubt = (
-            f" (constraints were left out as redundant at the start: {redundant[0].name}{', ...' if redundant[1:] else ''}; "
-            "if the mechanism is sound at that pose, start nearer to it, so that others are kept)"
-            if redundant
-            else ""
-        )
-        return SolveError(
-            f"{self.coordinates.dae.name}: the motion meets a singular pose at t = {t:.6g} s, where forces or "
-            f"accelerations are not determined. The equations that degenerate there: {'; '.join(weakest)}. .result "
-            f"holds the motion up to there: keep away from that pose, or change the geometry{doubt}",
-            time=t,
-            equations=weakest,
-        )
+    def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
+        return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], w.T)
 
     def _weakest(self, point: Point) -> list[str]:
-        return self.coordinates.weakest(point, (self.x[0], self.z[0], float(self.mesh[0]), self._inputs(0)))
+        return self.coordinates.weakest(point, self._point(0))
+
+    def _singular_pose(self, found: Approach) -> SolveError:
+        return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))
 
     def _stopped(self, error: Exception) -> SolveError:
         found = self._approach()
-        point = found.point
-        if self._weakest(point):
-            return self._singular_pose(point, found.zero)
-        reason = next(
-            (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
-        )
-        return SolveError(
-            f"{self.coordinates.dae.name}: the integration stopped at t = {point[2]:.6g} s: {reason}. The solution "
-            "may grow beyond all limits there; .result holds what was computed: look at it, and shorten the time or "
-            "change the inputs",
-            time=point[2],
-            equations=[],
-        )
+        if self._weakest(found.point):
+            return self._singular_pose(found)
+        return run_ends.stopped(self.coordinates.dae, found.point[2], error)
+
+    def _chattering(self, modes: np.ndarray, others: np.ndarray) -> SolveError:
+        switches, dae = self.coordinates.switches, self.coordinates.dae
+        conditions = [switches.spoken(int(i), dae) for i in np.flatnonzero(modes != others)]
+        return run_ends.chattering(dae, float(self.track.t[self.done]), list(dict.fromkeys(conditions)))
 
     def _approach(self) -> Approach:
-        """Walk from the last point of the mesh to the next, or to a singular pose before it."""
-        k = self.done
-        point = self.x[k], self.z[k], float(self.mesh[k]), self._inputs(k)
-        end = float(self.mesh[min(k + 1, self.mesh.size - 1)])
+        """Walk from the last place to the next, or to a singular pose before it."""
 
         def look(at: Point) -> Look:
             x, z, t, w = at
             return self._look(x[None], z[None], np.array([t]), w[None])
 
-        return approach(point, end, self._step, look)
-
-    def _step(self, point: Point, step: float) -> Point:
-        """The point a step later, in s."""
-        x, z, t, inputs = point
-        half = len(self.samples)
-        found = self._integrate(
-            1,
-            WALKED_STEPS,
-            x0=x if self.coordinates.states else 0.0,
-            z0=z,
-            p=[] if self.coordinates.stepwise else [t, step],
-            u=[t, step, 0, *inputs] if self.coordinates.stepwise else [],
-        )
-        there = np.concatenate([inputs[:half] + step * inputs[half : 2 * half], inputs[half:]])
-        near = np.array(found["xf"]).ravel()[: x.size]
-        if not np.all(np.isfinite(near)):
-            raise RuntimeError("the solution is not finite")
-        when, w, far = np.array([t + step]), there[None], np.array(found["zf"]).reshape(1, -1)
-        near = self.coordinates.project(near[None], when, w)
-        return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
-
-    def _rounded(self) -> bool:
-        """Whether small algebraics may have the rounding errors of large ones, which they did not so far.
-
-        What `settle` found solves the equations as well as rounding allows: where large forces decide a small one, the
-        integrator cannot make it better, gives up at once, and is asked for less.
-        """
-        before, self.size = self.size, float(np.abs(self.z[self.done]).max(initial=1.0))
-        self.integrators.clear()
-        return self.size > before
-
-    def _integrate(self, count: int, steps: int, **arguments: Any) -> dict[str, ca.DM]:
-        """One call of an integrator, which else writes its complaints to the screen."""
-        if (count, steps) not in self.integrators:
-            integrator = self.coordinates.integrator(count, self.tolerance, size=self.size, steps=steps)
-            self.integrators[count, steps] = integrator
-        with contextlib.redirect_stderr(io.StringIO()):
-            return self.integrators[count, steps](**arguments)
+        k = self.done
+        end = float(self.track.t[min(k + 1, self.track.last)])
+        return approach(self._point(k), end, self.integrators.step, look)

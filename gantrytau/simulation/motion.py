@@ -11,8 +11,10 @@ from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_blocks
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
+from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal
 from gantrytau.simulation.singular_poses import Conditioning
@@ -51,10 +53,14 @@ def all_coordinates(
     ]
     ode, algebraic, pivots, dropped, renewed, *rest = substitution.inserted(wanted)
     matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
+    found = switched([ode, algebraic, *invariants])
+    ode, algebraic, *invariants = found.expressions
+    w = ca.vertcat(w, *(turn.mode for turn in found.switches))
     row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
     divisors = [pivots[row_of[key], column_of[name]] for b in solved.blocks for key, name in b.pairs]
     x, z = column([chains.named(n) for n in states]), column(solved.tears)
     constraints = _constraints(dae, invariants, states)
+    arguments = [x, z, time, t0, w]
     return Coordinates(
         dae=dae,
         states=states,
@@ -72,9 +78,10 @@ def all_coordinates(
         known=known,
         substitution=substitution,
         pivots=pivots,
+        switches=Switches(found.switches, arguments, ode, algebraic),
         dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
-        renewed=ca.Function("renewed", [x, z, time, t0, w], [ca.densify(renewed)], {"cse": True}),
-        conditioning=Conditioning(*constraints, divisors, matrices, [x, z, time, t0, w]),
+        renewed=ca.Function("renewed", arguments, [ca.densify(renewed)], {"cse": True}),
+        conditioning=Conditioning(*constraints, divisors, matrices, arguments),
     )
 
 

@@ -13,13 +13,10 @@ MOST = 10_000_000  # instants of one simulation
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """mesh: times (n,) in s, with all instants among them; due: which variables are sampled there, (n, variables);
-    stretch: number of intervals from each place to the next instant, or to the end, (n,).
-    """
+    """mesh: times (n,) in s, with all instants among them; due: which variables are sampled there, (n, variables)."""
 
     mesh: np.ndarray
     due: np.ndarray
-    stretch: np.ndarray
 
 
 def instants(mesh: np.ndarray, names: Sequence[str], periods: np.ndarray) -> Instants:
@@ -45,10 +42,7 @@ def instants(mesh: np.ndarray, names: Sequence[str], periods: np.ndarray) -> Ins
     due = np.zeros((mesh.size, len(names)), dtype=bool)
     for column, period in enumerate(periods.tolist()):
         due[_nearest(mesh, times[period]), column] = True
-    places = np.append(np.flatnonzero(due.any(axis=1)), mesh.size - 1)
-    here = np.arange(mesh.size)
-    following = places[np.minimum(np.searchsorted(places, here, side="right"), places.size - 1)]
-    return Instants(mesh, due, np.maximum(following, here) - here)
+    return Instants(mesh, due)
 
 
 def _nearest(mesh: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -1,0 +1,100 @@
+"""Where along a motion a margin passes zero: in which step, and when in it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau.errors import SolveError
+from gantrytau.simulation.events.switches import Margins
+from gantrytau.simulation.singular_poses import Point
+
+DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at
+MOST = 100  # steps to one crossing
+JUST_BEHIND = 16  # times rounding: near enough behind the crossing
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Behind which place something is below zero, about when, s, and whether it is below at the next place."""
+
+    place: int
+    guess: float
+    certain: bool
+
+
+def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
+    """The first step between places t (n,) in s in which a gap falls below zero, or may dip below it."""
+    h = np.diff(t)[:, None]
+    g0, g1 = gaps.values[:-1], gaps.values[1:]
+    below = g1 < -gaps.noise[1:]
+    # the cubic through values and rates at both ends: g0 + b s + c s^2 + d s^3
+    b, e = h * gaps.rates[:-1], h * gaps.rates[1:]
+    c, d = 3 * (g1 - g0) - 2 * b - e, 2 * (g0 - g1) + b + e
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = -b / (c + np.sqrt(np.maximum(c**2 - 3 * b * d, 0.0)))
+        lowest = g0 + s * (b + s * (c + s * d))
+    lower = np.minimum(g0, g1)
+    dips = (b < 0) & (e > 0) & (lowest < DEEP * lower) & (lower > 4 * gaps.noise[1:])
+    dips &= h > 64 * np.spacing(np.abs(t[1:]))[:, None]
+    rows = np.flatnonzero((below | dips).any(axis=1))
+    if not rows.size:
+        return None
+    k = int(rows[0])
+    found = [_zero(g0[k, i], b[k, i], c[k, i], d[k, i]) for i in np.flatnonzero(below[k])]
+    if found:
+        return Crossing(k, float(t[k] + min(found) * h[k, 0]), True)
+    return Crossing(k, float(t[k] + np.min(s[k, dips[k]]) * h[k, 0]), False)
+
+
+def _zero(a: float, b: float, c: float, d: float) -> float:
+    """The first zero of a cubic between 0, where it is not below zero, and 1, where it is."""
+    roots = np.roots([d, c, b, a]).tolist() if np.all(np.isfinite([a, b, c, d])) else []
+    inside = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
+    return min(inside, default=0.5)
+
+
+def located(
+    low: Point,
+    end: float,
+    guess: float,
+    step: Callable[[Point, float], Point],
+    look: Callable[[Point], Margins],
+) -> Point:
+    """The point just behind the first crossing after `low`, which lies before the time `end`.
+
+    step: the point some seconds later, RuntimeError or SolveError where there is none. Newton steps on the gaps,
+    each from the last point before the crossing, so that what is left to go is found to the rounding of time.
+    """
+    high: Point | None = None
+    width = end - low[2]
+    for count in range(MOST):
+        least = 4 * np.spacing(max(abs(low[2]), abs(end)))
+        if end - low[2] <= least and high is not None:
+            return high
+        if not low[2] + least / 4 < guess < end or (count % 4 == 3 and end - low[2] > width / 8):
+            guess = (low[2] + end) / 2
+        width = end - low[2] if count % 4 == 3 else width
+        try:
+            there = step(low, guess - low[2])
+        except (RuntimeError, SolveError):
+            end = guess
+            continue
+        gaps = look(there)
+        left = gaps.values[0] + gaps.noise[0]
+        falling = gaps.rates[0] < 0
+        if np.any(left < 0):
+            high, end = there, guess
+            crossed = left < 0
+            near = left >= -JUST_BEHIND * gaps.noise[0] - least * np.abs(gaps.rates[0])
+            if np.all(near[crossed]):
+                return high
+            falling &= crossed
+        else:
+            low = there
+        with np.errstate(divide="ignore", invalid="ignore"):
+            waits = np.where(falling, (left + gaps.noise[0]) / -gaps.rates[0], np.inf)
+        guess = there[2] + float(np.min(waits, initial=np.inf))
+    if high is None:
+        raise SolveError("the crossing is not reached", time=low[2])
+    return high

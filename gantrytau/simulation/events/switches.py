@@ -1,0 +1,121 @@
+"""What switches in the equations of motion: its modes, which are constant between two events, and its margins."""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.translated import Translated
+from gantrytau.language.piecewise import Turn
+from gantrytau.language.symbols import time
+
+ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins at some places, each (places, switches): values, their rates in 1/s, and what rounding makes of zero."""
+
+    values: np.ndarray
+    rates: np.ndarray
+    noise: np.ndarray
+
+
+class Switches:
+    """What turns where its margin passes zero (or a whole number, if it counts).
+
+    turns: in an order in which a margin holds modes before it only; timed: whether a margin depends on time and on
+    modes alone.
+    """
+
+    def __init__(self, turns: Sequence[Turn], arguments: Sequence[ca.SX], ode: ca.SX, algebraic: ca.SX):
+        """arguments: x, z, time, t0, w; ode: x' = ode; algebraic: 0 = algebraic, which gives z."""
+        x, z, _, t0, _ = arguments
+        self.turns = tuple(turns)
+        self._closed = np.array([turn.closed for turn in turns], dtype=bool)
+        self._counts = np.array([turn.counts for turn in turns], dtype=bool)
+        margins = ca.densify(ca.vertcat(*(turn.margin for turn in turns))) if turns else ca.SX(0, 1)
+        moving = ca.vertcat(x, z, t0)
+        self.timed = [
+            not ca.depends_on(turn.margin, moving) and ca.depends_on(turn.margin, time) for turn in turns
+        ]
+        self.margins = margins
+        self._size = ca.SX.sym("size", x.numel())
+        by_x, by_z, by_t = (ca.jacobian(margins, symbol) for symbol in (x, z, time))
+        along = by_t + (by_x @ ode if x.numel() else 0)
+        terms = ca.fabs(by_x) @ ca.fmax(ca.fabs(x), self._size) if x.numel() else ca.SX(len(turns), 1)
+        terms += ca.fabs(by_z) @ ca.fabs(z) + ca.fabs(by_t * time) if z.numel() else ca.fabs(by_t * time)
+        found = [margins, along, terms]
+        self._of_algebraics = bool(by_z.nnz())
+        if self._of_algebraics:  # z' = -(dg/dz)^-1 (dg/dx x' + dg/dt)
+            change = ca.jacobian(algebraic, time) + (ca.jacobian(algebraic, x) @ ode if x.numel() else 0)
+            found += [by_z, ca.jacobian(algebraic, z), change]
+        dense = [ca.densify(e) for e in found]
+        self._look = ca.Function("margins", [*arguments, self._size], dense, {"cse": True})
+
+    def __len__(self) -> int:
+        return len(self.turns)
+
+    def look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray, size: np.ndarray) -> Margins:
+        """The margins at places: x (places, n), z (places, m), t (places,), w (places, k); size: of states, (n,)."""
+        places = len(t)
+        found = [np.array(f) for f in self._look(x.T, z.T, t[None], t[None], w.T, size)]
+        values, rates, terms = (f.reshape(len(self), -1).T for f in found[:3])
+        values, rates, terms = (
+            np.broadcast_to(f, (places, len(self))).copy() for f in (values, rates, terms)
+        )
+        if self._of_algebraics:
+            m = z.shape[1]
+            by_z = found[3].reshape(len(self), -1, m).transpose(1, 0, 2)
+            inner = found[4].reshape(m, -1, m).transpose(1, 0, 2)
+            change = found[5].reshape(m, -1).T[:, :, None]
+            with contextlib.suppress(
+                np.linalg.LinAlgError
+            ):  # what a margin loses by this is found in more steps
+                rates -= (by_z @ np.linalg.solve(inner, np.broadcast_to(change, (places, m, 1))))[:, :, 0]
+        noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
+        return Margins(values, rates, noise)
+
+    def written(self, margins: np.ndarray) -> np.ndarray:
+        """The modes that belong to margins as the model writes it."""
+        on = np.where(self._closed, margins >= 0, margins > 0)
+        return np.where(self._counts, np.floor(margins), on)
+
+    def following(self, margins: Margins) -> np.ndarray:
+        """The modes just after one place: where a margin is zero, its rate decides."""
+        values, rates, noise = margins.values[0], margins.rates[0], margins.noise[0]
+        whole = np.where(self._counts, np.round(values), 0.0)
+        rest = values - whole
+        turning = (np.abs(rest) <= noise) & (rates != 0)
+        after = np.where(self._counts, whole - (rates < 0), rates > 0)
+        return np.where(turning, after, self.written(values))
+
+    def gaps(self, margins: Margins, modes: np.ndarray) -> Margins:
+        """How far from its next turn each switch is: below zero the modes do not hold; two columns for one that counts."""
+        sign = np.where(self._counts, 1.0, 2 * modes - 1)
+        first = sign * margins.values - np.where(self._counts, modes, 0.0)
+        counts = self._counts
+        second = modes[counts] + 1 - margins.values[:, counts]
+        return Margins(
+            np.hstack([first, second]),
+            np.hstack([sign * margins.rates, -margins.rates[:, counts]]),
+            np.hstack([margins.noise, margins.noise[:, counts]]),
+        )
+
+    def of_gap(self, gap: int) -> int:
+        """Which switch a column of gaps belongs to."""
+        return gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
+
+    def spoken(self, index: int, dae: Translated) -> str:
+        """What a switch asks, in the model's words."""
+        turn = self.turns[index]
+        names = sorted(
+            {
+                dae.spoken(leaf.name())
+                for leaf in ca.symvar(turn.margin)
+                if not leaf.name().startswith("mode[")
+            }
+        )
+        return f"the condition on {', '.join(names)}"

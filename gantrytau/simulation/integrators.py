@@ -1,0 +1,73 @@
+"""The integrators of one run, and a step with them from one point to another."""
+
+import contextlib
+import io
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.singular_poses import Point
+
+MOST_STEPS = 100_000  # of the integrator between two ends
+WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
+
+
+class Integrators:
+    """Integrators over some numbers of intervals, made when they are needed.
+
+    size: of algebraics, below which their errors do not count.
+    """
+
+    def __init__(self, coordinates: Coordinates, tolerance: float):
+        self.coordinates, self.tolerance = coordinates, tolerance
+        self.size = 1.0
+        self._made: dict[tuple[int, int], ca.Function] = {}
+
+    def over(
+        self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """States and algebraics, (count, n) and (count, m), at all but the first of the times t (count + 1,).
+
+        x, z: at the first; courses: what a stepwise model is told of each interval, else the times are equidistant.
+        """
+        count = len(t) - 1
+        p = [t[0], t[1] - t[0]] if courses is None else []
+        return self._integrate(count, MOST_STEPS, x, z, p, [] if courses is None else courses)
+
+    def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
+        """The point a step later, in s; RuntimeError or SolveError where there is none."""
+        x, z, t, inputs = point
+        stepwise, half = self.coordinates.stepwise, len(self.coordinates.sampled)
+        p, u = ([], [t, step, 0, *inputs]) if stepwise else ([t, step], [])
+        near, far = self._integrate(1, most, x, z, p, u)
+        there = np.concatenate([inputs[:half] + step * inputs[half : 2 * half], inputs[half:]])
+        when, w = np.array([t + step]), there[None]
+        near = self.coordinates.project(near, when, w)
+        return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
+
+    def rounded(self, z: np.ndarray) -> bool:
+        """Whether small algebraics may have the rounding errors of large ones, which they did not so far.
+
+        What `settle` found solves the equations as well as rounding allows: where large forces decide a small one, the
+        integrator cannot make it better, gives up at once, and is asked for less.
+        """
+        before, self.size = self.size, float(np.abs(z).max(initial=1.0))
+        self._made.clear()
+        return self.size > before
+
+    def _integrate(
+        self, count: int, most: int, x: np.ndarray, z: np.ndarray, p: Any, u: Any
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """One call of an integrator, which else writes its complaints to the screen."""
+        if (count, most) not in self._made:
+            made = self.coordinates.integrator(count, self.tolerance, size=self.size, steps=most)
+            self._made[count, most] = made
+        with contextlib.redirect_stderr(io.StringIO()):
+            found = self._made[count, most](x0=x if x.size else 0.0, z0=z, p=p, u=u)
+        self.steps = int(self._made[count, most].stats()["nsteps"])
+        reached = np.array(found["xf"]).T if x.size else np.zeros((count, 0))
+        if not np.all(np.isfinite(reached)):
+            raise RuntimeError("the solution is not finite")
+        return reached, np.array(found["zf"]).T.reshape(count, -1)

@@ -1,0 +1,80 @@
+"""What is said when a simulation stops before its end."""
+
+from collections.abc import Sequence
+
+from gantrytau.compiler.translated import Translated
+from gantrytau.errors import SolveError
+
+REASONS = {
+    "TOO_MUCH_WORK": "the steps became too small",
+    "ERR_FAIL": "the steps became too small",
+    "CONV_FAIL": "the equations of a step found no solution",
+    "RHSFUNC": "the equations are not finite",
+    "RES_FAIL": "the equations are not finite",
+    "LSETUP_FAIL": "the equations of a step are singular",
+    "LSOLVE_FAIL": "the equations of a step are singular",
+}
+
+
+def opened(dae: Translated, t: float, name: str) -> SolveError:
+    """A loop opens because a constraint that was left out does not repeat others any more."""
+    return SolveError(
+        f"{dae.name}: after t = {t:.6g} s the loop opens: {name} was left out because it repeated "
+        "other constraints at the start, and it does not any more. Start nearer to that pose, where another "
+        "choice is made; .result holds the motion up to there",
+        time=t,
+        equations=[name],
+    )
+
+
+def singular_pose(dae: Translated, t: float, weakest: Sequence[str]) -> SolveError:
+    """The motion meets a singular pose at time t, where these equations degenerate."""
+    redundant = dae.redundant
+    doubt = (
+        f" (constraints were left out as redundant at the start: {redundant[0].name}{', ...' if redundant[1:] else ''}; "
+        "if the mechanism is sound at that pose, start nearer to it, so that others are kept)"
+        if redundant
+        else ""
+    )
+    return SolveError(
+        f"{dae.name}: the motion meets a singular pose at t = {t:.6g} s, where forces or "
+        f"accelerations are not determined. The equations that degenerate there: {'; '.join(weakest)}. .result "
+        f"holds the motion up to there: keep away from that pose, or change the geometry{doubt}",
+        time=t,
+        equations=weakest,
+    )
+
+
+def sampled_badly(dae: Translated, t: float, name: str) -> SolveError:
+    """What is sampled at time t is not finite."""
+    return SolveError(
+        f"{dae.name}: {name} is sampled at t = {t:.6g} s, and its new value is not finite; "
+        ".result holds the motion up to there: look for a division by zero or a root of a negative number",
+        time=t,
+        equations=[],
+    )
+
+
+def stopped(dae: Translated, t: float, error: Exception) -> SolveError:
+    """The integrator gives up at time t."""
+    reason = next(
+        (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
+    )
+    return SolveError(
+        f"{dae.name}: the integration stopped at t = {t:.6g} s: {reason}. The solution "
+        "may grow beyond all limits there; .result holds what was computed: look at it, and shorten the time or "
+        "change the inputs",
+        time=t,
+        equations=[],
+    )
+
+
+def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
+    """Conditions turn back and forth without end at time t."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turn{'s' if len(conditions) == 1 else ''} back and forth "
+        "without end: what holds on either side leads back to the other. Smooth it, as tanh(x / small) for sign(x), give "
+        "it a band within which it keeps its side, or use stick_slip for friction; .result holds the motion up to there",
+        time=t,
+        equations=[],
+    )
