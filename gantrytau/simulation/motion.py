@@ -56,8 +56,7 @@ def all_coordinates(
     found = switched([ode, algebraic, *invariants])
     ode, algebraic, *invariants = found.expressions
     w = ca.vertcat(w, *(turn.mode for turn in found.switches))
-    row_of, column_of = {key: i for i, key in enumerate(last)}, {name: j for j, name in enumerate(highest)}
-    divisors = [pivots[row_of[key], column_of[name]] for b in solved.blocks for key, name in b.pairs]
+    divisors = _divisors(solved, pivots, list(last), list(highest))
     x, z = column([chains.named(n) for n in states]), column(solved.tears)
     constraints = _constraints(dae, invariants, states)
     arguments = [x, z, time, t0, w]
@@ -106,6 +105,14 @@ def _highest_blocks(
             block.enter(guide)
     incidence = {key: dae.indexed.incidence[key] for key in last}
     return solve_blocks(block_pattern(incidence, highest).blocks, last, highest, guide)
+
+
+def _divisors(
+    solved: SolvedBlocks, pivots: ca.SX, equations: Sequence[Key], unknowns: Sequence[str]
+) -> list[ca.SX]:
+    """What is divided by where an equation is solved for one unknown."""
+    rows, columns = ({key: k for k, key in enumerate(keys)} for keys in (equations, unknowns))
+    return [pivots[rows[key], columns[name]] for b in solved.blocks for key, name in b.pairs]
 
 
 def _matrices(solved: SolvedBlocks) -> list[ca.SX]:
