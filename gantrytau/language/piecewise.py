@@ -87,7 +87,8 @@ class _Walk:
     def operation(self, operator: int, operands: list[_Value]) -> _Value:
         a = operands[0][0]
         b = operands[1][0] if len(operands) > 1 else a
-        if any(moves for _, moves in operands):
+        asked = operands[:1] if operator == ca.OP_IF_ELSE_ZERO else operands
+        if any(moves for _, moves in asked):
             found = self._switching(operator, a, b)
             if found is not None:
                 return found, True

@@ -3,13 +3,14 @@
 An equation such as b.r == a.r + R p gives b.r whatever the pose. Such variables need not be integrated.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
+from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -57,7 +58,9 @@ def entries(matrix: ca.SX) -> list[tuple[int, int, ca.SX]]:
     return list(zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True))
 
 
-def definitions_of(dae: Translated, pairs: Sequence[tuple[int, str]]) -> list[tuple[ca.SX, ca.SX]]:
+def definitions_of(
+    dae: Translated, pairs: Sequence[tuple[int, str]], residuals: Mapping[Key, ca.SX]
+) -> list[tuple[ca.SX, ca.SX]]:
     """(symbol, expression) of dependent variables and their derivatives below the highest, in order."""
     indexed, chains = dae.indexed, dae.reduced.chains
     found: list[tuple[ca.SX, ca.SX]] = []
@@ -66,7 +69,7 @@ def definitions_of(dae: Translated, pairs: Sequence[tuple[int, str]]) -> list[tu
             order = stage + indexed.orders[name]
             if order < 0:
                 continue
-            residual, symbol = indexed.residuals[i, order], chains.named(derivative_name(name, order))
+            residual, symbol = residuals[i, order], chains.named(derivative_name(name, order))
             slope = ca.jacobian(residual, symbol)
             found.append((symbol, -ca.substitute(residual, symbol, 0) / slope))
     return found

@@ -14,6 +14,7 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
+from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.singular_poses import Conditioning, Point
 
@@ -30,8 +31,9 @@ class Coordinates:
 
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
-    inputs, their slopes, values of the held variables, modes of the switches); substitution: all symbols in terms of
-    (t, x, z, w), as the model writes them, without modes; renewed: what the held variables become at an instant.
+    inputs, their slopes, values of the held variables, modes of the switches); substitutions: all symbols in terms of
+    (t, x, z, w), one after the other; pieces: the equations with modes; renewed: what the held variables become at an
+    instant.
     """
 
     dae: Translated
@@ -48,8 +50,9 @@ class Coordinates:
     invariants: tuple[ca.SX, ...]
     rows: tuple[tuple[str, ...], ...]
     known: Mapping[str, ca.SX]
-    substitution: Substitution
+    substitutions: tuple[Substitution, ...]
     pivots: ca.SX
+    pieces: InModes
     switches: Switches
     dropped: ca.Function
     renewed: ca.Function
@@ -107,8 +110,15 @@ class Coordinates:
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
-    def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Consistent states and algebraics at the start, with the inputs as they are then."""
+    def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """Expressions of reduced symbols in terms of (t, x, z, w)."""
+        found = list(expressions)
+        for substitution in self.substitutions:
+            found = substitution.inserted(found)
+        return found
+
+    def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Consistent states, algebraics and modes at the start, with the inputs as they are then."""
         dae = self.dae
         at = ca.Function("known", [time, self.t0, self.w], [ca.vertcat(*self.known.values())])
         values = {**dae.start, time.name(): t}
@@ -117,7 +127,9 @@ class Coordinates:
         guess = StartValues(values, dae.asked.started | frozenset(self.known), dae.asked.fixed)
         found = consistent_start(dae.flat, dae.reduced, dae.indexed, guess)
         x = np.array([found[n] for n in self.states])
-        return x, np.array([found[n] for n in self.algebraics])
+        modes = self.pieces.numbers({**found, time.name(): t})
+        own = np.array([modes[turn.mode.name()] for turn in self.switches.turns])
+        return x, np.array([found[n] for n in self.algebraics]), own
 
     @cached_property
     def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:

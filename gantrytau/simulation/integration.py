@@ -1,6 +1,7 @@
 """One run over a grid: in chunks, held to the constraints, from event to event, watched for singular poses."""
 
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 
@@ -23,6 +24,7 @@ STEPS_BETWEEN = (
     8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
 )
 STARTING = 60  # steps of the integrator after it starts anew
+MOST_AT_ONCE = 8  # switches of which all choices are tried
 REFINED = 50  # intervals ahead that are divided as well
 SAME_INSTANT = 50  # events within SHORT of the run: chattering
 SHORT = 1e-9
@@ -45,14 +47,15 @@ class Run:
         self.sizes = np.ones(len(coordinates.states))  # of states
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Times, states, algebraics and held variables at the output points that were reached."""
+        """Times, states, algebraics, and what is held, at the output points that were reached."""
         track = self.track
         kept = track.kept[track.kept <= self.done]
-        return track.t[kept], track.x[kept], track.z[kept], track.held[kept, : len(self.coordinates.held)]
+        return track.t[kept], track.x[kept], track.z[kept], track.held[kept]
 
     def go(self) -> None:
         track = self.track
-        track.x[0], track.z[0] = self.coordinates.start(track.t[0], track.inputs(0))
+        track.x[0], track.z[0], modes = self.coordinates.start(track.t[0], track.inputs(0))
+        track.held[0, track.held.shape[1] - modes.size :] = modes
         self._renew(0)
         self._turn()
         pressed: list[bool] = []
@@ -111,28 +114,49 @@ class Run:
         switches, track, k = self.coordinates.switches, self.track, self.done
         if not len(switches):
             return
-        first, own = self._modes(k), slice(track.held.shape[1] - len(switches), None)
+        first = self._modes(k).copy()
         margins = self._margins(*self._columns(np.array([k])))
-        modes, tried = switches.following(margins), [first]
-        if k == 0:
-            tried = []
-        elif not np.array_equal(modes, first):
-            track.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
-            self.done = k = k + 1
-        while not np.array_equal(modes, self._modes(k)):
-            if any(np.array_equal(modes, old) for old in tried):
-                raise self._chattering(modes, tried[-1])
-            tried.append(modes)
-            track.held[k, own] = modes
-            places = slice(k, k + 1)
-            track.x[k] = self.coordinates.project(track.x[places], track.t[places], track.inputs(k)[None])[0]
-            track.z[k] = self._settled(k)
-            modes = switches.following(self._margins(*self._columns(np.array([k]))))
+        modes = switches.following(margins)
+        if not np.array_equal(modes, first):
+            if k > 0:
+                track.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
+                self.done = k = k + 1
+            self._agree(k, modes)
         if by_states:
             self._count(modes, first)
         end = self.by_time.next(float(track.t[k]), track.inputs(k))
         if end is not None:
             track.stop_at(end, k)
+
+    def _agree(self, k: int, modes: np.ndarray) -> None:
+        """Give a place modes that agree with the margins they lead to, from these on; SolveError if there are none."""
+        tried = [self._modes(k).copy()]
+        while not any(np.array_equal(modes, old) for old in tried):
+            tried.append(modes)
+            modes = self._led_to(k, modes)
+            if np.array_equal(modes, tried[-1]):
+                return
+        # one leads to another in a circle: all choices of what changed, the nearest to the first first
+        track = self.track
+        changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
+        if changing.size <= MOST_AT_ONCE:
+            near = sorted(
+                product((0.0, 1.0), repeat=changing.size), key=lambda c: np.abs(c - tried[0][changing]).sum()
+            )
+            for choice in near:
+                modes = tried[0].copy()
+                modes[changing] = choice
+                if np.array_equal(self._led_to(k, modes), modes):
+                    return
+        raise run_ends.no_side(self.coordinates.dae, float(track.t[k]), self._conditions(changing))
+
+    def _led_to(self, k: int, modes: np.ndarray) -> np.ndarray:
+        """The modes that belong to the margins of a place that has these modes."""
+        track, places = self.track, slice(k, k + 1)
+        self._modes(k)[:] = modes
+        track.x[k] = self.coordinates.project(track.x[places], track.t[places], track.rows(np.array([k])))[0]
+        track.z[k] = self._settled(k)
+        return self.coordinates.switches.following(self._margins(*self._columns(np.array([k]))))
 
     def _count(self, modes: np.ndarray, before: np.ndarray) -> None:
         """SolveError if states made something switch too often."""
@@ -140,7 +164,8 @@ class Run:
         events.append(t)
         for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
             if len(events) > many and t - events[-many] < share * self.span:
-                raise self._chattering(modes, before)
+                conditions = self._conditions(np.flatnonzero(modes != before))
+                raise run_ends.chattering(self.coordinates.dae, t, conditions)
 
     def _modes(self, k: int) -> np.ndarray:
         return self.track.held[k, self.track.held.shape[1] - len(self.coordinates.switches) :]
@@ -268,10 +293,11 @@ class Run:
             return self._singular_pose(found)
         return run_ends.stopped(self.coordinates.dae, found.point[2], error)
 
-    def _chattering(self, modes: np.ndarray, others: np.ndarray) -> SolveError:
-        switches, dae = self.coordinates.switches, self.coordinates.dae
-        conditions = [switches.spoken(int(i), dae) for i in np.flatnonzero(modes != others)]
-        return run_ends.chattering(dae, float(self.track.t[self.done]), list(dict.fromkeys(conditions)))
+    def _conditions(self, switches: np.ndarray) -> list[str]:
+        """What some switches ask for, in the model's words."""
+        turns, pieces = self.coordinates.switches.turns, self.coordinates.pieces
+        found = [pieces.asked(turns[int(i)].mode.name(), self.coordinates.dae) for i in switches]
+        return list(dict.fromkeys(found))
 
     def _approach(self) -> Approach:
         """Walk from the last place to the next, or to a singular pose before it."""

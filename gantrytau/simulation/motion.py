@@ -11,9 +11,9 @@ from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_blocks
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
-from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal
@@ -32,33 +32,31 @@ def all_coordinates(
     chains, given = dae.reduced.chains, dependents(dae)
     states = _states(dae, {name for _, name in given})
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
-    last = {(i, c): dae.indexed.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
-    solved = _highest_blocks(dae, states, last, highest)
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
     known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
+    pieces = in_modes(dae, known)
+    last = {(i, c): pieces.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
+    solved = _highest_blocks(dae, states, last, highest, pieces.numbers(dae.start))
     definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
-    definitions += [(chains.named(n), e) for n, e in known.items()]
-    definitions += definitions_of(dae, given)
+    definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
+    definitions += definitions_of(dae, given, pieces.residuals)
     substitution = solved.after(definitions)
-    matrices = _matrices(solved)
-    levels, rows = _invariants(dae, {i for i, _ in given})
+    levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
+    moving = [column([chains.rate(n) for n in states]), column(solved.residuals), *levels]
     wanted = [
-        column([chains.rate(n) for n in states]),
-        column(solved.residuals),
+        *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
         dae.to_reduced(column([e.residual for e in dae.redundant])),
         dae.to_reduced(column([s.expression for s in dae.flat.sampled])),
-        *matrices,
-        *levels,
+        *_matrices(solved),
     ]
-    ode, algebraic, pivots, dropped, renewed, *rest = substitution.inserted(wanted)
-    matrices, invariants = rest[: len(matrices)], rest[len(matrices) :]
-    found = switched([ode, algebraic, *invariants])
-    ode, algebraic, *invariants = found.expressions
-    w = ca.vertcat(w, *(turn.mode for turn in found.switches))
+    found = substitution.inserted(wanted)
+    turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
+    ode, algebraic, *rest = outside.inserted(found)
+    invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
+    w = ca.vertcat(w, *(turn.mode for turn in turns))
     divisors = _divisors(solved, pivots, list(last), list(highest))
     x, z = column([chains.named(n) for n in states]), column(solved.tears)
-    constraints = _constraints(dae, invariants, states)
     arguments = [x, z, time, t0, w]
     return Coordinates(
         dae=dae,
@@ -75,12 +73,13 @@ def all_coordinates(
         invariants=tuple(invariants),
         rows=tuple(rows),
         known=known,
-        substitution=substitution,
+        substitutions=(substitution, outside),
         pivots=pivots,
-        switches=Switches(found.switches, arguments, ode, algebraic),
+        pieces=pieces,
+        switches=Switches(turns, arguments, ode, algebraic),
         dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
         renewed=ca.Function("renewed", arguments, [ca.densify(renewed)], {"cse": True}),
-        conditioning=Conditioning(*constraints, divisors, matrices, arguments),
+        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
     )
 
 
@@ -96,10 +95,14 @@ def _states(dae: Translated, follow: Collection[str]) -> tuple[str, ...]:
 
 
 def _highest_blocks(
-    dae: Translated, states: Sequence[str], last: Mapping[Key, ca.SX], highest: Mapping[str, ca.SX]
+    dae: Translated,
+    states: Sequence[str],
+    last: Mapping[Key, ca.SX],
+    highest: Mapping[str, ca.SX],
+    modes: Mapping[str, float],
 ) -> SolvedBlocks:
     """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
-    guide = Guide(dae.start, dae.table.values, states)
+    guide = Guide({**dae.start, **modes}, dae.table.values, states)
     for block in dae.blocks:
         if not highest.keys() & set(block.unknowns):
             block.enter(guide)
@@ -134,7 +137,9 @@ def _constraints(dae: Translated, invariants: list[ca.SX], states: Sequence[str]
     return jacobian[:, used], [k for k, j in enumerate(used) if names[j] not in chosen]
 
 
-def _invariants(dae: Translated, used: set[int]) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
+def _invariants(
+    dae: Translated, used: set[int], residuals: Mapping[Key, ca.SX]
+) -> tuple[list[ca.SX], list[tuple[str, ...]]]:
     """Residuals of the levels below the last, positions, then velocities, and the names of their equations.
 
     used: equations that give dependent variables, which hold anyway.
@@ -142,7 +147,7 @@ def _invariants(dae: Translated, used: set[int]) -> tuple[list[ca.SX], list[tupl
     counts, found, names = dae.indexed.counts, [], []
     for stage in range(-max(counts, default=0), 0):
         rows = [(i, stage + c) for i, c in enumerate(counts) if stage + c >= 0 and i not in used]
-        found.append(ca.vertcat(*(dae.indexed.residuals[key] for key in rows)) if rows else ca.SX(0, 1))
+        found.append(ca.vertcat(*(residuals[key] for key in rows)) if rows else ca.SX(0, 1))
         names.append(tuple(dae.reduced.equations[i].name for i, _ in rows))
     return found, names
 

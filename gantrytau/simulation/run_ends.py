@@ -71,10 +71,22 @@ def stopped(dae: Translated, t: float, error: Exception) -> SolveError:
 
 def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
     """Conditions turn back and forth without end at time t."""
+    turn = "turns" if len(conditions) == 1 else "turn"
     return SolveError(
-        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turn{'s' if len(conditions) == 1 else ''} back and forth "
-        "without end: what holds on either side leads back to the other. Smooth it, as tanh(x / small) for sign(x), give "
-        "it a band within which it keeps its side, or use stick_slip for friction; .result holds the motion up to there",
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} {turn} back and forth without end: what holds on either "
+        "side leads back to the other. Smooth it, as tanh(x / small) for sign(x), or let it keep its side within a band; "
+        "friction that sticks is stick_slip, in an FMU; .result holds the motion up to there",
+        time=t,
+        equations=[],
+    )
+
+
+def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
+    """No sides of conditions agree with what follows from them at time t."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s no side of {' and '.join(conditions)} agrees with what follows from it: the "
+        "equations have no solution there, or the motion would slide along the switch. Smooth it, as "
+        "tanh(x / small) for sign(x), or change what jumps; friction that sticks is stick_slip, in an FMU; .result holds the motion up to there",
         time=t,
         equations=[],
     )

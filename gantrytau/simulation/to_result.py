@@ -27,12 +27,13 @@ def result_of(
     samples = [signals[n] for n in coordinates.sampled]
     values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, PiecewiseLinear)]
     w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
-    known = coordinates.w[: len(w)]
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
-    (found,) = coordinates.substitution.inserted([expressions])
+    (found,) = coordinates.inserted([expressions])
     found = ca.substitute(found, coordinates.t0, time)
-    function = ca.Function("variables", [time, coordinates.x, coordinates.z, known], [ca.densify(found)])
+    function = ca.Function(
+        "variables", [time, coordinates.x, coordinates.z, coordinates.w], [ca.densify(found)]
+    )
     rows = np.array(function(times[None, :], x.T, z.T, w))
     rows = (
         rows.reshape(len(names), -1) if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)

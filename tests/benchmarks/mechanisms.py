@@ -83,7 +83,7 @@ def _six_links() -> Coordinates:
 
 def _second_of_the_robot() -> Iterator[Row]:
     coordinates = _six_links()
-    x, z = coordinates.start(0.0, np.zeros(0))
+    x, z, _ = coordinates.start(0.0, np.zeros(0))
     runs = {c: coordinates.integrator(1, 1e-8, compiled=c) for c in (False, True)}
     ends = {c: np.array(run(x0=x, z0=z, p=[0.0, 1.0])["xf"]) for c, run in runs.items()}
     np.testing.assert_allclose(ends[True], ends[False], atol=1e-6)
@@ -104,7 +104,7 @@ def _forward_dynamics() -> Iterator[Row]:
     point = ca.MX.sym("x", x.numel())
     a, b = parts(point)
     ours = ca.Function("six_links", [point], [rest(point, ca.solve(a, -b, "qr"))])
-    start, _ = coordinates.start(0.0, np.zeros(0))
+    start, *_ = coordinates.start(0.0, np.zeros(0))
     with tempfile.TemporaryDirectory() as folder:
         fast = compiled(ours, Path(folder), 20000)
         points = np.repeat(start[:, None], 20000, axis=1)

@@ -2,6 +2,7 @@
 
 import math
 
+import casadi
 import numpy as np
 import pytest
 
@@ -106,8 +107,6 @@ def test_switches_of_time_that_are_no_straight_lines(points):
 
 @pytest.mark.parametrize("points", [2, 12, 501])
 def test_steps_and_pulses_that_count(points):
-    import casadi
-
     class Counted(Model):
         stairs = Real(start=0.0, fixed=True)
         duty = Real(start=0.0, fixed=True)
@@ -219,6 +218,57 @@ def test_what_slides_ends_with_the_condition_and_the_time(torque):
     assert caught.value.time == pytest.approx(1.0, abs=1e-8)
     assert "tanh" in str(caught.value)
     assert caught.value.result.final("x") == pytest.approx(0.0, abs=1e-8)
+
+
+def test_an_equation_without_a_solution_for_either_side_ends_with_its_condition():
+    class Gap(Model):
+        u = Input()
+        x = Real(start=-1.0)
+        q = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield der(self.q) == self.x
+            yield self.x - 2 * fabs(self.x) == self.u  # two solutions below zero, none above
+
+    with pytest.raises(SolveError, match=r"at t = 1 s no side of the condition on x agrees") as caught:
+        simulate(Gap(), stop=2.0, inputs={"u": lambda t: t - 1})
+    assert np.isfinite(caught.value.result["x"]).all()
+
+
+@pytest.mark.parametrize("points", [2, 21])
+def test_equations_that_switch_on_their_own_unknowns_are_led_through_their_pieces(points):
+    class Own(Model):
+        u = Input()
+        half = Real(start=1.0)
+        limited = Real(start=0.5)
+        cubic = Real(start=0.5)
+        sum = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield self.half + 0.5 * fabs(self.half) == self.u
+            yield self.limited + casadi.fmin(casadi.fmax(4 * self.limited, -1), 1) == self.u
+            yield self.cubic**3 + fabs(self.cubic) + 2 * self.cubic == self.u
+            yield der(self.sum) == self.half + self.limited + self.cubic
+
+    found = simulate(Own(), stop=4.0, inputs={"u": lambda t: 3 - 2 * t}, points=points, tolerance=TOLERANCE)
+    u, c = 3 - 2 * found.time, found["cubic"]
+    np.testing.assert_allclose(found["half"], np.where(u > 0, u / 1.5, u / 0.5), atol=1e-9)
+    np.testing.assert_allclose(found["limited"], np.where(np.abs(u) < 1.25, u / 5, u - np.sign(u)), atol=1e-9)
+    np.testing.assert_allclose(c**3 + np.abs(c) + 2 * c, u, atol=1e-9)
+
+
+def test_a_kink_at_the_level_of_positions():
+    class Led(Model):
+        x = Real()
+        v = Real()
+
+        def equations(self):
+            yield self.x == fabs(time - 1)
+            yield self.v == der(self.x)
+
+    found = simulate(Led(), stop=2.0, points=5)
+    np.testing.assert_allclose(found["x"], [1, 0.5, 0, 0.5, 1], atol=1e-12)
+    np.testing.assert_allclose(found["v"][[0, 1, 3, 4]], [-1, -1, 1, 1], atol=1e-12)
 
 
 def test_a_switch_that_stays_on_one_side_changes_nothing():

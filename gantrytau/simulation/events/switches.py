@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
 
@@ -107,15 +106,3 @@ class Switches:
     def of_gap(self, gap: int) -> int:
         """Which switch a column of gaps belongs to."""
         return gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
-
-    def spoken(self, index: int, dae: Translated) -> str:
-        """What a switch asks, in the model's words."""
-        turn = self.turns[index]
-        names = sorted(
-            {
-                dae.spoken(leaf.name())
-                for leaf in ca.symvar(turn.margin)
-                if not leaf.name().startswith("mode[")
-            }
-        )
-        return f"the condition on {', '.join(names)}"
