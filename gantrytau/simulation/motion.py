@@ -39,8 +39,7 @@ def all_coordinates(
     solved = _highest_blocks(dae, states, last, highest, pieces.numbers(dae.start))
     definitions = [(dae.table.symbols[n], ca.SX(dae.table.values[n])) for n in dae.table.independent]
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
-    definitions += definitions_of(dae, given, pieces.residuals)
-    substitution = solved.after(definitions)
+    substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
     moving = [column([chains.rate(n) for n in states]), column(solved.residuals), *levels]
     wanted = [

@@ -85,8 +85,9 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
     """No sides of conditions agree with what follows from them at time t."""
     return SolveError(
         f"{dae.name}: at t = {t:.6g} s no side of {' and '.join(conditions)} agrees with what follows from it: the "
-        "equations have no solution there, or the motion would slide along the switch. Smooth it, as "
-        "tanh(x / small) for sign(x), or change what jumps; friction that sticks is stick_slip, in an FMU; .result holds the motion up to there",
+        "equations have no solution there, or the motion would slide along the switch. Smooth it, as tanh(x / small) "
+        "for sign(x), or change what jumps; friction that sticks is stick_slip, in an FMU; .result holds the motion up to "
+        "there",
         time=t,
         equations=[],
     )
