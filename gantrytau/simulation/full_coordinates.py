@@ -14,8 +14,8 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
+from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
-from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected

@@ -10,13 +10,13 @@ from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
-from gantrytau.simulation.events.switches import Margins
+from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
-from gantrytau.simulation.track import LEAST_STEPS, Track
+from gantrytau.simulation.trail import LEAST_STEPS, Trail
 
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 GROWTH = 10  # of a stretch in which nothing has switched
@@ -39,7 +39,7 @@ class Run:
     ):
         self.coordinates, self.integrators = coordinates, Integrators(coordinates, tolerance)
         self.span = float(grid[-1] - grid[0])
-        self.track = Track(coordinates, signals, grid)
+        self.trail = Trail(coordinates, signals, grid)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.events: list[float] = []  # times at which states made something switch
@@ -48,41 +48,41 @@ class Run:
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics, and what is held, at the output points that were reached."""
-        track = self.track
-        kept = track.kept[track.kept <= self.done]
-        return track.t[kept], track.x[kept], track.z[kept], track.held[kept]
+        trail = self.trail
+        kept = trail.kept[trail.kept <= self.done]
+        return trail.t[kept], trail.x[kept], trail.z[kept], trail.held[kept]
 
     def go(self) -> None:
-        track = self.track
-        track.x[0], track.z[0], modes = self.coordinates.start(track.t[0], track.inputs(0))
-        track.held[0, track.held.shape[1] - modes.size :] = modes
+        trail = self.trail
+        trail.x[0], trail.z[0], modes = self.coordinates.start(trail.t[0], trail.inputs(0))
+        trail.held[0, trail.held.shape[1] - modes.size :] = modes
         self._renew(0)
         self._turn()
         pressed: list[bool] = []
-        with Progress(track.t[0], track.t[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
+        with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
             size = most = self._longest()
-            while self.done < track.last:
-                count = min(size, track.stretch(self.done))
+            while self.done < trail.last:
+                count = min(size, trail.stretch(self.done))
                 try:
                     turned = self._advance(count)
                 except RuntimeError as error:
-                    if "IDACalcIC" in str(error) and self.integrators.rounded(track.z[self.done]):
+                    if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
                     if count == 1:
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
                 size = min(CHUNK if turned else size * GROWTH, most)
-                if track.stops[self.done] or turned:
+                if trail.stops[self.done] or turned:
                     self._renew(self.done)
                     self._turn(by_states=turned)
-                progress.at(track.t[self.done])
+                progress.at(trail.t[self.done])
                 if pressed:
                     raise KeyboardInterrupt
 
     def _longest(self) -> int:
         """The most intervals that are integrated at once."""
-        coordinates, last = self.coordinates, self.track.last
+        coordinates, last = self.coordinates, self.trail.last
         if coordinates.constrained or coordinates.sampled or coordinates.held:
             return min(CHUNK, last)
         if len(coordinates.switches):
@@ -91,27 +91,27 @@ class Run:
 
     def _renew(self, k: int) -> None:
         """Give new values to what is sampled at a place, all from the values just before."""
-        track = self.track
-        due = track.due[k]
+        trail = self.trail
+        due = trail.due[k]
         if not due.any():
             return
-        t = float(track.t[k])
-        new = np.array(self.coordinates.renewed(track.x[k], track.z[k], t, t, track.inputs(k))).ravel()
+        t = float(trail.t[k])
+        new = np.array(self.coordinates.renewed(trail.x[k], trail.z[k], t, t, trail.inputs(k))).ravel()
         for name, value, now in zip(self.coordinates.held, new, due, strict=True):
             if now and not np.isfinite(value):
                 raise run_ends.sampled_badly(self.coordinates.dae, t, name)
-        track.held[k, : due.size][due] = new[due]
-        track.z[k] = self._settled(k)
+        trail.held[k, : due.size][due] = new[due]
+        trail.z[k] = self._settled(k)
 
     def _settled(self, k: int) -> np.ndarray:
         """The algebraics of a place."""
-        places, track = slice(k, k + 1), self.track
-        w = track.inputs(k)[None]
-        return self.coordinates.settle(track.x[places], track.z[places], track.t[places], w)[0]
+        places, trail = slice(k, k + 1), self.trail
+        w = trail.inputs(k)[None]
+        return self.coordinates.settle(trail.x[places], trail.z[places], trail.t[places], w)[0]
 
     def _turn(self, *, by_states: bool = False) -> None:
         """Find the modes that hold from the last place on, and lay a second place there if they are others."""
-        switches, track, k = self.coordinates.switches, self.track, self.done
+        switches, trail, k = self.coordinates.switches, self.trail, self.done
         if not len(switches):
             return
         first = self._modes(k).copy()
@@ -119,14 +119,14 @@ class Run:
         modes = switches.following(margins)
         if not np.array_equal(modes, first):
             if k > 0:
-                track.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
+                trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
                 self.done = k = k + 1
             self._agree(k, modes)
         if by_states:
             self._count(modes, first)
-        end = self.by_time.next(float(track.t[k]), track.inputs(k))
+        end = self.by_time.next(float(trail.t[k]), trail.inputs(k))
         if end is not None:
-            track.stop_at(end, k)
+            trail.stop_at(end, k)
 
     def _agree(self, k: int, modes: np.ndarray) -> None:
         """Give a place modes that agree with the margins they lead to, from these on; SolveError if there are none."""
@@ -137,30 +137,28 @@ class Run:
             if np.array_equal(modes, tried[-1]):
                 return
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
-        track = self.track
+        trail = self.trail
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
-            near = sorted(
-                product((0.0, 1.0), repeat=changing.size), key=lambda c: np.abs(c - tried[0][changing]).sum()
-            )
-            for choice in near:
+            choices = product(*(np.unique([old[i] for old in tried]).tolist() for i in changing))
+            for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
                 modes = tried[0].copy()
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes), modes):
                     return
-        raise run_ends.no_side(self.coordinates.dae, float(track.t[k]), self._conditions(changing))
+        raise run_ends.no_side(self.coordinates.dae, float(trail.t[k]), self._conditions(changing))
 
     def _led_to(self, k: int, modes: np.ndarray) -> np.ndarray:
         """The modes that belong to the margins of a place that has these modes."""
-        track, places = self.track, slice(k, k + 1)
+        trail, places = self.trail, slice(k, k + 1)
         self._modes(k)[:] = modes
-        track.x[k] = self.coordinates.project(track.x[places], track.t[places], track.rows(np.array([k])))[0]
-        track.z[k] = self._settled(k)
+        trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
+        trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self._margins(*self._columns(np.array([k]))))
 
     def _count(self, modes: np.ndarray, before: np.ndarray) -> None:
         """SolveError if states made something switch too often."""
-        t, events = float(self.track.t[self.done]), self.events
+        t, events = float(self.trail.t[self.done]), self.events
         events.append(t)
         for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
             if len(events) > many and t - events[-many] < share * self.span:
@@ -168,39 +166,39 @@ class Run:
                 raise run_ends.chattering(self.coordinates.dae, t, conditions)
 
     def _modes(self, k: int) -> np.ndarray:
-        return self.track.held[k, self.track.held.shape[1] - len(self.coordinates.switches) :]
+        return self.trail.held[k, self.trail.held.shape[1] - len(self.coordinates.switches) :]
 
     def _columns(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """States, algebraics, times and inputs at places."""
-        track = self.track
-        return track.x[places], track.z[places], track.t[places], track.rows(places)
+        trail = self.trail
+        return trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
 
     def _margins(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Margins:
         return self.coordinates.switches.look(x, z, t, w, self.sizes)
 
     def _advance(self, count: int) -> bool:
         """Integrate some intervals, or up to where something switches; whether it does."""
-        track, here = self.track, self.done
-        track.held[here + 1 : here + count + 1] = track.held[here]
+        trail, here = self.trail, self.done
+        trail.held[here + 1 : here + count + 1] = trail.held[here]
         ahead = np.arange(here, here + count + 1)
         courses = self._courses(here, count) if self.coordinates.stepwise else None
-        x, z = self.integrators.over(track.x[here], track.z[here], track.t[ahead], courses)
+        x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
         if self._too_wide(count):
             return False
         reached = ahead[1:]
-        inputs = track.rows(reached)
+        inputs = trail.rows(reached)
         try:
-            track.x[reached] = self.coordinates.project(x, track.t[reached], inputs)
+            trail.x[reached] = self.coordinates.project(x, trail.t[reached], inputs)
         except SolveError as error:  # perhaps only for want of shorter stretches
             raise RuntimeError("the constraints cannot be met any more") from error
-        track.z[reached] = self.coordinates.settle(track.x[reached], z, track.t[reached], inputs)
+        trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place
         self._watch(here, self.done)
-        opened = self.coordinates.opened(track.x[reached], track.t[reached], inputs)
+        opened = self.coordinates.opened(trail.x[reached], trail.t[reached], inputs)
         if opened is not None and here + opened[0] < self.done:
             self.done = here + opened[0]
-            raise run_ends.opened(self.coordinates.dae, float(track.t[self.done]), opened[1])
+            raise run_ends.opened(self.coordinates.dae, float(trail.t[self.done]), opened[1])
         return found is not None and self._cross(found)
 
     def _too_wide(self, count: int) -> bool:
@@ -210,22 +208,22 @@ class Run:
         parts = (self.integrators.steps - STARTING) // (STEPS_BETWEEN * count)
         if parts < 2:
             return False
-        track, here = self.track, self.done
-        for k in reversed(range(here, min(here + max(count, REFINED), track.last))):
-            times = np.linspace(track.t[k], track.t[k + 1], int(parts) + 1)[1:-1]
-            if np.all(np.diff(times, prepend=track.t[k], append=track.t[k + 1]) > SHORT**2 * self.span):
-                track.insert(k, times)
+        trail, here = self.trail, self.done
+        for k in reversed(range(here, min(here + max(count, REFINED), trail.last))):
+            times = np.linspace(trail.t[k], trail.t[k + 1], int(parts) + 1)[1:-1]
+            if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > SHORT**2 * self.span):
+                trail.insert(k, times)
         return True
 
     def _courses(self, here: int, count: int) -> np.ndarray:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
-        track = self.track
-        h = np.diff(track.t[here : here + count + 1])
-        if not track.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
-            length = (track.t[here + count] - track.t[here]) / count
-            return np.repeat(np.array([[track.t[here], length, 0, *track.held[here]]]).T, count, axis=1)
-        inputs = track.rows(np.arange(here, here + count)).T
-        return np.vstack([track.t[here : here + count], h, np.arange(count), inputs])
+        trail = self.trail
+        h = np.diff(trail.t[here : here + count + 1])
+        if not trail.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
+            length = (trail.t[here + count] - trail.t[here]) / count
+            return np.repeat(np.array([[trail.t[here], length, 0, *trail.held[here]]]).T, count, axis=1)
+        inputs = trail.rows(np.arange(here, here + count)).T
+        return np.vstack([trail.t[here : here + count], h, np.arange(count), inputs])
 
     def _crossing(self, places: np.ndarray) -> Crossing | None:
         """The first interval between successive places in which something switches."""
@@ -233,11 +231,11 @@ class Run:
         if not len(switches):
             return None
         gaps = switches.gaps(self._margins(*self._columns(places)), self._modes(places[0]))
-        return first_crossing(self.track.t[places], gaps)
+        return first_crossing(self.trail.t[places], gaps)
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
-        track, k, switches = self.track, self.done, self.coordinates.switches
+        trail, k, switches = self.trail, self.done, self.coordinates.switches
         low, modes = self._point(k), self._modes(k).copy()
 
         def look(point: Point) -> Margins:
@@ -245,31 +243,31 @@ class Run:
             return switches.gaps(self._margins(x[None], z[None], np.array([t]), w[None]), modes)
 
         if found.certain:
-            there = located(low, float(track.t[k + 1]), found.guess, self.integrators.step, look)
+            there = located(low, float(trail.t[k + 1]), found.guess, self.integrators.step, look)
         else:
             there = self.integrators.step(low, found.guess - low[2])
             gaps = look(there)
             if np.any(gaps.values < -gaps.noise):
                 there = located(low, found.guess, found.guess, self.integrators.step, look)
-        track.insert(k, np.array([there[2]]))
-        track.x[k + 1], track.z[k + 1] = there[:2]
+        trail.insert(k, np.array([there[2]]))
+        trail.x[k + 1], trail.z[k + 1] = there[:2]
         self.done = k + 1
         gaps = look(there)
         return bool(np.any(gaps.values < -gaps.noise))
 
     def _point(self, k: int) -> Point:
-        return self.track.x[k], self.track.z[k], float(self.track.t[k]), self.track.inputs(k)
+        return self.trail.x[k], self.trail.z[k], float(self.trail.t[k]), self.trail.inputs(k)
 
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places; `done` is then the last before it."""
         if not self.coordinates.conditioning.needed:
             return
-        track = self.track
+        trail = self.trail
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
-        places = places[np.append(np.diff(track.t[places]) > 0, True)]
+        places = places[np.append(np.diff(trail.t[places]) > 0, True)]
         look = self._look(*self._columns(places))
-        for k in places[:-1][doubtful(track.t[places], look)]:
+        for k in places[:-1][doubtful(trail.t[places], look)]:
             if k <= self.seen:
                 continue
             self.done = self.seen = int(k)
@@ -307,5 +305,5 @@ class Run:
             return self._look(x[None], z[None], np.array([t]), w[None])
 
         k = self.done
-        end = float(self.track.t[min(k + 1, self.track.last)])
+        end = float(self.trail.t[min(k + 1, self.trail.last)])
         return approach(self._point(k), end, self.integrators.step, look)

@@ -13,8 +13,8 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
-from gantrytau.simulation.events.switches import Switches
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal
 from gantrytau.simulation.singular_poses import Conditioning

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.errors import SolveError
-from gantrytau.simulation.events.switches import Margins
+from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.singular_poses import Point
 
 DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.language.symbols import time
-from gantrytau.simulation.events.switches import Switches
+from gantrytau.simulation.events.margins import Switches
 
 DENSE = 20_000  # steps of the run in which a margin that is not linear in time is looked for zeros
 WITHIN = 64  # parts of such a step, where a margin turns round in it

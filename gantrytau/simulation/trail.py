@@ -13,7 +13,7 @@ LEAST_STEPS = (
 )
 
 
-class Track:
+class Trail:
     """Places in order of time: t (n,) in s, which repeats where something jumps, before and behind; x, z: states and
     algebraics, a row each; held: what is held from there on, sampled variables, then modes; due: which of the former
     are sampled there; stops: whether an integration ends there; kept: places of the output points.
