@@ -49,7 +49,11 @@ def assemblies(dae: Translated) -> tuple[Assembly, ...]:
     found = []
     for block in dae.blocks:
         positions = all(split_derivative(n)[1] == 0 for n in block.unknowns)
-        if block.kind in ("quadratic", "spheres", "nonlinear") and positions and len(block.tears) <= MOST:
+        if (
+            block.kind in ("quadratic", "spheres", "piecewise", "nonlinear")
+            and positions
+            and len(block.tears) <= MOST
+        ):
             angles = np.array([units.get(n) == "rad" for n in block.unknowns])
             shown = _shown(block)
             taken = {dae.spoken(n): dae.start[n] for n in shown}

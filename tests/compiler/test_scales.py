@@ -15,6 +15,7 @@ from gantrytau import (
     StructureError,
     cos,
     der,
+    exp,
     simulate,
     sin,
     translate,
@@ -107,3 +108,18 @@ def test_rows_and_columns_of_linear_blocks_have_any_size(row, column):
 def test_what_rounding_alone_determines_is_refused():
     with pytest.raises(StructureError, match="x is not determined at the start"):
         translate(Turned())
+
+
+class Large(Model):
+    """An unknown of a million, that starts at zero."""
+
+    u = Input(start=1.0)
+    x = Real(start=0.0, nominal=1e6)
+
+    def equations(self):
+        yield self.x / 1e6 + exp(self.x / 1e6) == self.u
+
+
+def test_the_start_walks_as_far_as_it_has_to():
+    x = translate(Large()).evaluate({"u": 1 + math.e})["x"]
+    assert x == pytest.approx(1e6, rel=1e-12)

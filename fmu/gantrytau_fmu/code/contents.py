@@ -34,6 +34,7 @@ class Contents:
     entries: tuple[Entry, ...]
     constants: tuple[float, ...]
     nominals: tuple[float, ...]
+    z_nominals: tuple[float, ...]
     structure: ModelStructure
     terminals: tuple[FmuTerminal, ...]
 
@@ -146,6 +147,7 @@ def contents_of(model: ModelGraph, outputs: Sequence[str], others: Sequence[str]
         entries=tuple(listed.entries),
         constants=tuple(listed.constants),
         nominals=tuple(_nominal(listed, n) for n in formulas.states),
+        z_nominals=tuple(1.0 if n.startswith("der(") else _nominal(listed, n) for n in formulas.z_names),
         structure=_structure(listed, Dependencies(formulas, model.outputs), outputs, indicators),
         terminals=_terminals(listed),
     )

@@ -123,6 +123,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _numbers("gt_start_z", at["z"]),
         _numbers("gt_start_p", at["p"]),
         _numbers("gt_x_nominals", contents.nominals),
+        _numbers("gt_z_nominals", contents.z_nominals),
         _integers("gt_initial_states", formulas.starts.solved),
         _integers("gt_friction_unknowns", [formulas.z_names.index(n) for n in formulas.frictions]),
         _integers("gt_held_clocks", formulas.clocks),

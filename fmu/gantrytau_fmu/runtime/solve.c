@@ -8,7 +8,7 @@
 #define GT_HALVINGS 12
 #define GT_SMALL 1e-11     /* relative size of a Newton step that ends the iteration: the next would be its square */
 #define GT_SINGULAR 1e-7   /* relative to the largest coefficient: below, rounding moves a solution by its own root */
-#define GT_FAR 0.1         /* size of a first step, relative to 1 + |z|, from which on the way is followed */
+#define GT_FAR 0.1         /* size of a first step, relative to nominal + |z|, from which on the way is followed */
 #define GT_STEPS_ON_THE_WAY 64
 
 static double gt_norm(int n, const double *values) {
@@ -63,7 +63,7 @@ static double gt_relative(const gt_block *block, const double *z, const double *
     double largest = 0;
     int i;
     for (i = 0; i < block->count; i++)
-        largest = fmax(largest, isfinite(step[i]) ? fabs(step[i]) / (1 + fabs(z[i])) : INFINITY);
+        largest = fmax(largest, isfinite(step[i]) ? fabs(step[i]) / (gt_z_nominals[block->first + i] + fabs(z[i])) : INFINITY);
     return largest;
 }
 

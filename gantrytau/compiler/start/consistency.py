@@ -245,13 +245,13 @@ def newton(
         for attempt in range(attempts):
             shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
             step = weights * (right.T @ (shares * along))
-            if attempt:
-                step *= min(1.0, _longest(point, step))
+            share = min(1.0, _longest(point, step)) if attempt else 1.0
+            step *= share
             f_new, jacobian_new = at(point + step)
             sound = np.all(np.isfinite(f_new)) and np.all(np.isfinite(jacobian_new))
             size = np.linalg.norm(f_new / rows) if sound else np.inf
             # at once only where the equations are as good as linear; a large step may reach another branch
-            if size < (1 - 1e-4 if attempt else enough) * merit:
+            if size < (1 - 1e-4 * share if attempt else enough) * merit:
                 point, f, jacobian, moved = point + step, f_new, jacobian_new, True
                 damping = 0.0 if size < 0.1 * merit else damping / 10
                 break
