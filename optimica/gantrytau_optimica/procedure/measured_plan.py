@@ -11,11 +11,17 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.tool_error import ToolError, tool_error
-from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
+from gantrytau_optimica.calibration.trust.calibration_verdict import (
+    CalibrationVerdict,
+    judge,
+    told_by_tool,
+    um,
+)
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
@@ -26,6 +32,7 @@ AS_PLANNED = 1e-6  # m, of digits in poses.csv: nothing measures that well
 FEW = 3  # poses that hold a frame
 OF_TAPE = 5  # deviations of the tape measure by which a tool may be off its nominal place
 MATTERS = 0.1  # of the error that is wanted, by which a number that is not held may move the tool
+NOISIER = 3.0  # times the noise that is foretold, more than which is not chance
 REST = "Rest"
 
 Frame = Literal["fitted", "base"]
@@ -87,7 +94,19 @@ class MeasuredPlan:
         if self.motion is not None:
             checked = replace(checked, calibration=checked.calibration.measured_by(self.motion))
         found = told_by_tool(checked.calibration, expected, least=MATTERS * cell.wanted, tape=cell.tape)
+        found = found.with_findings([*found.findings, *self._noisy(found)])
         return found, judge(checked, cell.wanted, expected=expected, tape=cell.tape)
+
+    def _noisy(self, found: Calibration) -> Iterator[Finding]:
+        """Noise that the device of the plan does not have."""
+        foretold = self.planned.plan.prediction.noise
+        if found.noise > NOISIER * foretold:
+            yield Finding(
+                "noise",
+                found.rows,
+                f"what is left needs noise of {um(found.noise)} in each coordinate, {um(foretold)} are foretold of the "
+                "device; look at the other findings, at its settings, and whether robot and target stood still",
+            )
 
     @property
     def rest_program(self) -> Path:

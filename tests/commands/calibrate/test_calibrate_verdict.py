@@ -88,6 +88,17 @@ def test_outliers_that_have_no_weight_do_not_count(folder, run):
     assert true_error(found, folder) < 50e-6
 
 
+def test_more_noise_than_the_device_has_is_told(folder, run):
+    def change(table):
+        table[:, 3:] += 3e-4 * np.random.default_rng(3).standard_normal((len(table), 3))
+        return table
+
+    spoken = run("calibrate", cells.measure(folder, change=change))
+    assert spoken.exit_code == FAULT
+    told = r"noise: what is left needs noise of \d+ um in each coordinate, 1\d(\.\d)? um are foretold of the device"
+    assert re.search(told, spoken.stdout)
+
+
 def test_the_report_says_all_of_it(folder, answer):
     found = answer("calibrate", cells.measure(folder))
     page = (folder / "measurements-calibrated" / "report.html").read_text()

@@ -7,7 +7,12 @@ from itertools import combinations, permutations, product
 import numpy as np
 
 AXES = "xyz"
-UNITS = {"millimetres": ("mm", 1e-3), "centimetres": ("cm", 1e-2), "inches": ("inches", 0.0254)}
+UNITS = {
+    "millimetres": ("mm", 1e-3),
+    "centimetres": ("cm", 1e-2),
+    "inches": ("inches", 0.0254),
+    "kilometres": ("km (m that were divided by 1000)", 1e3),
+}
 
 Poses = tuple[np.ndarray, np.ndarray, np.ndarray | None]  # q (N, n), r (N, 3), R (N, 3, 3) or None
 

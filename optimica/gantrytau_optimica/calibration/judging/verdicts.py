@@ -6,9 +6,9 @@ import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.judging.causes import ordered, pulled, scaled
 from gantrytau_optimica.calibration.judging.device_frames import frame_of, moved_arms
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
-from gantrytau_optimica.calibration.judging.order_effects import OrderEffect, order_effect
 from gantrytau_optimica.calibration.judging.plausibility import (
     NEAR,
     Fitting,
@@ -18,8 +18,6 @@ from gantrytau_optimica.calibration.judging.plausibility import (
     misses_of,
     swapped_carts,
 )
-from gantrytau_optimica.calibration.judging.pulls import pulls
-from gantrytau_optimica.calibration.judging.slips import Slip, slip, smooth_functions
 from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.rods.error_models import ModelLink, links_of_arms, moved
@@ -30,9 +28,6 @@ LEFT_OUT = ("nan", "duplicates", "stuck")
 STILL = 1e-4  # m, over which a cart must move to be calibrated
 MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
 EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
-SHOWN = 3  # priors or constraints that are named
-LOOKED_AT = 1000  # poses, in which a slip or a drift is looked for
-ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
 
 def usable_rows(findings: Sequence[Finding], measurements: Measurements) -> np.ndarray:
@@ -190,37 +185,15 @@ def judged(found: FittedRods) -> list[Finding]:
             f"deviations; {advice}"
         )
         findings.append(Finding("outliers", others, words))
-    findings += _ordered(found)
-    return [*findings, *_misfit(found, seen, findings), *_pulled(found), *_far(found), *_in_doubt(found)]
-
-
-def _pulled(found: FittedRods) -> Iterator[Finding]:
-    """Priors and constraints that data contradict, and limits that are reached."""
-    each = [pull for fit in found.fits for pull in pulls(fit, found.constraints)]
-    for kind, told, advice in (
-        (
-            "prior",
-            "data want {name} at {wanted:.7g}, the prior {held:.7g} +- {deviation:.3g} holds it {far} deviations off",
-            "look at its value, or give it a larger deviation",
-        ),
-        (
-            "equation",
-            "data want {name} at {wanted:.7g}, a constraint holds it at {held:.7g}, {far} deviations off",
-            "look at its value, or leave it free",
-        ),
-        (
-            "limit",
-            "{name} stands at its limit {held:.7g}, data want {wanted:.7g}, {far} deviations beyond",
-            "widen the limit, or look whether measurements and units are right",
-        ),
-    ):
-        those = [pull for pull in each if pull.kind == kind]
-        if those:
-            shown = "; ".join(
-                told.format(**vars(pull), far=f"{pull.deviations:.3g}") for pull in those[:SHOWN]
-            )
-            more = f"; and {len(those) - SHOWN} more" if len(those) > SHOWN else ""
-            yield Finding(kind, found.rows, f"{shown}{more}; the other numbers are pulled along; {advice}")
+    findings += ordered(found)
+    return [
+        *findings,
+        *_misfit(found, seen, findings),
+        *pulled(found),
+        *scaled(found),
+        *_far(found),
+        *_in_doubt(found),
+    ]
 
 
 def _far(found: FittedRods) -> Iterator[Finding]:
@@ -260,67 +233,6 @@ def _misfit(found: FittedRods, seen: Suspicion, findings: list[Finding]) -> Iter
             findings=findings,
         )
     yield Finding("misfit", rows, f"{words}; expected {remedy}")
-
-
-def _ordered(found: FittedRods) -> Iterator[Finding]:
-    """What changed from one row on, with the order of the rows, or from row to row."""
-    used, systems = found.systems(LOOKED_AT)
-    r, fitted = found.measurements.r[used], np.flatnonzero(np.isin(used, found.rows))
-    smooth = smooth_functions(r[fitted])
-    slips = []
-    for one in (each.of(fitted) for each in systems):
-        for column, slopes in one.actuators.items():
-            if (seen := slip(one, slopes, smooth)) is not None:
-                last = fitted[seen.last] if seen.last < len(fitted) else len(used)
-                slips.append((column, Slip(int(fitted[seen.first]), int(last), seen.size)))
-    rows = np.setdiff1d(np.union1d(found.rows, found.held_out), found.left_out)
-    if (effect := order_effect(systems, r, used, slips)) is not None:
-        yield _by_order(found, effect, rows, used)
-        return
-    for column, seen in slips:
-        last = used[seen.last] if seen.last < len(used) else len(found.measurements)
-        off = rows[(rows >= used[seen.first]) & (rows < last)]
-        words = (
-            f"q{column + 1} is off by {_size(found, column, seen.size)} in {rows_in_words(off, len(found.measurements))}, "
-            "beside the other rows; the encoder slipped or was referenced anew, or the robot or the device was moved; "
-            "calibrate the parts apart, or measure again"
-        )
-        yield Finding("slip", off, words)
-
-
-def _size(found: FittedRods, column: int, size: float) -> str:
-    """How far an actuator is off."""
-    return f"{size * 1e3:+.3g} {'mm' if column < len(found.nominal_rods.arms) else 'mrad'}"
-
-
-def _by_order(found: FittedRods, effect: OrderEffect, rows: np.ndarray, used: np.ndarray) -> Finding:
-    """rows: all that take part; used: those in which the effect was seen."""
-    first, kind = used[effect.rows[0]], "drift"
-    if effect.kind == "jump":
-        rows, kind = rows[rows >= first], "jump"
-    elif effect.kind == "period":
-        rows, kind = rows[(rows - first) % effect.period == 0], "period"
-    where = rows_in_words(rows, len(found.measurements))
-    unit = "mrad" if effect.kind == "turn" else "mm"
-    size = f"{effect.size * 1e3:.3g} {unit} ({', '.join(f'{x * 1e3:+.3g}' for x in effect.change)} {unit})"
-    every = f"every {ORDINALS[effect.period]} row, " if effect.period else ""
-    said = {
-        "position": f"positions drift by {size} from the first of {where} to the last",
-        "turn": f"the frame of positions turns by {size} from the first of {where} to the last",
-        "actuator": f"q{effect.column + 1} drifts by {_size(found, effect.column, float(effect.change[0]))} from the first "
-        f"of {where} to the last",
-        "jump": f"positions lie off by {size} in {where}, beside the other rows",
-        "period": f"positions lie off by {size} in {every}{where}, beside the other rows",
-    }[effect.kind]
-    advice = {
-        "drift": "the device or the robot warmed up, settled or gave way; wait until they stand, and measure again, the "
-        "first poses once more at the end",
-        "jump": "the device or the robot was moved; calibrate the parts apart, or measure again",
-        "period": "look how they were measured or written down, and leave them out, or measure again",
-    }[kind]
-    alike = "; as rows follow the places of the tool, an error of the model may look the same: a mixed order tells"
-    left = f"without it {np.sqrt(effect.variance) * 1e6:.3g} um are left of the links"
-    return Finding(kind, rows, f"{said}; {left}; {advice}{alike if effect.alike else ''}")
 
 
 def _in_doubt(found: FittedRods) -> Iterator[Finding]:

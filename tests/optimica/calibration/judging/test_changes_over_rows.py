@@ -1,15 +1,16 @@
 """What goes wrong while poses are measured: drifts, jumps, every k-th row, so many wrong rows that a fit follows them."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica import Measurements, calibrate
+from gantrytau_optimica import CalibrationError, Measurements, calibrate
 from tests.optimica.calibration import f1_data, synthetic_d1
-from tests.optimica.calibration.synthetic import NOISE, grid, nominal
+from tests.optimica.calibration.synthetic import NOISE, grid, inverse, nominal
 
 OFF = 1e-3  # m, a hundred times the noise
 
@@ -156,3 +157,30 @@ def test_an_error_of_the_model_is_no_drift():
         q, r, R, _ = synthetic_d1.measure(seed, 100)
         kinds = found_in(SixLinkGantryTau(prototypes.D1), q, r, R)
         assert not {"drift", "jump", "period", "outliers"} & set(kinds)
+
+
+def test_a_scale_that_all_guideways_share():
+    """As of a device that takes air for warmer than it is; where a model has directions of length 1."""
+    truth = replace(
+        prototypes.L1,
+        arms=tuple(
+            replace(arm, direction=tuple(np.array(arm.direction) / np.linalg.norm(arm.direction)))
+            for arm in prototypes.L1.arms
+        ),
+    )
+    r = grid(prototypes.L1)[1][::10]
+    q = inverse(truth, r)
+    r = r + NOISE * np.random.default_rng(0).standard_normal(r.shape)
+    assert not found_in(GantryTau(truth), q, r, None)
+    kinds = found_in(GantryTau(truth), q, 1.0002 * r, None)
+    assert set(kinds) == {"scale"}
+    assert size(r"all guideways are ([\d.]+) m long", kinds["scale"]) == pytest.approx(1.0002, abs=3e-5)
+    assert "look at the scale of the device (temperature, refraction)" in kinds["scale"].message
+
+
+@pytest.mark.parametrize(("of_q", "of_r", "words"), [(1, 1e-3, "r in km"), (1e-3, 1e-3, "q and r in km")])
+def test_metres_that_were_divided_by_a_thousand_once_more(of_q, of_r, words):
+    robot, q, r, _ = l1()
+    with pytest.raises(CalibrationError, match=words) as caught:
+        calibrate(robot, Measurements(q * of_q, r * of_r))
+    assert caught.value.kind == "kilometres"
