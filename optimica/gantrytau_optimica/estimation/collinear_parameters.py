@@ -33,10 +33,10 @@ class LocalSlopes:
         return LocalSlopes(self.jacobian[:, some], self.values[some])
 
 
-def without_influence(point: LocalSlopes, sizes: np.ndarray, measured: float) -> list[int]:
-    """Numbers of the parameters that no residual depends on; measured: norm of the values in deviations."""
+def without_influence(point: LocalSlopes, sizes: np.ndarray) -> list[int]:
+    """Numbers of the parameters that no residual depends on; residuals by the size of what was measured."""
     moved = np.linalg.norm(point.jacobian * sizes, axis=0)
-    return np.flatnonzero(moved <= SILENT * max(measured, np.max(moved, initial=0.0))).tolist()
+    return np.flatnonzero(moved <= SILENT * max(1.0, np.max(moved, initial=0.0))).tolist()
 
 
 @dataclass(frozen=True, eq=False)

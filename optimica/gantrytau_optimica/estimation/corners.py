@@ -24,10 +24,10 @@ def corners(problem: ControlProblem, phase: Phase) -> np.ndarray:
     return np.unique(times[(times > 0) & (times < 1)])
 
 
-def with_corners(mesh: Mesh, problem: ControlProblem, phase: Phase) -> Mesh:
-    """The mesh with borders at all corners, if these are not more than elements."""
+def with_corners(mesh: Mesh, problem: ControlProblem, phase: Phase, most: int) -> Mesh:
+    """The mesh with borders at all corners, if these are not more than `most`."""
     shares = corners(problem, phase)
-    return with_borders(mesh, shares) if 0 < shares.size <= mesh.elements else mesh
+    return with_borders(mesh, shares) if 0 < shares.size <= most else mesh
 
 
 def _bends(phase: Phase) -> np.ndarray:

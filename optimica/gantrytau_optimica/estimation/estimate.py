@@ -46,6 +46,7 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 SOLVED = WORDS["Solve_Succeeded"]
 MOST_STEPS, SHARE = 30, 0.8  # steps from the first guesses, and the part of the time that they leave
 EXPLAINED = 0.3  # of the spread of each measured course: what a fit from the first guesses may leave
+MOST_CORNERS = 2000  # where a mesh that misses some does not lead to the data
 AT_FIRST = 50  # elements or a few more, on which a first answer is looked for from far away
 
 
@@ -176,22 +177,34 @@ class _Work:
 
     def first(self) -> Optimum:
         """The answer on the mesh to begin with, from the first guesses. Raises SolveError, ModelError."""
-        scheme = collocation("radau", 1) if self.read.static else self.asked.collocation
-        program = transcribe(self.built.problem, self._meshes(), scheme)
+        program = self._program(self._meshes())
         check_determined(residuals(program), _without_start(self.read))
         from_guess = self._from_the_guess(program)
-        if from_guess is not None and self._explains(from_guess, program):
-            return self._optimum(program, from_guess, SOLVED)
+        if from_guess is not None and self._explains(from_guess):
+            return from_guess
         try:
             solver = Solver(program, self.settings)
-            return Prepared(self.built, program, solver, {}, self.build_time, reached=self.reached).search()
+            prepared = Prepared(self.built, program, solver, {}, self.build_time, reached=self.reached)
+            found = [prepared.search()]
         except SolveError:
             if from_guess is None or not self.reached.clock.left:
                 raise
-        return self._optimum(program, from_guess, SOLVED)
+            found = []
+        found += [from_guess] if from_guess is not None else []
+        if not self.read.static and not any(self._explains(one) for one in found):
+            # a mesh that misses most corners of the inputs may lead far from the best fit
+            whole = self._with_borders(self.asked.mesh, MOST_CORNERS)
+            if sum(m.elements for m in whole) > program.places.layouts[0].mesh.elements:
+                again = self._from_the_guess(self._program(whole))
+                found += [again] if again is not None else []
+        return min(found, key=lambda one: one.objective)
 
-    def _from_the_guess(self, program: Program) -> np.ndarray | None:
-        """Unknowns of the best fit by steps from the motion with the first guesses; None if they lead nowhere.
+    def _program(self, meshes: Sequence[Mesh]) -> Program:
+        scheme = collocation("radau", 1) if self.read.static else self.asked.collocation
+        return transcribe(self.built.problem, meshes, scheme)
+
+    def _from_the_guess(self, program: Program) -> Optimum | None:
+        """The best fit by steps from the motion with the first guesses; None if they lead nowhere.
 
         Much quicker than Ipopt from afar, but its motion must exist for all numbers on the way.
         """
@@ -204,20 +217,24 @@ class _Work:
             self._step(cost)
 
         try:
-            return descended(found, first_guess(program), Weights.even(found.total), step)
+            w = descended(found, first_guess(program), Weights.even(found.total), step)
         except TimeOver:
             return None
         except KeyboardInterrupt:
             self.reached.keep(self._optimum(program, first_guess(program), INTERRUPTED))
             raise
+        return None if w is None else self._optimum(program, w, SOLVED)
 
-    def _explains(self, w: np.ndarray, program: Program) -> bool:
+    def _explains(self, optimum: Optimum) -> bool:
         """Whether a fit leaves little of how the values spread, so that it is not a minimum far from the best one."""
-        found, sums = residuals(program), program.problem.sums
-        left = np.split(found.values(w), np.cumsum([s.times.size for s in sums])[:-1])
-        spread = [(s.values - s.values.mean()) / s.deviations for s in sums]
+        found, sums = residuals(optimum.program), optimum.program.problem.sums
+        left = np.split(found.values(optimum.solution.w), np.cumsum([s.times.size for s in sums])[:-1])
+        sizes = [
+            (s.values - s.values.mean()) / s.deviations if np.ptp(s.values) else s.values / s.deviations
+            for s in sums
+        ]
         return all(
-            np.linalg.norm(a) <= EXPLAINED * np.linalg.norm(b) for a, b in zip(left, spread, strict=True)
+            np.linalg.norm(a) <= EXPLAINED * np.linalg.norm(b) for a, b in zip(left, sizes, strict=True)
         )
 
     def _optimum(self, program: Program, w: np.ndarray, status: str) -> Optimum:
@@ -244,9 +261,10 @@ class _Work:
         begun = Mesh(np.append(begun.borders[thinned], 1.0))
         return self._with_borders(begun)
 
-    def _with_borders(self, mesh: Mesh) -> list[Mesh]:
-        problem = self.built.problem
-        return [with_corners(with_jumps(mesh, phase), problem, phase) for phase in problem.phases]
+    def _with_borders(self, mesh: Mesh, most: int | None = None) -> list[Mesh]:
+        """The mesh of every phase with borders where inputs jump, and at their corners if these are few."""
+        problem, most = self.built.problem, mesh.elements if most is None else most
+        return [with_corners(with_jumps(mesh, phase), problem, phase, most) for phase in problem.phases]
 
     def solve(self, found: Residuals, w: np.ndarray, weights: Weights) -> np.ndarray | None:
         """Unknowns by Ipopt from unknowns near them; None where it finds none. Raises TimeOver."""

@@ -80,14 +80,12 @@ def _refuse_lost(read: Plan, refined: RefinedFit, optimum: Optimum, inner: list[
     if not inner:
         return
     fit, error = refined.fit, refined.error
-    program, roots = fit.residuals.program, fit.weights.roots[:, None]
+    program, roots = fit.residuals.program, _even(read, fit)
     names = [program.problem.free[k].name for k in inner]
     point = LocalSlopes((fit.jacobian * roots)[:, inner], fit.numbers[inner])
     finer = None if error is None else LocalSlopes((error.jacobian * roots)[:, inner], point.values)
     sizes = fit.sizes[inner]
-    sums = program.problem.sums
-    measured = np.concatenate([s.values / s.deviations for s in sums]) * roots[:, 0]
-    silent = without_influence(point, sizes, float(np.linalg.norm(measured)))
+    silent = without_influence(point, sizes)
     kept = [k for k in range(len(inner)) if k not in silent]
     words = [f"{names[k]} has no influence on what was measured" for k in silent]
     if kept:
@@ -96,7 +94,7 @@ def _refuse_lost(read: Plan, refined: RefinedFit, optimum: Optimum, inner: list[
             point.of(kept),
             sizes[kept],
             None if finer is None else finer.of(kept),
-            lambda: _elsewhere(fit, inner, sizes, kept),
+            lambda: _elsewhere(fit, inner, kept, roots),
         )
     if words:
         remedy = "Leave it out" if len(words) == len(silent) == 1 else "Take one of each as known"
@@ -107,13 +105,21 @@ def _refuse_lost(read: Plan, refined: RefinedFit, optimum: Optimum, inner: list[
         )
 
 
-def _elsewhere(fit: MeshFit, inner: list[int], sizes: np.ndarray, kept: list[int]) -> LocalSlopes | None:
+def _even(read: Plan, fit: MeshFit) -> np.ndarray:
+    """Factors (N, 1) of residuals, by which all outputs count alike: what data tell does not hang on their noise."""
+    sums = fit.residuals.program.problem.sums
+    measured = np.concatenate([s.values / s.deviations for s in sums])
+    sizes = [np.linalg.norm(measured[read.outputs == g]) for g in range(int(np.max(read.outputs)) + 1)]
+    whole = max(sizes) or 1.0
+    return 1.0 / np.array([size or whole for size in sizes])[read.outputs][:, None]
+
+
+def _elsewhere(fit: MeshFit, inner: list[int], kept: list[int], roots: np.ndarray) -> LocalSlopes | None:
     """Slopes with respect to the kept of the inner numbers at another point, a tenth away."""
     numbers = fit.numbers.copy()
-    numbers[inner] += sizes * 0.1 * (1 + np.arange(len(inner)) / len(inner))
+    numbers[inner] += fit.sizes[inner] * 0.1 * (1 + np.arange(len(inner)) / len(inner))
     moved = fit.residuals.on_manifold(fit.w, numbers)
     if moved is None:
         return None
-    roots = fit.weights.roots[:, None]
     values = moved[fit.residuals.program.places.free][inner][kept]
     return LocalSlopes((fit.residuals.jacobian(moved) * roots)[:, inner][:, kept], values)

@@ -180,20 +180,28 @@ class ParameterFit:
                 f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
                 "small, or the model is wrong"
             )
-        if not self.known and self.freedom > 0 and self.noise <= COMPUTED * self._spread:
-            found.append(
-                f"the residuals are {self.noise / self._spread:.1g} of the spread of the data, as those of computed values: "
-                "the deviations are those of rounding, not of measuring"
-            )
-        return tuple(found)
+        return (*found, *self._computed())
 
-    @property
-    def _spread(self) -> float:
-        """Of the measured values, in the deviations of the residuals."""
-        values = np.concatenate(
-            [s.values.ravel(order="F") for e in self.experiments for s in e.measured.values()]
-        )
-        return float(np.sqrt(np.mean((values / self.scales) ** 2)))
+    def _computed(self) -> list[str]:
+        """Words for outputs without deviations that the model meets as closely as only computed values are met."""
+        if self.known or self.freedom <= 0:
+            return []
+        left: dict[str, list[np.ndarray]] = {}
+        whole: dict[str, list[np.ndarray]] = {}
+        for (experiment, name), residual in self.residuals.items():
+            values = next(e for e in self.experiments if e.name == experiment).measured[name].values
+            left.setdefault(name, []).append(residual.ravel())
+            whole.setdefault(name, []).append(values.ravel())
+        parts = {n: np.linalg.norm(np.concatenate(v)) for n, v in left.items()}
+        sizes = {n: np.linalg.norm(np.concatenate(v)) for n, v in whole.items()}
+        names = [n for n in parts if parts[n] <= COMPUTED * sizes[n]]
+        if not names:
+            return []
+        worst = max((parts[n] / sizes[n] for n in names if sizes[n]), default=0.0)
+        return [
+            f"the residuals of {', '.join(names)} are {worst:.1g} of the values, as those of computed data: the deviations "
+            "are those of rounding, not of measuring"
+        ]
 
     def _mesh_words(self) -> list[str]:
         """What the mesh costs, where that matters, and why it was not made finer."""
