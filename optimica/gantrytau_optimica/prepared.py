@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import with_guesses
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Limit
+from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
@@ -23,9 +23,9 @@ from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Pressed, Solver, SolverSettings
+from gantrytau_optimica.solving.moving_points import settled
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.point_functions import places_of_points, share_of
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe
 
@@ -35,9 +35,7 @@ MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
-ROUNDS = 6  # of solving again with points at moving times read from other elements
 
-UNSETTLED = "not settled: values at moving times leave the elements that they are read from"
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
     "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
@@ -207,19 +205,15 @@ class Prepared:
         clock = self._reached.clock
         try:
             solution = solver.solve(program, first, clock)
-            for number in range(ROUNDS):
-                if not solution.success or not program.astray(solution.w):
-                    break
-                program = _relocated(program, solution.w, confined=number == ROUNDS - 1)
-                built = replace(built, problem=program.problem)
-                solution = self._solver(program, solver.settings).solve(program, solution.w, clock)
+            program, solution = settled(
+                program, solution, lambda p, w: self._solver(p, solver.settings).solve(p, w, clock)
+            )
+            built = replace(built, problem=program.problem)
         except Pressed as pressed:
             self._reached.keep(Optimum(built.read.name, built, program, pressed.solution, self.build_time))
             raise
         if solution.success:
             program.require_points(solution.w)
-            if program.astray(solution.w):
-                solution = replace(solution, success=False, status=UNSETTLED)
         optimum = Optimum(built.read.name, built, program, solution, self.build_time)
         self._reached.keep(optimum)
         return optimum
@@ -256,28 +250,6 @@ def solved_or_raise(optimum: Optimum) -> Optimum:
     remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
     ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
     raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
-
-
-def _relocated(program: Program, w: np.ndarray, confined: bool) -> Program:
-    """The program with the points at moving times read from the elements in which they now lie; confined: kept there."""
-    layouts = program.places.layouts
-    borders = [layout.placed(w).borders for layout in layouts]
-    problem = program.problem
-    if confined and not any(layout.knots.size for layout in layouts):
-        now = places_of_points(program.places, w[program.places.free], borders, inside_only=False)
-        rows = [
-            Limit(
-                share_of(problem.phases[one.phase], one.point.time),
-                float(borders[one.phase][one.element]),
-                float(borders[one.phase][one.element + 1]),
-                f"the time of {one.point.symbol} stays within its element",
-            )
-            for one in now
-            if one.place is None and not isinstance(one.point.time, str)
-        ]
-        problem = replace(problem, boundary=(*problem.boundary, *rows))
-    located = (w[program.places.free], borders)
-    return transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme, located)
 
 
 def solution_given(guess: Any) -> bool:
