@@ -1,8 +1,7 @@
 """Blocks without closed form inside a CasADi function: linear ones solved outright, others by Newton's method.
 
-Positions are led from the start to the arguments in a few steps, so that the function stays on the branch where
-the start lies: one Newton iteration over the whole way may end in another way to assemble the mechanism.
-Where there is no solution the results are NaN.
+The unknowns are led from the start to the arguments along one branch, so that the function does not end in another way
+to assemble the mechanism, and are made exact there. Where there is no solution on that branch the results are NaN.
 """
 
 from collections.abc import Sequence
@@ -11,15 +10,23 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.answers.branch_follower import follow
 from gantrytau.compiler.blocks.pivots import Scales, extent
 from gantrytau.compiler.blocks.solution import Block
-from gantrytau.language.symbols import split_derivative
+from gantrytau.language.piecewise import switched
+from gantrytau.language.term_sizes import term_sizes
 
 SINGULAR = 1e-12  # of a matrix with rows and columns of size one: below, rounding decides on the solution
 SIGNS = np.array([1.0, -1.0, -1.0])
 STEPS = 16  # from the start to the arguments
-SOLVED = 1e-8  # residual above which an iteration found nothing
-NEWTON = {"abstol": 1e-13, "abstolStep": 1e-15, "max_iter": 50, "error_on_fail": False}
+SOLVED = 1e-9  # of the terms of an equation, above which an iteration found nothing
+NEWTON = {
+    "abstol": 1e-15,
+    "abstolStep": 0.0,
+    "max_iter": 8,  # from a guess of some digits: more only where rounding does not let it end
+    "error_on_fail": False,
+    "linear_solver_options": {"eps": 0.0},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +63,7 @@ def solved_one_by_one(
         if part.block.scales is not None:
             found = _linear(part, part.block.scales, y, known, values)
         else:
-            positions = all(split_derivative(n)[1] == 0 for n in part.block.unknowns)
-            found = _newton(f"newton{number}", part, y, known, (begin, values), STEPS if positions else 1)
+            found = _newton(f"newton{number}", part, y, known, (begin, values))
         solved, before, begin = (
             ca.vertcat(solved, found),
             ca.vertcat(before, y),
@@ -92,13 +98,39 @@ def one_where(condition: ca.MX) -> ca.MX:
     return ca.if_else(condition, 1.0, ca.MX.nan())
 
 
-def _newton(name: str, part: Implicit, y: ca.SX, known: ca.SX, way: tuple[ca.DM, ca.MX], steps: int) -> ca.MX:
+def _newton(name: str, part: Implicit, y: ca.SX, known: ca.SX, way: tuple[ca.DM, ca.MX]) -> ca.MX:
+    """Solution on the branch of the start by Newton's method, to some roundings of the terms of the equations."""
     residual = ca.Function("residual", [y, known], [part.residual], {"cse": True})
-    solve = ca.rootfinder(name, "fast_newton", residual, NEWTON)
     begin, end = way
-    found = ca.MX(part.start)
-    for step in range(1, steps + 1):
-        share = step / steps
-        values = end if step == steps else ca.MX(begin) + share * (end - begin)
-        found = solve(found, values)
-    return found * one_where(ca.sumsqr(residual(found, end)) <= SOLVED**2)
+    if switched([part.residual], {leaf.name() for leaf in y.elements()}).switches:
+        near, arrived = _in_steps(name, residual, part.start, begin, end), ca.MX(1)
+    else:
+        near, arrived = follow(f"follow_{name}", residual, part.start, begin, end)
+    rows, columns = _sizes(part.residual, y, known)(near, end)
+    sizes = ca.SX.sym("rows", y.numel()), ca.SX.sym("columns", y.numel())
+    z, at = ca.SX.sym("z", y.numel()), ca.SX.sym("at", known.numel())
+    scaled = residual(z * sizes[1], at) / sizes[0]
+    scaled = ca.Function("scaled", [z, ca.vertcat(at, *sizes)], [scaled], {"cse": True})
+    given = ca.vertcat(end, rows, columns)
+    found = ca.rootfinder(name, "fast_newton", scaled, NEWTON)(near / columns, given)
+    holds = ca.logic_and(arrived, ca.sumsqr(scaled(found, given)) <= SOLVED**2)
+    return found * columns * one_where(holds)
+
+
+def _sizes(residual: ca.SX, y: ca.SX, known: ca.SX) -> ca.Function:
+    """(y, known) -> sizes of the terms of equations, and units of unknowns in which the Jacobian has columns of size one."""
+    size = y.numel()
+    rows = ca.vertcat(*(ca.if_else(terms > 0, terms, 1.0) for terms in term_sizes(residual.elements())))
+    matrix = ca.densify(ca.jacobian(residual, y))
+    columns = [1 / extent((matrix[:, j] / rows).T, np.ones(size)) for j in range(size)]
+    options = {"cse": True, "is_diff_out": [False, False]}
+    return ca.Function("sizes", [y, known], [rows, ca.vertcat(*columns)], options)
+
+
+def _in_steps(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca.MX) -> ca.MX:
+    """Newton's method from one of some points on the way to the next, for equations whose slopes jump."""
+    solve = ca.rootfinder(f"steps_{name}", "fast_newton", residual, {**NEWTON, "max_iter": 50})
+    found = ca.MX(start)
+    for share in np.linspace(0, 1, STEPS + 1)[1:]:
+        found = solve(found, ca.MX(begin) + share * (end - begin))
+    return found
