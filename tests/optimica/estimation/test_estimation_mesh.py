@@ -2,6 +2,7 @@
 
 import signal
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,7 +51,8 @@ def through_corners(a: np.ndarray, b: np.ndarray, times: np.ndarray, values: np.
     """x' = a x + b u from x = 0 at the times of u, which is joined by straight lines: exact, by exponentials, (n, m)."""
     from scipy.linalg import expm
 
-    m, found = b.size, [np.zeros(b.size)]
+    m = b.size
+    found: list[Any] = [np.zeros(m)]
     for k, step in enumerate(np.diff(times)):
         whole = np.zeros((m + 2, m + 2))  # of x, u and its slope
         whole[:m, :m], whole[:m, m], whole[m, m + 1] = a, b, 1.0
@@ -73,7 +75,7 @@ def test_inputs_with_corners_that_are_no_borders_of_the_default_mesh():
     fit = estimate(Filter, {"T": 0.1}, experiment)
     assert fit.parameters["T"] == pytest.approx(0.05, rel=1e-7)
     within(fit, {"T": 0.05})
-    assert "as those of computed values" in fit.warnings[0]
+    assert "as those of computed data" in fit.warnings[0]
 
 
 def test_the_current_of_two_stages_tells_all_four_numbers():
