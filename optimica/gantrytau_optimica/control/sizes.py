@@ -318,11 +318,12 @@ def _aims(problem: ControlProblem) -> np.ndarray:
         value, _ = _along(problem, phase, ca.vertcat(slope, curvature), SHARES)
         found[first : first + len(phase.signals)] = _steps(*np.split(value, 2))
     points = _points(problem)
-    arguments = [points.symbols, problem.numbers, *(one.symbol for one in problem.sums)]
+    sums = {one.symbol.element_hash(): one.symbol for one in problem.sums}  # of a vector they share one symbol
+    arguments = [points.symbols, problem.numbers, *sums.values()]
     function = ca.Function(
         "steepness", arguments, list(map(ca.densify, _steepness(problem.objective, points.symbols)))
     )
-    values = function(points.values, [n.guess for n in problem.free], *(0.0 for _ in problem.sums))
+    values = function(points.values, [n.guess for n in problem.free], *(0.0 for _ in sums))
     steps = _steps(*(_finite(np.array(x).ravel()) for x in values))
     with np.errstate(divide="ignore"):
         each = np.where(points.slopes > 0, steps[:, None] / points.slopes, np.nan)
