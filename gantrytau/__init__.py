@@ -6,6 +6,7 @@ from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
 from gantrytau.answers.linearization import Linearization, linearize
 from gantrytau.dae import Dae, translate
 from gantrytau.errors import (
+    DoubtfulResult,
     GantryTauError,
     InitializationError,
     ModelError,
@@ -66,6 +67,7 @@ __all__ = [
     "Dae",
     "Declared",
     "Diagnosis",
+    "DoubtfulResult",
     "Fixed",
     "FlatModel",
     "Flow",

@@ -69,6 +69,10 @@ class SolveError(GantryTauError):
         return isinstance(self.__context__, KeyboardInterrupt) or status == "interrupted"
 
 
+class DoubtfulResult(UserWarning):
+    """A result holds values that are no numbers, or beyond all measure; the message names them and their first time."""
+
+
 def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     """The closest of `names` as a question that ends a message, or what there is if none is close.
 

@@ -1,10 +1,13 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and picture_output."""
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau import SolveError
+from gantrytau import DoubtfulResult, SolveError
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
@@ -20,7 +23,7 @@ from gantrytau.commands.arguments.options import (
 )
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing import picture_output, result_output
-from gantrytau.commands.printing.reporting import as_json, busy, reporting
+from gantrytau.commands.printing.reporting import as_json, busy, note, reporting
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
@@ -57,14 +60,16 @@ def simulate(
         place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
         dae = _translated(chosen, drawn)
+        told: list[str] = []
         try:
-            result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
+            with _heard(told, json):
+                result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
         files = result_output.save(result, output)
         if place:
             files += picture_output.draw(result, drawn, place)
-        summary = _summary(chosen, dae, result, files)
+        summary = {**_summary(chosen, dae, result, files), "warnings": told}
         if json:
             typer.echo(as_json(summary))
         else:
@@ -81,6 +86,24 @@ def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
     for name in drawn:
         dae.expand(name)
     return dae
+
+
+@contextmanager
+def _heard(told: list[str], json: bool) -> Iterator[None]:
+    """While it lasts, what a simulation warns of is kept, and printed beside the answer."""
+
+    def hear(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if not issubclass(category, DoubtfulResult):
+            show(message, category, *where, **more)
+            return
+        told.append(str(message))
+        if not json:
+            note(f"Note: {message}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", DoubtfulResult)
+        show, warnings.showwarning = warnings.showwarning, hear
+        yield
 
 
 def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":

@@ -69,11 +69,19 @@ class Coordinates:
         return bool(self.sampled or self.held or len(self.switches))
 
     def integrator(
-        self, count: int, tolerance: float, *, size: float = 1.0, steps: int = 100_000, compiled: bool = False
+        self,
+        count: int,
+        tolerance: float,
+        *,
+        size: float = 1.0,
+        steps: int = 100_000,
+        modes: Sequence[float] = (),
+        compiled: bool = False,
     ) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
 
-        size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end.
+        size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
+        it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -88,7 +96,10 @@ class Coordinates:
             t, h, begin = p[0] + p[1] * tau, p[1], p[0]
         old = ca.vertcat(time, self.t0, self.w)
         new = ca.vertcat(t, begin, w)
-        ode, algebraic = ca.cse(ca.substitute([h * self.ode, self.algebraic], [old], [new]))
+        own = self.w[self.w.numel() - len(modes) :]
+        equations = ca.substitute([self.ode, self.algebraic], [own], [ca.SX(ca.DM(modes))]) if modes else None
+        rates, rest = equations or (self.ode, self.algebraic)
+        ode, algebraic = ca.cse(ca.substitute([h * rates, rest], [old], [new]))
         # an integrator needs a state: a model without one gets a constant
         x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
         problem = {"t": tau, "x": x, "p": p, "u": u, "ode": ode}
@@ -130,6 +141,21 @@ class Coordinates:
         modes = self.pieces.numbers({**found, time.name(): t})
         own = np.array([modes[turn.mode.name()] for turn in self.switches.turns])
         return x, np.array([found[n] for n in self.algebraics]), own
+
+    def not_finite(self, point: Point, step: float) -> list[str]:
+        """Names of what has no finite value at a point, or where its rates lead within a time, s."""
+        arguments = [self.x, self.z, time, self.t0, self.w]
+        function = ca.Function("rates", arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
+        x, z, t, w = point
+        rates = np.array(function(x, z, t, t, w)[0]).ravel()
+        for share in (0.0, 1e-6, 1e-3, 1.0):
+            there = x + share * step * np.nan_to_num(rates)
+            found = [np.array(f).ravel() for f in function(there, z, t + share * step, t, w)]
+            names = [*(derivative_name(n, 1) for n in self.states), *self.algebraics]
+            bad = np.flatnonzero(~np.isfinite(np.concatenate(found)))
+            if bad.size:
+                return [self.dae.spoken(names[k]) for k in bad]
+        return []
 
     @cached_property
     def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:

@@ -10,7 +10,7 @@ from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
@@ -19,6 +19,8 @@ from gantrytau.simulation.singular_poses import Approach, Look, Point, approach,
 from gantrytau.simulation.trail import LEAST_STEPS, Trail
 
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
+FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
+REST = 10.0  # times the tolerance: what may be left of a margin
 GROWTH = 10  # of a stretch in which nothing has switched
 STEPS_BETWEEN = (
     8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
@@ -68,7 +70,7 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if count == 1:
+                    if count == 1 and not self._nearer():
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
@@ -155,6 +157,32 @@ class Run:
         trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
         trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self._margins(*self._columns(np.array([k]))))
+
+    def _nearer(self) -> bool:
+        """Whether something is about to switch where the integration fails: then the next place is laid nearer.
+
+        Where no more than the tolerance is left of a margin, the states are put just behind it.
+        """
+        switches, trail, k = self.coordinates.switches, self.trail, self.done
+        if not len(switches):
+            return False
+        margins = self._margins(*self._columns(np.array([k])))
+        gaps = switches.gaps(margins, self._modes(k))
+        left, rates, scale = (a[0] for a in (gaps.values, gaps.rates, gaps.noise / ROUNDING))
+        h = trail.t[k + 1] - trail.t[k]
+        closing = (rates < 0) & (left <= -FORESIGHT * h * rates)
+        if not closing.any():
+            return False
+        close = closing & (left <= REST * self.integrators.tolerance * scale)
+        if not close.any():
+            if h > SHORT**2 * self.span:
+                trail.insert(k, np.array([trail.t[k] + h / 2]))
+            return bool(h > SHORT**2 * self.span)
+        for gap in np.flatnonzero(close):
+            trail.x[k] = switches.behind(int(gap), self._point(k), self._modes(k), self.sizes)
+        self.integrators.by_modes = True
+        self._turn(by_states=True)
+        return True
 
     def _count(self, modes: np.ndarray, before: np.ndarray) -> None:
         """SolveError if states made something switch too often."""
@@ -289,7 +317,9 @@ class Run:
         found = self._approach()
         if self._weakest(found.point):
             return self._singular_pose(found)
-        return run_ends.stopped(self.coordinates.dae, found.point[2], error)
+        step = float(self.trail.t[min(self.done + 1, self.trail.last)]) - found.point[2]
+        endless = self.coordinates.not_finite(found.point, step)
+        return run_ends.stopped(self.coordinates.dae, found.point[2], error, endless)
 
     def _conditions(self, switches: np.ndarray) -> list[str]:
         """What some switches ask for, in the model's words."""

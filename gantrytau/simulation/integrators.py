@@ -17,13 +17,13 @@ WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it en
 class Integrators:
     """Integrators over some numbers of intervals, made when they are needed.
 
-    size: of algebraics, below which their errors do not count.
+    size: of algebraics, below which their errors do not count; by_modes: whether each choice of modes has its own.
     """
 
     def __init__(self, coordinates: Coordinates, tolerance: float):
         self.coordinates, self.tolerance = coordinates, tolerance
-        self.size = 1.0
-        self._made: dict[tuple[int, int], ca.Function] = {}
+        self.size, self.by_modes = 1.0, False
+        self._made: dict[tuple[int, int, tuple[float, ...]], ca.Function] = {}
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -61,12 +61,16 @@ class Integrators:
         self, count: int, most: int, x: np.ndarray, z: np.ndarray, p: Any, u: Any
     ) -> tuple[np.ndarray, np.ndarray]:
         """One call of an integrator, which else writes its complaints to the screen."""
-        if (count, most) not in self._made:
-            made = self.coordinates.integrator(count, self.tolerance, size=self.size, steps=most)
-            self._made[count, most] = made
+        own = len(self.coordinates.switches) if self.by_modes else 0
+        modes = tuple(np.reshape(u, (-1, count), order="F")[-own:, 0].tolist()) if own else ()
+        key = count, most, modes
+        if key not in self._made:
+            self._made[key] = self.coordinates.integrator(
+                count, self.tolerance, size=self.size, steps=most, modes=modes
+            )
         with contextlib.redirect_stderr(io.StringIO()):
-            found = self._made[count, most](x0=x if x.size else 0.0, z0=z, p=p, u=u)
-        self.steps = int(self._made[count, most].stats()["nsteps"])
+            found = self._made[key](x0=x if x.size else 0.0, z0=z, p=p, u=u)
+        self.steps = int(self._made[key].stats()["nsteps"])
         reached = np.array(found["xf"]).T if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")

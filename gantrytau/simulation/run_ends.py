@@ -55,8 +55,17 @@ def sampled_badly(dae: Translated, t: float, name: str) -> SolveError:
     )
 
 
-def stopped(dae: Translated, t: float, error: Exception) -> SolveError:
-    """The integrator gives up at time t."""
+def stopped(dae: Translated, t: float, error: Exception, endless: Sequence[str]) -> SolveError:
+    """The integrator gives up at time t; endless: what has no finite value there, or just behind."""
+    if endless:
+        shown = ", ".join(endless[:4]) + (", ..." if len(endless) > 4 else "")
+        return SolveError(
+            f"{dae.name}: the integration stopped at t = {t:.6g} s: behind it {shown} "
+            f"{'is' if len(endless) == 1 else 'are'} not finite. Look in what it follows from for a root or a logarithm of "
+            "a number that becomes negative, or a division by zero; .result holds what was computed",
+            time=t,
+            equations=_origins(dae, endless),
+        )
     reason = next(
         (words for sign, words in REASONS.items() if sign in str(error)), str(error).splitlines()[-1]
     )
@@ -67,6 +76,12 @@ def stopped(dae: Translated, t: float, error: Exception) -> SolveError:
         time=t,
         equations=[],
     )
+
+
+def _origins(dae: Translated, names: Sequence[str]) -> list[str]:
+    """The equations that give variables."""
+    found = [o.equations for o in dae.origins if {dae.spoken(n) for n in (*o.tears, *o.inner)} & set(names)]
+    return list(dict.fromkeys(e for equations in found for e in equations))
 
 
 def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:

@@ -4,6 +4,7 @@ The integrator sees every coordinate, not a choice of independent ones, so it ca
 that only the choice makes. Constraints and their derivatives are kept by projecting onto them.
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,7 +15,7 @@ from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
-from gantrytau.errors import ModelError, SolveError
+from gantrytau.errors import DoubtfulResult, ModelError, SolveError
 from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
@@ -22,7 +23,7 @@ from gantrytau.results.result import Result
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal, read_signals
-from gantrytau.simulation.to_result import result_of
+from gantrytau.simulation.to_result import doubts, result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
 OFTEN = 1e-2  # of that, where the integrator starts anew at hundreds of instants, in steps of first order
@@ -47,7 +48,8 @@ def simulate(
     parameters: name -> value; outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the
     integrator gets a tenth, and errors of long motions add up); points: of the result.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
-    when there is no consistent start, ModelError for wrong names and values.
+    when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
+    that are not finite although the states are.
     """
     _check(start, stop, tolerance, points)
     dae = model if isinstance(model, Translated) else translate_model(model)
@@ -77,7 +79,11 @@ def simulate(
             time=float(reached[0][-1]),
             result=result_of(coordinates, signals, *reached, outputs),
         ) from None
-    return result_of(coordinates, signals, *run.so_far(), outputs)
+    result = result_of(coordinates, signals, *run.so_far(), outputs)
+    doubt = doubts(result)
+    if doubt:
+        warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
+    return result
 
 
 def _check(start: float, stop: float, tolerance: float, points: int) -> None:

@@ -12,6 +12,9 @@ from gantrytau.results.result import Result
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal
 
+HUGE = 1e100  # no quantity is that large
+SHOWN = 4  # names in a warning
+
 
 def result_of(
     coordinates: Coordinates,
@@ -43,6 +46,25 @@ def result_of(
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
     units, words = labels(dae)
     return Result(times, table, units=units, descriptions=words, title=dae.name)
+
+
+def doubts(result: Result) -> str:
+    """What is to be said of values that are not finite or huge, "" if there are none."""
+    found = []
+    for name in result.names:
+        values = result[name]
+        wrong = values.size and not np.max(np.abs(values)) < HUGE  # NaN is not below either
+        if wrong:
+            k = int(np.flatnonzero(~(np.abs(values) < HUGE))[0])
+            what = "not finite" if not np.isfinite(values[k]) else f"beyond {HUGE:g}"
+            found.append(f"{name} is {what} from t = {result.time[k]:.6g} s on")
+    if not found:
+        return ""
+    rest = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+    return (
+        f"{'; '.join(found[:SHOWN])}{rest}: look in what gives it for a root or a logarithm of a number that becomes "
+        "negative, or a division by zero"
+    )
 
 
 def _names(dae: Translated, outputs: Sequence[str] | None) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import (
+    DoubtfulResult,
     Input,
     Model,
     Parameter,
@@ -20,6 +21,7 @@ from gantrytau import (
     if_else,
     simulate,
     sin,
+    sqrt,
     time,
     translate,
 )
@@ -282,3 +284,58 @@ def test_a_switch_that_stays_on_one_side_changes_nothing():
 
     found = simulate(Bent(), stop=5.0, tolerance=TOLERANCE)
     np.testing.assert_allclose(found["x"], np.cos(found.time), atol=100 * TOLERANCE)
+
+
+class Emptying(Model):
+    """A tank with a hole: h = (1 - t / 2)^2 until it is empty at 2 s."""
+
+    h = Real(start=1.0, fixed=True)
+
+    def equations(self):
+        yield der(self.h) == -sqrt(casadi.fmax(self.h, 0))
+
+
+@pytest.mark.parametrize("points", [2, 11, 501])
+def test_a_motion_that_comes_to_rest_on_a_switch_goes_on(points):
+    found = simulate(Emptying(), stop=4.0, points=points)
+    np.testing.assert_allclose(found["h"], np.maximum(1 - found.time / 2, 0) ** 2, atol=3e-8)
+
+
+def test_a_root_that_is_left_names_what_is_not_finite():
+    class Left(Model):
+        h = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield der(self.h) == -sqrt(self.h)
+
+    with pytest.raises(
+        SolveError, match=r"stopped at t = 2 s: behind it der\(h\) is not finite\. Look"
+    ) as caught:
+        simulate(Left(), stop=4.0)
+    assert "the model (Left), equation 1" in caught.value.equations
+    assert "grow beyond" not in str(caught.value)
+
+
+def test_what_is_not_finite_is_told_with_its_first_time():
+    class Root(Model):
+        x = Real(start=1.0, fixed=True)
+        y = Real()
+
+        def equations(self):
+            yield der(self.x) == -1.0
+            yield self.y == sqrt(self.x - 0.5)
+
+    with pytest.warns(DoubtfulResult, match=r"Root: y is not finite from t = 0\.51 s on: look"):
+        found = simulate(Root(), stop=1.0, points=101)
+    assert np.isfinite(found["x"]).all()
+
+
+def test_what_is_huge_is_told():
+    class Huge(Model):
+        x = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == 300 * self.x
+
+    with pytest.warns(DoubtfulResult, match=r"x is beyond 1e\+100 from t = 0\.77 s on"):
+        simulate(Huge(), stop=1.0, points=101)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
+from gantrytau.simulation.singular_poses import Point
 
 ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
 
@@ -52,6 +53,7 @@ class Switches:
             change = ca.jacobian(algebraic, time) + (ca.jacobian(algebraic, x) @ ode if x.numel() else 0)
             found += [by_z, ca.jacobian(algebraic, z), change]
         dense = [ca.densify(e) for e in found]
+        self._slopes = ca.Function("slopes", list(arguments), [ca.densify(by_x)])
         self._look = ca.Function("margins", [*arguments, self._size], dense, {"cse": True})
 
     def __len__(self) -> int:
@@ -74,6 +76,7 @@ class Switches:
                 np.linalg.LinAlgError
             ):  # what a margin loses by this is found in more steps
                 rates -= (by_z @ np.linalg.solve(inner, np.broadcast_to(change, (places, m, 1))))[:, :, 0]
+        rates = np.nan_to_num(rates, posinf=0.0, neginf=0.0)  # not finite: what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
         return Margins(values, rates, noise)
 
@@ -103,6 +106,14 @@ class Switches:
             np.hstack([margins.noise, margins.noise[:, counts]]),
         )
 
-    def of_gap(self, gap: int) -> int:
-        """Which switch a column of gaps belongs to."""
-        return gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
+    def behind(self, gap: int, point: Point, modes: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """The states moved by the shortest way to just behind where a gap is zero."""
+        x, z, t, w = point
+        index = gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
+        slopes = np.array(self._slopes(x, z, t, t, w))[index]
+        for _ in range(2):
+            margins = self.look(x[None], z[None], np.array([t]), w[None], size)
+            left = self.gaps(margins, modes)
+            sign = 1.0 if gap >= len(self) or not (self._counts[index] or modes[index]) else -1.0
+            x = x + sign * slopes * (left.values[0, gap] + 2 * left.noise[0, gap]) / (slopes @ slopes)
+        return x
