@@ -124,6 +124,7 @@ def _close(
         values,
         held=guess.fixed,
         started=guess.started,
+        chosen=guess.chosen,
         title=title,
         thorough=True,
     )
@@ -176,7 +177,7 @@ def _poses(
     found: list[dict[str, float]] = []
     random = np.random.default_rng(0)
     names = constraints.moving
-    loose = replace(guess, fixed=frozenset(), started=frozenset())
+    loose = replace(guess, fixed=frozenset(), started=frozenset(), chosen=frozenset())
     here = dict(closed)
     for _ in range(POSES):
         _, sizes, right = np.linalg.svd(_matrix(constraints, here))

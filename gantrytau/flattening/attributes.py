@@ -83,6 +83,7 @@ def _common(placed: Placed) -> dict[str, Any]:
         description=attributes["description"].value if "description" in attributes else "",
         start=expression(placed, "start") if "start" in attributes else None,
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
+        chosen=placed.chosen,
         owner=placed.path,
         free=getattr(placed.declaration, "free", False),
         undetermined=attributes["undetermined"].value,

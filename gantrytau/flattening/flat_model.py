@@ -19,8 +19,8 @@ class FlatVariable:
 
     name: dotted path; shape: (), (n,) or (n, m); elements: names of its scalars, column after column;
     symbol: its SX; start, min, max: SX expressions of parameters per scalar, or None (no opinion);
-    model: class that declares it; owner: path of the component or connector that holds it; undetermined: the likely
-    cause where the equations do not determine it.
+    chosen: whether its start is said by whoever uses the model, not by its author; owner: path of the component or
+    connector that holds it; undetermined: the likely cause where the equations do not determine it.
     """
 
     name: str
@@ -32,6 +32,7 @@ class FlatVariable:
     description: str
     start: tuple[ca.SX, ...] | None = None
     fixed: bool = False
+    chosen: bool = False
     min: tuple[ca.SX, ...] | None = None
     max: tuple[ca.SX, ...] | None = None
     nominal: tuple[ca.SX, ...] | None = None

@@ -1,6 +1,7 @@
 """From an inert model to one whose members are symbols: modifications applied, paths given, symbols made."""
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -49,6 +50,7 @@ class Placed:
     symbol: ca.SX
     attributes: dict[str, Leaf]
     elements: list[str] = field(default_factory=list)
+    chosen: bool = False  # whether the start is said by whoever uses the model
 
 
 @dataclass(eq=False)
@@ -85,7 +87,7 @@ def instantiate(model: Model) -> Instance:
         model = _made(model)
     if not isinstance(model, Model):
         raise ModelError(f"found {type(model).__name__}, expected a Model (an instance, or its class)")
-    builder = _Builder()
+    builder = _Builder(model.chosen_starts)
     root = builder.build(model, "", {}, None, [])
     builder.resolve_outers()
     return Instance(
@@ -94,7 +96,8 @@ def instantiate(model: Model) -> Instance:
 
 
 class _Builder:
-    def __init__(self) -> None:
+    def __init__(self, chosen: frozenset[str]) -> None:
+        self.chosen = chosen
         self.symbols = Symbols()
         self.quantities: list[Placed] = []
         self.components: list[tuple[str, Any]] = []
@@ -106,7 +109,7 @@ class _Builder:
         cls = type(template)
         instance = cls.__new__(cls)
         for name, value in vars(template).items():
-            if name == "_modifications":
+            if name in ("_modifications", "_chosen_starts"):
                 continue
             refuse_container(f"{path or cls.__name__}.{name}", value)
             if isinstance(value, (Declared, Quantity, Array)):
@@ -211,7 +214,8 @@ class _Builder:
         vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
         symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
         instance.__dict__[name] = symbol
-        self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names))
+        chosen = full in self.chosen or re.sub(r"\[\d+\]", "", full) in self.chosen
+        self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names, chosen))
 
     def resolve_outers(self) -> None:
         for instance, name, wanted, around in self.outers:

@@ -5,7 +5,7 @@ An instance remembers its modifications and nothing else; `gantrytau.flattening.
 
 import copy
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self, TypeGuard
 
 from gantrytau.errors import ModelError, did_you_mean
@@ -55,6 +55,7 @@ class Declared(_Part):
                 f"{type(self).__name__}: found {defaults!r} without a name, expected keywords, as {example}"
             )
         self._modifications = merge(dict(defaults or {}), modifications)
+        self._chosen_starts = frozenset(_starts(modifications))
         for name in self._modifications:
             check_member(type(self), name, type(self).__name__)
 
@@ -63,6 +64,11 @@ class Declared(_Part):
         """What was modified, by name."""
         return self._modifications
 
+    @property
+    def chosen_starts(self) -> frozenset[str]:
+        """Names of variables whose start values whoever uses the class said, not its author; `carts.s` are all of them."""
+        return self._chosen_starts
+
     @classmethod
     def open(cls, **modifications: Any) -> Self:
         """A component for a class body whose `__init__` gives it its values: its own `__init__` is left out."""
@@ -70,12 +76,16 @@ class Declared(_Part):
         Declared.__init__(found, **modifications)
         return found
 
-    def modified(self, modifications: Mapping[str, Any]) -> Self:
-        """The same with further modifications; ModelError for a name that is not declared."""
+    def modified(self, modifications: Mapping[str, Any], starts: Iterable[str] | None = None) -> Self:
+        """The same with further modifications; ModelError for a name that is not declared.
+
+        starts: names of variables of which they say the start values, where not all of them do.
+        """
         for name in modifications:
             check_member(type(self), name, type(self).__name__)
         found = copy.copy(self)
         found._modifications = merge(dict(self._modifications), modifications)
+        found._chosen_starts |= frozenset(_starts(modifications) if starts is None else starts)
         return found
 
     @classmethod
@@ -164,6 +174,20 @@ def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
             value = [merge(dict(a), value) if isinstance(a, Mapping) else value for a in old]
         merged[name] = value
     return merged
+
+
+def _starts(modifications: Mapping[str, Any], path: str = "") -> Iterator[str]:
+    """Dotted names of the variables whose start values are modified."""
+    for key, value in modifications.items():
+        name = f"{path}{key}"
+        if isinstance(value, Start) or (isinstance(value, Mapping) and "start" in value):
+            yield name
+        elif isinstance(value, Mapping):
+            yield from _starts(value, f"{name}.")
+        elif isinstance(value, Declared):
+            yield from (f"{name}.{inner}" for inner in value.chosen_starts)
+        elif _elementwise(value):
+            yield from _starts({f"{name}[{k}]": item for k, item in enumerate(value)})
 
 
 def _attributes(value: Any) -> Any:

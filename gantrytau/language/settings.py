@@ -26,7 +26,9 @@ def with_setting(model: Part, name: str, value: Any) -> Part:
     name: `m`, `carts[0].m`, `carts.m` (of all carts), `x.start`. ModelError for what cannot be set.
     """
     try:
-        return _changed(model, _steps(name), value, type(model).__name__)
+        steps = _steps(name)
+        changed = _modified(type(model), model.modifications, {}, steps, value, type(model).__name__)
+        return model.modified(changed, [name.removesuffix(".start")] if steps[-1] == "start" else ())
     except ModelError as error:
         raise ModelError(f"{name}: {error}") from error
 

@@ -17,6 +17,7 @@ from gantrytau import (
     connect,
     der,
     translate,
+    with_setting,
 )
 from gantrytau.mechanics import multibody, translational
 from gantrytau_models import FourBar
@@ -133,3 +134,16 @@ def test_bounds_do_not_erase_a_start():
 def test_what_would_be_lost_is_refused(build, words):
     with pytest.raises(ModelError, match=words):
         build()
+
+
+@pytest.mark.parametrize("phi", [0.5, 1.3, 2.0])
+def test_a_start_that_is_given_is_kept_before_those_of_the_model(phi):
+    """The bars have starts of their own, to which the crank does not fit; it comes from outside and stays."""
+    for model in (
+        FourBar(crank=dict(phi=Start(phi))),
+        FourBar().modified(dict(crank=dict(phi=Start(phi)))),
+        with_setting(FourBar(), "crank.phi.start", phi),
+    ):
+        dae = translate(model)
+        assert dae.start["crank.phi"] == phi
+        assert "crank.phi" not in {m.name for m in dae.diagnosis.moved}

@@ -96,21 +96,28 @@ def solve_levels(
     held: frozenset[str],
     started: frozenset[str],
     title: str,
+    chosen: frozenset[str] = frozenset(),
     thorough: bool = False,
 ) -> dict[str, float]:
     """Values that satisfy all levels, nearest to the given ones.
 
     values: a number for every symbol that occurs; held: names that must not move; started: names whose
-    number somebody gave; thorough: if they do not lead to a solution, try others around them. Raises
-    InitializationError with the worst residuals by name.
+    number somebody gave; chosen: of these those that are kept before the others; thorough: if they do not lead to a
+    solution, try others around them. Raises InitializationError with the worst residuals by name.
     """
     values = dict(values)
     for level in levels:
         moving = [n for n in level.unknowns if n not in held]
         if level.residuals:
             free = [n for n in moving if n not in started]
-            try:  # starts that fit together are held
-                _solve(level, free, values, started, title)
+            looser = [n for n in moving if n not in chosen]
+            try:  # starts that fit together are held, or else those that whoever uses the model chose
+                try:
+                    _solve(level, free, values, started, title)
+                except InitializationError:
+                    if not len(free) < len(looser) < len(moving):
+                        raise
+                    _solve(level, looser, values, started, title)
             except InitializationError:
                 try:
                     (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)

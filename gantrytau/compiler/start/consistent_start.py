@@ -27,7 +27,13 @@ def consistent_start(
     started, thorough = guess.started | held, not held
     try:
         values = solve_levels(
-            stages, guess.values, held=fixed, started=started, title=title, thorough=thorough
+            stages,
+            guess.values,
+            held=fixed,
+            started=started,
+            chosen=guess.chosen,
+            title=title,
+            thorough=thorough,
         )
     except InitializationError as error:
         if held or not guess.fixed:

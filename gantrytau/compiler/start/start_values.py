@@ -14,17 +14,21 @@ from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 
 @dataclass(frozen=True, eq=False)
 class StartValues:
-    """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold."""
+    """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold.
+
+    chosen: of the started those that whoever uses the model gave, not its author: they are kept before the others.
+    """
 
     values: Mapping[str, float]
     started: frozenset[str]
     fixed: frozenset[str]
+    chosen: frozenset[str] = frozenset()
 
 
 def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> StartValues:
     """Start attributes carried over to the symbols of the reduced equations."""
     table, values = reduced.table, dict.fromkeys(symbols, 0.0)
-    owners: dict[str, tuple[bool, int]] = {}
+    owners: dict[str, tuple[bool, bool, int]] = {}
     fixed: dict[str, str] = {}
     for variable in flat.variables:
         if variable.start is None:
@@ -37,7 +41,8 @@ def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> Start
         values[event.name] = _own_start(flat, table, event.name)
     values.update(table.values)
     values[flat.time.name()] = 0.0
-    return StartValues(values, frozenset(owners), frozenset(fixed))
+    chosen = frozenset(n for n, (_, by_author, _) in owners.items() if not by_author)
+    return StartValues(values, frozenset(owners), frozenset(fixed), chosen)
 
 
 def _own_start(flat: FlatModel, table: ParameterTable, name: str) -> float:
@@ -71,7 +76,7 @@ def _place(
             "it is an alias; "
             "release one with Start(...) instead of Fixed(...)"
         )
-    rank = (not variable.fixed, name.count("."))
+    rank = (not variable.fixed, not variable.chosen, name.count("."))
     if symbol not in owners or rank < owners[symbol]:
         owners[symbol] = rank
         values[symbol] = value
