@@ -12,6 +12,7 @@ from gantrytau_optimica.answers.archive.run_record import require_place, write_r
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.controls import read_controls
+from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.failures.dependence import check_freedom
 from gantrytau_optimica.policy import Guesses, Policy, PolicyKeywords, policy_of
 from gantrytau_optimica.prepared import Prepared, parameter_names, read_guesses, solution_given
@@ -115,6 +116,8 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     if policy.refine is not None or (policy.mesh.moving and policy.points > 1):
         # free borders would be moved to where limits are passed
         built = replace(built, problem=with_ramps(built.problem, meshes))
+    elif policy.points > 1 and not policy.shooting:
+        built = replace(built, problem=with_ramped_rates(built.problem))
     program = (
         shoot(built.problem, meshes, policy.points)
         if policy.shooting

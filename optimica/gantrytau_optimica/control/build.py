@@ -25,6 +25,7 @@ from gantrytau_optimica.control.control_problem import (
     Signal,
 )
 from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess
+from gantrytau_optimica.control.input_rates import Rates, check_pieces, input_rates, lifted
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
 from gantrytau_optimica.control.sizes import with_sizes
 from gantrytau_optimica.problem.model_words import algebraic_words
@@ -47,7 +48,10 @@ def build(
     chosen = _free_numbers(dae, guess, held)
     open_names = {n.name for n in chosen}
     numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
-    conditions = (start_conditions(dae), link_conditions(read))
+    mentioned = [*system.to_system(_statements(read)), system.ode, system.residuals]
+    rates = input_rates(read, mentioned)
+    check_pieces(read, rates, controls or {})
+    conditions = (start_conditions(dae), link_conditions(read, rates))
     points = (*read.points, *(p for more, _ in conditions for p in more))
     constraints = (*read.constraints, *(c for _, more in conditions for c in more))
     limits = (*constraints, *_declared_limits(dae))
@@ -60,7 +64,7 @@ def build(
     times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
     objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
     ode, residuals = with_values([system.ode, system.residuals], read, numbers)
-    split = _Split(read, system, ode, residuals, dict(controls or {}))
+    split = _Split(read, system, ode, residuals, dict(controls or {}), rates)
     phases = []
     for k, stage in enumerate(read.phases):
         integrand, start_time, final_time = resolve([stage.integrand, stage.start_time, stage.final_time])
@@ -88,6 +92,14 @@ def build(
     forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
     built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
     return replace(built, problem=with_sizes(with_guesses(built, guess)))
+
+
+def _statements(read: SymbolicProblem) -> list[ca.SX]:
+    """All expressions of the problem beside the model, in reduced symbols."""
+    found = [read.objective, *(phase.integrand for phase in read.phases)]
+    found += [e for c in read.constraints for e in (c.expression, c.lower, c.upper)]
+    found += [one.expression for one in (*read.points, *read.targets)]
+    return [read.dae.to_reduced(ca.SX(e)) for e in found]
 
 
 def _check_courses(read: SymbolicProblem, number: int, phase: Phase) -> None:
@@ -135,6 +147,7 @@ class _Split:
     ode: ca.SX
     residuals: ca.SX
     controls: dict[str, Pieces]
+    rates: Rates
 
     def phase(self, number: int) -> Phase:
         """The dynamics of one phase; its times, costs and points are still missing."""
@@ -142,12 +155,14 @@ class _Split:
         nominal = {n: x for v in self.read.dae.flat.variables for n, x in _nominals(v, self.read.dae)}
         states = [k for k, name in enumerate(system.states) if self._owner(name) == number]
         algebraics = [k for k, a in enumerate(system.algebraics) if self._owner(a.name) == number]
-        inputs, courses = [], []
+        inputs, courses, moved = [], [], []
         for name, symbol in zip(system.inputs, system.u.elements(), strict=True):
             if self._owner(name) != number:
                 continue
             course = self.read.courses.get(name)
             if course is None:
+                states_of, name, symbol = lifted(name, symbol, self.rates)
+                moved += [(_signal(n, x, nominal.get(n, np.nan)), rate) for n, x, rate in states_of]
                 pieces = self.controls.get(name, Pieces())
                 inputs.append(_signal(name, symbol, nominal.get(name, np.nan), pieces))
             elif not isinstance(course, ca.SX):
@@ -165,8 +180,12 @@ class _Split:
             name=self.read.phases[number].name,
             start_time=ca.SX(0),
             final_time=ca.SX(1),
-            states=tuple(
-                _signal(system.states[k], system.x[k], nominal.get(system.states[k], np.nan)) for k in states
+            states=(
+                *(
+                    _signal(system.states[k], system.x[k], nominal.get(system.states[k], np.nan))
+                    for k in states
+                ),
+                *(signal for signal, _ in moved),
             ),
             algebraics=tuple(
                 replace(_signal(a.name, a.symbol), min=a.min, words=words.get(a.name, ("", a.name))[1])
@@ -174,7 +193,7 @@ class _Split:
             ),
             inputs=tuple(inputs),
             courses=tuple(courses),
-            ode=self.ode[states] if states else ca.SX(0, 1),
+            ode=ca.vertcat(self.ode[states] if states else ca.SX(0, 1), *(rate for _, rate in moved)),
             residuals=self.residuals[algebraics] if algebraics else ca.SX(0, 1),
             residual_names=tuple(
                 words.get(a.name, (f"the equation of {a.name}", ""))[0]

@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau import Dae, ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import Course, Phase, SampleSum
+from gantrytau_optimica.control.input_rates import Rates
 from gantrytau_optimica.problem.optimization import Point, Target
 from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, LinkedPaths, SymbolicProblem
@@ -37,17 +38,22 @@ def start_conditions(dae: Dae) -> Conditions:
     return points, found
 
 
-def link_conditions(read: SymbolicProblem) -> Conditions:
-    """States of a phase that begin where those of the phase before end. ModelError for names that do not fit."""
+def link_conditions(read: SymbolicProblem, rates: Rates) -> Conditions:
+    """States of a phase, and inputs whose rates are mentioned, that begin where those of the phase before end.
+
+    ModelError for names that do not fit.
+    """
     points: list[Point] = []
     found: list[ConstraintRow] = []
     for link in read.links:
-        jumping = _jumping(read, link)
-        for state in read.dae.states:
+        jumping = _jumping(read, link, rates)
+        for state in _continuous(read, rates):
             base, order = split_derivative(state)
             if not base.startswith(f"{link.second}.") or _key(read.dae, state) in jumping:
                 continue
             before = derivative_name(link.first + base[len(link.second) :], order)
+            if state not in read.dae.states and split_derivative(before)[0] not in rates:
+                continue  # an input that jumps in the phase before may do so at its end
             if split_derivative(before)[0] not in read.dae.variables:
                 raise ModelError(
                     f"{read.name}: link({link.first}, {link.second}) finds no {before}, expected the same variables in both "
@@ -68,14 +74,20 @@ def link_conditions(read: SymbolicProblem) -> Conditions:
     return points, found
 
 
-def _jumping(read: SymbolicProblem, link: LinkedPaths) -> set[str]:
-    states = {_key(read.dae, state) for state in read.dae.states}
+def _continuous(read: SymbolicProblem, rates: Rates) -> list[str]:
+    """States, and inputs with those of their rates that are states."""
+    inputs = [derivative_name(name, k) for name, chain in rates.items() for k in range(len(chain))]
+    return [*read.dae.states, *inputs]
+
+
+def _jumping(read: SymbolicProblem, link: LinkedPaths, rates: Rates) -> set[str]:
+    states = {_key(read.dae, state) for state in _continuous(read, rates)}
     found = set()
     for name in link.jump:
         for element in read.dae.expand(name):
             key = _key(read.dae, element)
             if key not in states:
-                own = [n for n in read.dae.states if n.startswith(f"{link.second}.")]
+                own = [n for n in _continuous(read, rates) if n.startswith(f"{link.second}.")]
                 raise ModelError(
                     f"{read.name}: link, jump: {element} is no state of the phase, expected one of {', '.join(own)}"
                 )

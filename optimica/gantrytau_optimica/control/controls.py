@@ -7,6 +7,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
+from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import Pieces
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
@@ -22,7 +23,8 @@ def read_controls(read: SymbolicProblem, controls: Any) -> dict[str, Pieces]:
     found: dict[str, Pieces] = {}
     for name, wanted in controls.items():
         for element in read.dae.expand(name):
-            if element not in read.dae.inputs or element in read.courses:
+            base = split_derivative(element)[0]  # the rate of an input may be what is chosen
+            if base not in read.dae.inputs or base in read.courses:
                 chosen = [n for n in read.dae.inputs if n not in read.courses]
                 raise ModelError(
                     f"controls: {element} is no input that the optimiser chooses, expected one of "

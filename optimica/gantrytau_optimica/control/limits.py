@@ -203,10 +203,13 @@ def check_symbols(draft: ControlProblem, name: str) -> None:
     for leaf in ca.symvar(everything):
         if leaf.element_hash() not in nodes:
             base, order = split_derivative(leaf.name())
-            what = f"the derivative of the input {base}" if order else leaf.name()
+            if order:
+                raise ModelError(
+                    f"{name}: needs the derivative of the input {base}, of which there are samples only, expected a course "
+                    "that has one; give it in `inputs` as a function of time"
+                )
             raise ModelError(
-                f"{name}: {what} is needed but not chosen by the optimiser; make the derivative the input and "
-                "integrate it in the model"
+                f"{name}: {leaf.name()} is needed but not chosen by the optimiser; make it a variable, or give it a value"
             )
     numbers = {f.symbol.element_hash() for f in draft.free}
     for point in draft.points:

@@ -60,6 +60,7 @@ class Optimization(Model):
     A component that is an Optimization itself is a phase: it has a clock, objective and limits of its own, and this
     problem may add an objective and conditions on values at times, `yield link(self.first, self.second)` among them.
     A problem without derivatives and time is a static one: its signals have one value.
+    Where it mentions the rate of an input, `between(-800, der(self.crane.f), 800)`, that input is continuous.
     """
 
     start_time: Any = 0.0

@@ -28,8 +28,16 @@ def one_point(read: SymbolicProblem) -> bool:
         return False
     expressions = [p.integrand for p in read.phases] + [p.expression for p in read.points]
     expressions += [e for c in read.constraints for e in (c.expression, c.lower, c.upper)]
-    timed = ca.depends_on(ca.vertcat(*(ca.vec(e) for e in expressions)), read.dae.flat.time)
-    return not timed and not read.targets and len({str(p.time) for p in read.points}) <= 1
+    whole = read.dae.to_reduced(ca.vertcat(read.objective, *(ca.vec(ca.SX(e)) for e in expressions)))
+    timed = ca.depends_on(whole, read.dae.flat.time)
+    moved = any(
+        split_derivative(leaf.name())[0] in read.dae.inputs for leaf in ca.symvar(whole) if _order(leaf)
+    )
+    return not timed and not moved and not read.targets and len({str(p.time) for p in read.points}) <= 1
+
+
+def _order(leaf: ca.SX) -> int:
+    return split_derivative(leaf.name())[1]
 
 
 def check_objective(read: SymbolicProblem) -> SymbolicProblem:

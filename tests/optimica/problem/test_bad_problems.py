@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Real, SolveError, between, der
-from gantrytau_optimica import Free, Optimization, at, final, initial, optimize
+from gantrytau_optimica import Free, Optimization, Samples, at, final, initial, optimize
 from tests.optimica.problems import BoundedOscillator, FastestMass, Mass
 
 
@@ -79,7 +79,6 @@ def message(wrong, **policy) -> str:
             lambda p: [p.mass.x <= final(p.mass.x)],
             "mixes a signal over the whole path with its value at one time",
         ),
-        (lambda p: [der(p.mass.u) <= 3], "the derivative of the input mass.u is needed but not chosen"),
         (lambda p: [p.mass.x == 1 - p.mass.x, p.mass.u**2 == 1], "conditions for"),
     ],
 )
@@ -175,21 +174,25 @@ def test_nothing_to_choose():
     assert "nothing is free; declare a Free number or an Input" in message(Empty)
 
 
-def test_the_rate_of_an_input():
+def test_the_rate_of_an_input_that_is_known_from_samples():
     class Geared(Model):
         u = Input(unit="m", description="hand")
         v = Real(unit="m/s", description="its speed")
+        x = Real(unit="m", start=0.0, fixed=True, description="what follows")
+        k = Free(1.0, unit="1", description="how well")
 
         def equations(self):
             yield self.v == der(self.u)
+            yield der(self.x) == self.k * self.v
 
     class Problem(Optimization):
         geared = Geared()
+        inputs = {"geared.u": Samples([0.0, 1.0], [0.0, 1.0])}
 
-        def integrand(self):
-            return self.geared.v**2
+        def objective(self):
+            return (final(self.geared.x) - 1) ** 2
 
-    assert "make the derivative the input and integrate it in the model" in message(Problem)
+    assert "needs the derivative of the input geared.u, of which there are samples only" in message(Problem)
 
 
 def test_limits_that_contradict_each_other_are_named():

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
-from gantrytau.language.symbols import split_derivative
+from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau.simulation.to_result import labels
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.archive.fingerprint import hashes, plain, versions
@@ -139,15 +139,28 @@ def _content(optimum: ProgramAnswer) -> tuple[dict[str, Any], Arrays]:
         "descriptions": words,
         "vectors": {n: v.elements for n, v in dae.vectors.items() if tuple(v.elements) != (n,)},
         "phases": [
-            _phase_content(optimum, phase, f"phases/{i}", [*dae.variables, *_derivatives(words)], arrays)
+            _phase_content(
+                optimum, phase, f"phases/{i}", [*dae.variables, *_derivatives(optimum, words)], arrays
+            )
             for i, phase in enumerate(optimum.phases.values())
         ],
     }
     return plain(header), arrays
 
 
-def _derivatives(words: dict[str, str]) -> list[str]:
-    return [name for name in words if split_derivative(name)[1]]
+def _derivatives(optimum: ProgramAnswer, words: dict[str, str]) -> list[str]:
+    """Names of derivatives that the model has, and of rates of inputs that the problem has."""
+    dae, chosen = (
+        optimum.dae,
+        [split_derivative(u.name) for p in optimum.phases.values() for u in p.phase.inputs],
+    )
+    orders = dict(chosen)
+    found = [name for name in words if split_derivative(name)[1]]
+    for name in dae.variables:
+        alias = dae.root(name)
+        order = orders.get(alias.root or "", 0) if alias is not None and not alias.order else 0
+        found += [derivative_name(name, k) for k in range(1, order + 1)]
+    return list(dict.fromkeys(found))
 
 
 def _phase_content(
