@@ -162,7 +162,7 @@ def test_what_a_playback_finds_is_in_the_verdict():
 class Tracked(Optimization):
     """Samples of a position are followed by a limited force."""
 
-    mass = Mass(x=Fixed(0.0), v=Fixed(0.0))
+    mass = Mass(x=Fixed(0.5), v=Fixed(0.0))
     samples = Samples([0.0, 0.5, 1.0], [0.0, 0.1, 0.2])
     most, gain = 1.0, 2.0
 
@@ -194,8 +194,8 @@ LEAST = 2.0**-52  # the last bit of a number
         dict(gain=2.0 * (1 + LEAST)),
         dict(final_time=1.0 + LEAST),
         dict(integrand=lambda self: 1e-300 * self.mass.u**2),
-        dict(mass=Mass(x=Fixed(LEAST), v=Fixed(0.0))),
-        dict(mass=Mass(x=dict(start=0.0, fixed=True, nominal=2.0), v=Fixed(0.0))),
+        dict(mass=Mass(x=Fixed(0.5 * (1 + LEAST)), v=Fixed(0.0))),
+        dict(mass=Mass(x=dict(start=0.5, fixed=True, nominal=2.0), v=Fixed(0.0))),
     ],
     ids=str,
 )
