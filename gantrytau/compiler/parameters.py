@@ -55,8 +55,16 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
     known = [*(p.name for p in flat.parameters), *(e for p in flat.parameters for e in p.elements)]
     for name in values:
         if name not in known:
-            raise ModelError(f"{flat.name} has no parameter '{name}'{did_you_mean(name, known)}")
+            raise ModelError(f"{flat.name} has no parameter '{name}'{_remedy(flat, name, known)}")
     return replace(flat, parameters=tuple(_with_value(p, remaining) for p in flat.parameters))
+
+
+def _remedy(flat: FlatModel, name: str, known: list[str]) -> str:
+    """The end of a message about what is no parameter."""
+    variable = name.removesuffix(".start")
+    if variable in flat.vectors or variable in flat.scalars:
+        return f"; {variable} is a variable, simulate takes another start value of it as starts={{'{variable}': ...}}"
+    return did_you_mean(name, known)
 
 
 def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:

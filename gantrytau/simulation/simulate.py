@@ -13,6 +13,7 @@ import numpy as np
 
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
+from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import DoubtfulResult, ModelError, SolveError
@@ -40,6 +41,7 @@ def simulate(
     outputs: Sequence[str] | None = None,
     tolerance: float = 1e-8,
     points: int = 501,
+    starts: Mapping[str, Any] | None = None,
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
@@ -47,6 +49,8 @@ def simulate(
     (n, rows, columns)), joined by straight lines; an input that is not named keeps its start value.
     parameters: name -> value; outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the
     integrator gets a tenth, and errors of long motions add up); points: of the result.
+    starts: name -> other start value, without a new translation: made consistent with the equations as those of the
+    model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are.
@@ -61,6 +65,7 @@ def simulate(
         dae.expand(name)
     if any(split_derivative(name)[1] for name in wanted):
         dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
+    dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat)
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)

@@ -1,0 +1,67 @@
+"""Other start values for a model that is translated already."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from gantrytau.compiler.start.consistent_start import consistent_start
+from gantrytau.compiler.start.start_values import StartValues
+from gantrytau.compiler.translated import Translated
+from gantrytau.errors import ModelError
+from gantrytau.flattening.shapes import elements_of
+
+SAME = 1e-9  # relative, below which two starts of one symbol agree
+
+
+def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
+    """The same translation from other start values, name -> number or array; what is not named moves before them.
+
+    A start that is fixed in the model stays fixed, at its new value. Equations and states are those that the old start
+    chose. Raises ModelError for names that are no variables and for wrong shapes, InitializationError where no
+    consistent values are found.
+    """
+    if not isinstance(starts, Mapping):
+        raise ModelError(f"starts: found {starts!r}, expected {{name: value}}", argument="starts")
+    values, given = dict(dae.start), dict[str, str]()
+    for name, value in starts.items():
+        elements = _variables(dae, name)
+        numbers = elements_of(f"starts: {name}", value, dae.flat.shape(name))
+        for element, number in zip(elements, numbers, strict=True):
+            symbol, start = _symbol(dae, element, number)
+            if symbol in given and abs(values[symbol] - start) > SAME * max(abs(start), abs(values[symbol])):
+                raise ModelError(
+                    f"starts: {element} contradicts {given[symbol]}, of which it is an alias; give one of them",
+                    argument="starts",
+                )
+            values[symbol], given[symbol] = start, element
+    asked = StartValues(values, frozenset(given) | dae.asked.fixed, dae.asked.fixed)
+    found = consistent_start(dae.flat, dae.reduced, dae.indexed, asked)
+    return replace(dae, asked=asked, start=found)
+
+
+def _variables(dae: Translated, name: str) -> tuple[str, ...]:
+    """The scalar variables of a name."""
+    elements = dae.expand(name)
+    remedy = ""
+    if name in dae.parameters or any(n in dae.table.symbols for n in elements):
+        remedy = f"is a parameter, expected a variable; give it as parameters={{'{name}': ...}}"
+    elif any(n in dae.inputs for n in elements):
+        remedy = f"is an input, expected a variable; give it as inputs={{'{name}': ...}}"
+    elif any(n not in dae.reduced.aliases and n not in dae.known for n in elements):
+        remedy = "is no declared variable, but follows from others; give starts of those"
+    if remedy:
+        raise ModelError(f"starts: {name} {remedy}", argument="starts")
+    return elements
+
+
+def _symbol(dae: Translated, name: str, number: float) -> tuple[str, float]:
+    """The symbol of the reduced equations behind a variable, and its value."""
+    if name in dae.known:
+        return name, number  # sampled: held until the first instant
+    alias = dae.reduced.aliases[name]
+    if alias.root is None:
+        raise ModelError(
+            f"starts: {name} is constant and equal to {dae.table.number(alias.offset):g}; leave it out",
+            argument="starts",
+        )
+    return alias.symbol, dae.table.number(alias.root_value(number))
