@@ -228,6 +228,7 @@ def _independent(matrix: np.ndarray, sizes: np.ndarray, ranks: Sequence[int]) ->
     norms = np.linalg.norm(matrix, axis=1)
     norms[norms <= LEAST_PIVOT * sizes] = 0.0  # nothing but rounding
     rest = matrix / np.where(norms > 0, norms, np.inf)[:, None]
+    basis = np.empty((min(matrix.shape), matrix.shape[1]))
     chosen: set[int] = set()
     for least in (GOOD_PIVOT, LEAST_PIVOT):
         for rank in sorted(set(ranks)):
@@ -238,7 +239,10 @@ def _independent(matrix: np.ndarray, sizes: np.ndarray, ranks: Sequence[int]) ->
                 if not left[best] > least:
                     break
                 row = candidates.pop(best)
+                # of what little is left of a row, much is rounding: once more across the others
+                direction = rest[row] - basis[: len(chosen)].T @ (basis[: len(chosen)] @ rest[row])
+                direction /= np.linalg.norm(direction)
+                basis[len(chosen)] = direction
                 chosen.add(row)
-                direction = rest[row] / left[best]
                 rest -= np.outer(rest @ direction, direction)
     return chosen
