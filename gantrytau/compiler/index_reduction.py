@@ -17,6 +17,7 @@ from gantrytau.compiler.dulmage_mendelsohn import largest_sum, signature
 from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.consistency import Level
 from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative
 
 Key = tuple[int, int]  # equation, times differentiated
@@ -114,7 +115,7 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
     """For each unknown the highest derivative that the model or its user names, by whatever alias."""
     place = {name: j for j, name in enumerate(reduced.unknowns)}
     found = np.zeros(len(place), dtype=int)
-    named = [*reduced.aliases, *flat.derivatives, *wanted]
+    named = [*reduced.aliases, *flat.derivatives, *wanted, *_fixed_motions(reduced, flat)]
     for name in wanted:
         if name in reduced.definitions:  # follows from derivatives of variables
             named += [leaf.name() for leaf in ca.symvar(reduced.definitions.reduced(name))]
@@ -124,6 +125,17 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
         if alias is not None and alias.root in place:
             found[place[alias.root]] = max(found[place[alias.root]], alias.order + order)
     return found
+
+
+def _fixed_motions(reduced: Reduced, flat: FlatModel) -> list[str]:
+    """Accelerations of what starts at a fixed place with a fixed speed: with them, both can be states."""
+    fixed: dict[str, set[int]] = {}
+    for variable in flat.variables:
+        for name in variable.elements if variable.fixed and variable.prefer >= StateSelect.DEFAULT else ():
+            alias = reduced.aliases[name]
+            if alias.root is not None:
+                fixed.setdefault(alias.root, set()).add(alias.order)
+    return [derivative_name(root, 2) for root, orders in fixed.items() if {0, 1} <= orders]
 
 
 def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:

@@ -51,6 +51,8 @@ def simulate(
     integrator gets a tenth, and errors of long motions add up); points: of the result.
     starts: name -> other start value, without a new translation: made consistent with the equations as those of the
     model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
+    With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
+    an FMU keeps the states of its export.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are.

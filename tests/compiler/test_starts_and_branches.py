@@ -15,7 +15,10 @@ from gantrytau import (
     Real,
     Start,
     connect,
+    cos,
     der,
+    simulate,
+    sin,
     translate,
     with_setting,
 )
@@ -147,3 +150,44 @@ def test_a_start_that_is_given_is_kept_before_those_of_the_model(phi):
         dae = translate(model)
         assert dae.start["crank.phi"] == phi
         assert "crank.phi" not in {m.name for m in dae.diagnosis.moved}
+
+
+class Crane(Model):
+    """A load on a rope, whose length and angle start at fixed values and speeds; the balances are those of the load."""
+
+    m = Parameter(1.0, unit="kg")
+    M = Parameter(5.0, unit="kg")
+    g = Parameter(9.81, unit="m/s2")
+    L = Real(unit="m", start=1.0)
+    theta = Real(unit="rad", start=0.1)
+    x = Real(unit="m", start=0.0)
+    L_rate = Real(unit="m/s", start=0.2)
+    omega = Real(unit="rad/s", start=0.0)
+    v = Real(unit="m/s", start=0.0)
+    px, pz = Real(unit="m"), Real(unit="m")
+    T = Real(unit="N", start=9.0)
+
+    def equations(self):
+        yield self.px == self.x + self.L * sin(self.theta)
+        yield self.pz == -self.L * cos(self.theta)
+        yield self.m * der(der(self.px)) == -self.T * sin(self.theta)
+        yield self.m * der(der(self.pz)) == self.T * cos(self.theta) - self.m * self.g
+        yield self.M * der(self.v) == self.T * sin(self.theta)
+        yield self.T == 9.0
+        yield self.L_rate == der(self.L)
+        yield self.omega == der(self.theta)
+        yield self.v == der(self.x)
+
+
+def test_what_starts_at_a_fixed_place_with_a_fixed_speed_is_a_state():
+    """The equations differentiate the load's place twice, the rope's length once; the motion is that of other states."""
+    names = {"L": 1.0, "theta": 0.1, "x": 0.0, "L_rate": 0.2, "omega": 0.0, "v": 0.0}
+    fixed = translate(Crane(**{name: Fixed(value) for name, value in names.items()}))
+    assert set(fixed.states) == set(names)
+    assert all(block.solution is not None for block in fixed.blocks)
+    other = translate(Crane(**{name: Fixed(value) for name, value in names.items()}), states=["px", "pz"])
+    assert {"px", "pz"} < set(other.states)
+    motions = [simulate(dae, stop=1.0, points=5, tolerance=1e-10) for dae in (fixed, other)]
+    assert motions[0]["L"][0] == 1.0
+    for name in (*names, "px", "pz"):
+        np.testing.assert_allclose(motions[0][name], motions[1][name], rtol=0, atol=1e-7)  # sums of errors
