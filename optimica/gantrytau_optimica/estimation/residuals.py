@@ -8,10 +8,11 @@ equations of the model as constraints.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
@@ -25,6 +26,10 @@ from gantrytau_optimica.transcription.program import Program
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
+CLOSER, CHORD = (
+    1e-12,
+    0.1,
+)  # the last one with slopes of another point, and how much each of these has to gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +42,17 @@ class Residuals:
     program: Program
     assembled: Assembled
     sizes: tuple[int, ...]
+    _last: dict[str, Any] = field(
+        default_factory=dict
+    )  # slopes of the equations where they were factorised last
+
+    @cached_property
+    def _slopes(self) -> "_Sparse":
+        return _Sparse.of(self.assembled.jac_g, self.program.places.scale)
+
+    @cached_property
+    def _gradients(self) -> "_Sparse":
+        return _Sparse.of(self.program.assembled.jac_g, self.program.places.scale)
 
     @property
     def total(self) -> int:
@@ -60,7 +76,7 @@ class Residuals:
     def jacobian(self, w: np.ndarray) -> np.ndarray:
         """Slopes (N, k) with respect to the free numbers in their units."""
         program, free = self.program, self.program.places.free
-        slopes = self.assembled.jac_g(w / program.places.scale, [])[1].sparse()
+        slopes = self._slopes.at(w)
         found = slopes[:, free].toarray()
         if self.others.size:
             equations, factors = self._factorised(w)
@@ -76,7 +92,7 @@ class Residuals:
         scaled = w / self.program.places.scale
         _, factors = self._factorised(w)
         values = np.array(self.program.assembled.nlp(scaled, [])[1]).ravel()
-        slopes = self.assembled.jac_g(scaled, [])[1].sparse().tocsc()[:, self.others]
+        slopes = self._slopes.at(w)[:, self.others]
         adjoint = factors.solve((slopes.T @ rows.T), trans="T")
         return -adjoint * (values - self.program.lbg)[self.equations, None]
 
@@ -93,31 +109,63 @@ class Residuals:
         """Unknowns that fulfil the equations for other free numbers, by Newton's method from w; None if it fails."""
         scale, w = self.program.places.scale, w.copy()
         w[self.program.places.free] = numbers
+        factors, fresh, before = self._last.get("factors"), False, np.inf
         for _ in range(NEWTON_STEPS):
-            try:
-                _, factors = self._factorised(w)
-            except ModelError:
-                return None
             values = np.array(self.program.assembled.nlp(w / scale, [])[1]).ravel()
-            step = factors.solve((values - self.program.lbg)[self.equations])
-            if not np.all(np.isfinite(step)):
+            step = np.full(self.others.size, np.nan) if factors is None else factors.solve(
+                (values - self.program.lbg)[self.equations]
+            )  # fmt: skip
+            size = np.max(np.abs(step), initial=0.0)
+            if not size <= CHORD * before and not fresh:  # old slopes lead no further
+                try:
+                    factors, fresh, before = self._factorised(w)[1], True, np.inf
+                except ModelError:
+                    return None
+                continue
+            if not np.isfinite(size):
                 return None
             w[self.others] -= step * scale[self.others]
-            if np.max(np.abs(step), initial=0.0) < CLOSE:
+            if size < (CLOSE if fresh else CLOSER):
                 return w
+            fresh, before = False, size
         return None
 
     def _factorised(self, w: np.ndarray) -> tuple[Any, SuperLU]:
         """Slopes of the equations, and the factors of those with respect to the other unknowns."""
-        whole = self.program.assembled.jac_g(w / self.program.places.scale, [])[1].sparse().tocsr()
-        equations = whole[self.equations].tocsc()
+        if "at" in self._last and np.array_equal(self._last["at"], w):
+            return self._last["equations"], self._last["factors"]
+        equations = self._gradients.at(w)[self.equations]
         try:
-            return equations, splu(equations[:, self.others].tocsc())
+            factors = splu(equations[:, self.others].tocsc())
         except (RuntimeError, ValueError) as error:
             raise ModelError(
                 f"{self.program.problem.name}: the equations and starts do not determine the motion ({error}); give "
                 "independent starts"
             ) from error
+        self._last.update(at=w.copy(), equations=equations, factors=factors)
+        return equations, factors
+
+
+@dataclass(frozen=True, eq=False)
+class _Sparse:
+    """A sparse Jacobian as CasADi evaluates it, with its pattern read once."""
+
+    function: ca.Function
+    scale: np.ndarray
+    rows: np.ndarray
+    starts: np.ndarray
+    shape: tuple[int, int]
+
+    @staticmethod
+    def of(function: ca.Function, scale: np.ndarray) -> "_Sparse":
+        pattern = function.sparsity_out(1)
+        return _Sparse(function, scale, np.array(pattern.row()), np.array(pattern.colind()), pattern.shape)
+
+    def at(self, w: np.ndarray) -> Any:
+        """Slopes by scaled unknowns at unknowns w, by columns."""
+        found = self.function(w / self.scale, [])[1]
+        values = np.array(found.nz[:]).ravel() if self.rows.size else np.zeros(0)
+        return sparse.csc_matrix((values, self.rows, self.starts), shape=self.shape)
 
 
 def residuals(program: Program) -> Residuals:

@@ -12,8 +12,9 @@ and the matrices of these relations are computed once. Nothing is differentiated
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -71,9 +72,14 @@ class Assembled:
     nlp: ca.Function  # (x, p) -> (f, g)
     grad_f: ca.Function  # (x, p) -> (f, gradient)
     jac_g: ca.Function  # (x, p) -> (g, Jacobian)
-    hess_lag: ca.Function  # (x, p, lam_f, lam_g) -> upper triangle of the Hessian
     variables: int
     rows: int
+    second: Callable[[], ca.Function]  # makes hess_lag, which not everyone asks for
+
+    @cached_property
+    def hess_lag(self) -> ca.Function:
+        """(x, p, lam_f, lam_g) -> upper triangle of the Hessian."""
+        return self.second()
 
 
 def assemble(
@@ -86,8 +92,6 @@ def assemble(
     g = sum((_values(term, w, p) for term in constraints), ca.mtimes(to_dm(linear), w))
     gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
     jacobian = _jacobian(constraints, linear, w, p)
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    hessian = _hessian([(term, lam_f) for term in objective] + [(term, lam_g) for term in constraints], w, p)
     # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
     return Assembled(
         nlp=ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"]),
@@ -95,16 +99,20 @@ def assemble(
             "nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)], ["x", "p"], ["f", "grad_f_x"]
         ),
         jac_g=ca.Function("nlp_jac_g", [w, p], [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        hess_lag=ca.Function(
-            "nlp_hess_l",
-            [w, p, lam_f, lam_g],
-            [hessian],
-            ["x", "p", "lam_f", "lam_g"],
-            ["triu_hess_gamma_x_x"],
-        ),
         variables=n,
         rows=rows,
+        second=lambda: _second(objective, constraints, w, p, rows),
     )
+
+
+def _second(
+    objective: Sequence[Term], constraints: Sequence[Term], w: ca.MX, p: ca.MX, rows: int
+) -> ca.Function:
+    """The Hessian of the Lagrangian as nlpsol takes it."""
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
+    hessian = _hessian([(term, lam_f) for term in objective] + [(term, lam_g) for term in constraints], w, p)
+    names = ["x", "p", "lam_f", "lam_g"]
+    return ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [hessian], names, ["triu_hess_gamma_x_x"])
 
 
 def _values(term: Term, w: ca.MX, p: ca.MX) -> ca.MX:
