@@ -18,6 +18,7 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
 REPLAYED = 1e-7  # relative: what tolerances of solver and integration leave in an objective played back
+LEAST_CHANGE = 1e-12  # of the objective, by rounding: the mesh is as it was
 SMALL = (
     30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
 )
@@ -34,6 +35,7 @@ class Round:
     iterations: int
     error: float  # of the objective as played back
     size: float  # of the objective
+    before: float = np.nan  # the objective of the round from which this one was made, NaN for the first
 
     def __str__(self) -> str:
         return (
@@ -64,7 +66,7 @@ class Refinement:
         if not self.rounds:
             return f"{word} {self.accuracy:g}{why}"
         first, last = self.rounds[0], self.rounds[-1]
-        change = abs(self.rounds[-1].objective - self.rounds[-2].objective) if len(self.rounds) > 1 else 0.0
+        change = abs(last.objective - last.before) if len(self.rounds) > 1 else 0.0
         held = "" if self.reached else f"; round {self.kept + 1} is kept, {self.rounds[self.kept]}"
         return (
             f"{word} {self.accuracy:g} in {len(self.rounds)} rounds{why}, {first.elements} to {last.elements} elements, "
@@ -110,20 +112,22 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
     """
     clock, search, best = reached.clock, optimum.search, optimum
     rounds: list[Round] = []
-    moving, stopped = True, ""
+    moving, moved, stopped, before = True, False, "", np.nan
     try:
         while True:
             number = f"round {len(rounds) + 1} of at most {MOST_ROUNDS + 1}"
             clock.enter(f"{number}: playing back")
-            rounds.append(_round(optimum))
+            rounds.append(replace(_round(optimum), before=before))
             kept = _kept(rounds, accuracy)
             best = optimum if kept == len(rounds) - 1 else best
             reached.best = best.with_notes(refinement=_record(best, rounds, accuracy), search=search)
-            if _holds(rounds, accuracy) or len(rounds) > MOST_ROUNDS or rounds[-1].elements > MOST_ELEMENTS:
+            if _holds(rounds, accuracy) or _exhausted(rounds):
                 break
             clock.enter(f"{number}: solving on the next mesh")
             moving = moving and rounds[-1].defect < SMALL * accuracy
-            better = None
+            if moved and not moving:  # borders were moved to err more
+                optimum = best
+            better, before, moved = None, optimum.objective, False
             for how in [*(["moving"] if moving else []), "switches", "divided"]:
                 better = (
                     _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
@@ -131,6 +135,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                     else None
                 )
                 if better is not None:
+                    moved = how == "moving"
                     break
                 moving = False
             if better is None:
@@ -143,6 +148,14 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
         reached.best = newest.with_notes(refinement=refinement, search=search)
         raise
     return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)
+
+
+def _exhausted(rounds: Sequence[Round]) -> bool:
+    """Whether another round is of no use: there were enough, or the last one changed nothing."""
+    last = rounds[-1]
+    stands = len(rounds) > 2 and last.elements == rounds[-2].elements
+    same = stands and abs(last.objective - last.before) <= LEAST_CHANGE * last.size
+    return same or len(rounds) > MOST_ROUNDS or last.elements > MOST_ELEMENTS
 
 
 def _record(best: Optimum, rounds: Sequence[Round], accuracy: float, stopped: str = "") -> Refinement:
@@ -163,8 +176,9 @@ def _off(rounds: Sequence[Round], k: int) -> float:
     """By how much a round fails, relative: by what limits, conditions and objective are off, and by how much the objective
     differs from that of the round before, or after the first.
     """
-    one, other = rounds[k], rounds[k - 1 if k else min(1, len(rounds) - 1)]
-    moved = abs(one.objective - other.objective) / one.size
+    one = rounds[k]
+    other = one.before if k else rounds[min(1, len(rounds) - 1)].objective
+    moved = abs(one.objective - other) / one.size
     off = max(one.violation, one.defect, abs(one.error) / one.size, moved)
     return off if np.isfinite(off) else np.inf
 
@@ -209,7 +223,7 @@ def _holds(rounds: Sequence[Round], accuracy: float) -> bool:
     last = rounds[-1]
     if max(last.violation, last.defect) > accuracy:
         return False
-    unmoved = abs(last.objective - rounds[-2].objective) <= accuracy * last.size
+    unmoved = abs(last.objective - last.before) <= accuracy * last.size
     return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * last.size
 
 

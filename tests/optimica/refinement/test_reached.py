@@ -291,6 +291,34 @@ def test_the_best_round_is_kept_where_the_accuracy_is_not_reached(monkeypatch):
     assert "round 2 is kept, which passes limits by" in str(refinement)
 
 
+def test_borders_that_moved_to_err_more_are_given_up(monkeypatch):
+    """The second round, in which borders move, is said to miss the end: the third goes on from the first."""
+    measured = refinement_module._round
+    made = []
+
+    def worse(optimum):
+        made.append(optimum)
+        found = measured(optimum)
+        return replace(found, defect=1.0) if len(made) == 2 else found
+
+    monkeypatch.setattr(refinement_module, "_round", worse)
+    optimum = optimize(FastestMass, elements=7, refine=ACCURACY)
+    rounds = optimum.refinement.rounds
+    assert made[1].program.places.layouts[0].mesh.moving
+    assert rounds[2].before == rounds[0].objective
+    assert not any(o.program.places.layouts[0].mesh.moving for o in made[2:])
+    assert optimum.refinement.reached
+    assert optimum.final_time == pytest.approx(2.0, rel=2 * ACCURACY)
+
+
+def test_a_mesh_that_no_longer_changes_ends_it(monkeypatch):
+    monkeypatch.setattr(refinement_module, "_holds", lambda rounds, accuracy: False)
+    monkeypatch.setattr(refinement_module, "_meshes", lambda o, *_: [p.mesh for p in o.phases.values()])
+    refinement = optimize(FastestMass, elements=8, refine=ACCURACY).refinement
+    assert not refinement.reached
+    assert len(refinement.rounds) < 5
+
+
 def test_progress_says_the_round():
     stages = []
     optimum = optimize(
