@@ -33,7 +33,8 @@ class Diagnosis:
     """What translation found out: sizes, loops, states and their conditioning, blocks, the start.
 
     mobility: number of ways in which the positions can change; redundant: equations that repeat others;
-    moved: start values that were moved, the farthest first; assemblies: where the positions have several
+    assumed: parameters of which nobody gave the value, and what it is; moved: start values that were moved, the farthest
+    first; assemblies: where the positions have several
     solutions, the one taken and others; missing: what keeps the model from being translated, else "".
     Prints itself.
     """
@@ -49,6 +50,7 @@ class Diagnosis:
     states: tuple[str, ...] = ()
     condition: float = 1.0
     blocks: tuple[tuple[str, int, int], ...] = ()  # kind, unknowns, torn unknowns
+    assumed: tuple[str, ...] = ()
     moved: tuple[Moved, ...] = ()
     assemblies: tuple[Assembly, ...] = ()
     missing: str = ""
@@ -70,6 +72,7 @@ class Diagnosis:
             *_listed("redundant constraints", self.redundant),
             f"  states (condition {self.condition:.3g}{poor}): {', '.join(self.states) or 'none'}",
             f"  {len(self.blocks)} blocks, of them with several unknowns: {', '.join(several) or 'none'}",
+            *(_listed("assumed", self.assumed) if self.assumed else []),
             *_listed("start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved]),
             *(f"  {assembly}" for assembly in self.assemblies),
         ]
@@ -118,6 +121,7 @@ def diagnose(dae: Translated) -> Diagnosis:
         states=dae.states,
         condition=dae.choice.condition,
         blocks=tuple((b.kind, len(b.unknowns), len(b.tears)) for b in dae.blocks),
+        assumed=tuple(f"{p.name}: {p.assumed}" for p in dae.flat.parameters if p.assumed),
         moved=_moved(dae),
         assemblies=assemblies(dae),
     )

@@ -27,7 +27,9 @@ def flat_parameter(placed: Placed) -> FlatParameter:
         )
     declaration = placed.declaration
     assert isinstance(declaration, Parameter)
-    return FlatParameter(**_common(placed), value=expression(placed, "value"), fold=declaration.fold)
+    value, given = expression(placed, "value"), placed.attributes["value"].value is not declaration.value
+    assumed = "" if given else declaration.assumed
+    return FlatParameter(**_common(placed), value=value, fold=declaration.fold, assumed=assumed)
 
 
 def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:

@@ -46,11 +46,13 @@ class FlatVariable:
 class FlatParameter(FlatVariable):
     """A parameter: `value` holds one SX per scalar, a number or an expression of other parameters.
 
-    fold: its value shapes the equations and is folded in at translation.
+    fold: its value shapes the equations and is folded in at translation; assumed: what is said of the value if it is
+    the one of the declaration, which nobody gave.
     """
 
     value: tuple[ca.SX, ...] = ()
     fold: bool = False
+    assumed: str = ""
 
 
 @dataclass(frozen=True, eq=False)

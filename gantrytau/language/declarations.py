@@ -234,7 +234,7 @@ class Parameter(Quantity):
     value: number, array, formula of declarations (`2 * m`), or function of the instance
     (`lambda self: self.L / 2`). Its shape is that of the value, unless `shape` says otherwise.
     evaluate: the value shapes the equations (a joint axis): it is folded in when the model is
-    translated, as Modelica's annotation Evaluate=true.
+    translated, as Modelica's annotation Evaluate=true. assumed: what `check` says where nobody gives another value.
     """
 
     kind = "parameter"
@@ -250,12 +250,14 @@ class Parameter(Quantity):
         nominal: Any = None,
         shape: Any = None,
         evaluate: bool = False,
+        assumed: str = "",
     ):
         if shape is None:
             shape = () if value is None or callable(value) or isinstance(value, Formula) else np.shape(value)
         super().__init__(shape, unit=unit, description=description, min=min, max=max, nominal=nominal)
         self.value = value
         self.fold = evaluate
+        self.assumed = assumed
 
 
 class Array(Generic[Component]):

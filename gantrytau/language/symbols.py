@@ -117,11 +117,13 @@ def writing(symbols: Symbols):
         _current.reset(token)
 
 
-def der(expression: Any) -> ca.SX:
+def der(expression: Any, order: int = 1) -> ca.SX:
     """Time derivative of a variable or expression, of the same shape; for use in equations(self).
 
-    Raises ModelError outside of the equations of a model.
+    order: how often it is differentiated. Raises ModelError outside of the equations of a model.
     """
+    if isinstance(order, bool) or not isinstance(order, int) or order < 1:
+        raise ModelError(f"der: found order {order!r}, expected a whole number of at least 1")
     symbols = _current.get()
     if symbols is None:
         raise ModelError(
@@ -129,7 +131,9 @@ def der(expression: Any) -> ca.SX:
             "a result is asked for a derivative by name: result['der(x)']"
         )
     expression = ca.densify(ca.SX(expression))
-    elements = [symbols.total_derivative(element) for element in expression.elements()]
+    elements = expression.elements()
+    for _ in range(order):
+        elements = [symbols.total_derivative(element) for element in elements]
     return ca.reshape(ca.vertcat(*elements), *expression.shape)
 
 

@@ -16,7 +16,10 @@ from gantrytau import (
     connect,
     der,
     flatten,
+    fmax,
+    fmin,
     if_else,
+    sign,
     translate,
 )
 from gantrytau.mechanics import rotational, translational
@@ -298,3 +301,32 @@ def test_units_that_are_none(unit, message):
     with pytest.raises(ModelError, match=message):
         translate(Wrong())
     assert translate(Wrong(), units=False).evaluate({})["x"] == 1.0
+
+
+def test_functions_and_derivatives_of_any_order():
+    class Ringing(Model):
+        x = Real(start=1.0, fixed=True)
+        v = Real(start=0.0, fixed=True)
+        low = Parameter(-0.5)
+        high = Parameter(fmax(low, 0.25) * 2)
+        r = Real(3)
+
+        def equations(self):
+            yield der(self.x, 2) == -4 * self.x
+            yield self.v == der(self.x)
+            yield self.r[0] == fmin(self.high, fmax(self.low, self.x))
+            yield self.r[1] == sign(self.x)
+            yield self.r[2] == der(self.x**2, 2)
+
+    at = translate(Ringing()).evaluate({"x": 0.3, "v": 2.0})
+    assert at["der(der(x))"] == pytest.approx(-1.2, rel=1e-14)
+    np.testing.assert_allclose(at["r"], [0.3, 1.0, 2 * 4.0 - 2 * 0.3 * 1.2], rtol=1e-14)
+    np.testing.assert_allclose(translate(Ringing()).evaluate({"x": -2.0, "v": 0.0})["r"][:2], [-0.5, -1.0])
+
+
+@pytest.mark.parametrize("order", [0, -1, 1.5, "2", True])
+def test_an_order_of_a_derivative_that_is_none(order):
+    with pytest.raises(
+        ModelError, match=r"equation 2: der: found order .*, expected a whole number of at least 1"
+    ):
+        translate(plant(lambda p: der(p.x, order) == 0))

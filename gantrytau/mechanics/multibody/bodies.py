@@ -36,7 +36,10 @@ class Body(Model):
     m = Parameter(1.0, unit="kg", min=0.0, description="mass")
     r_cm = Parameter([0.0, 0.0, 0.0], unit="m", description="centre of mass, resolved in frame_a")
     J = Parameter(
-        np.diag([0.1, 0.1, 0.1]), unit="kg.m2", description="inertia about the centre of mass, in frame_a"
+        np.diag([0.1, 0.1, 0.1]),
+        unit="kg.m2",
+        description="inertia about the centre of mass, in frame_a",
+        assumed="nobody gave the inertia, 0.1 kg.m2 about each axis is taken; give J, zeros for a mass in one point",
     )
     r = Real(3, unit="m", description="position of frame_a, resolved in the world", undetermined=MASSLESS)
     v = Real(3, unit="m/s", description="velocity of frame_a, resolved in the world", undetermined=MASSLESS)

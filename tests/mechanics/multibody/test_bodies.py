@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import Array, Fixed, Model, Start, connect, simulate, translate
+from gantrytau import Array, Fixed, Model, Start, check, connect, linearize, simulate, translate
 from gantrytau.mechanics.multibody import (
     Body,
     FixedRotation,
@@ -217,3 +217,26 @@ def test_linked_bodies_without_a_ground_keep_momentum_and_energy():
     # a thousand times the integrator's tolerance, relative to sizes of about one
     for conserved in (momentum, spin, energy):
         assert np.ptp(conserved, axis=0).max() < 1e-6
+
+
+def test_an_inertia_that_nobody_gave_is_told():
+    """A pendulum of 1 kg at 0.3 m swings at sqrt(g / l) as a point mass; the inertia that is assumed doubles its square."""
+
+    class Swinging(Model):
+        world = World()
+        hinge = Revolute(n=[0.0, 1.0, 0.0])
+        body = Body(m=1.0, r_cm=[0.0, 0.0, -0.3])
+
+        def equations(self):
+            yield connect(self.world.frame_b, self.hinge.frame_a)
+            yield connect(self.hinge.frame_b, self.body.frame_a)
+
+    (line,) = check(Swinging()).assumed
+    assert line.startswith("body.J: nobody gave the inertia, 0.1 kg.m2 about each axis is taken; give J")
+    assert line in str(check(Swinging()))
+    point = Swinging(body=dict(J=np.zeros((3, 3))))
+    assert check(point).assumed == ()
+    slope = linearize(translate(point), at={"hinge.phi": 0.0, "hinge.w": 0.0}).eigenvalues()
+    assert np.abs(slope) == pytest.approx(np.sqrt(9.81 / 0.3), rel=1e-9)
+    slope = linearize(translate(Swinging()), at={"hinge.phi": 0.0, "hinge.w": 0.0}).eigenvalues()
+    assert np.abs(slope) == pytest.approx(np.sqrt(9.81 * 0.3 / (0.1 + 0.09)), rel=1e-9)
