@@ -17,7 +17,7 @@ from gantrytau.mechanics.multibody.orientation import of_quaternion
 from gantrytau.mechanics.rotational import Torque
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
-from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts
+from gantrytau_models.mechanisms.gantry_tau import Cart, WrongRecord, driven_carts, in_words
 from gantrytau_models.mechanisms.six_link import Plate, quaternion
 from gantrytau_models.prototypes import RotatingArm, RotatingPrototype
 
@@ -88,7 +88,7 @@ class F1GantryTau(Model):
     are the pose of the plate and its rates. It starts below the carts, as joints under the carts and above the tool
     ask for, links uncrossed, near `prototype.plate_rotation`. Pose and actuators all have start values, which meet in
     the middle: `tool=dict(r=Fixed(...), q=Fixed(...))` holds a pose exactly.
-    Raises TypeError for another kind of record, ModelError for another structure or turntables that are not rigid.
+    Raises ModelError for another kind of record, another structure, or turntables that are not rigid.
     """
 
     world = World()
@@ -146,8 +146,8 @@ class F1GantryTau(Model):
 
 def _check_prototype(prototype: RotatingPrototype, robot: str) -> None:
     if not isinstance(prototype, RotatingPrototype):
-        raise TypeError(
-            f"{robot}: found {prototype!r}, expected a record with turntables such as prototypes.F1"
+        raise WrongRecord(
+            f"{robot}: found {in_words(prototype)}, expected a record with turntables such as prototypes.F1"
         )
     found = tuple((len(arm.turntables), len(arm.links)) for arm in prototype.arms)
     if found != STRUCTURE:

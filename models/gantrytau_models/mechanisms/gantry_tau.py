@@ -5,9 +5,12 @@ between the cart and the tool; that the plate keeps its orientation is modelled 
 prismatic joints in series.
 """
 
+from typing import Any
+
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
+from gantrytau.errors import ModelError
 from gantrytau.language.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
@@ -145,6 +148,15 @@ class GantryTau(Model):
         )
 
 
+class WrongRecord(ModelError, TypeError):
+    """What a robot was given is no record that describes it, or no class of friction."""
+
+
+def in_words(found: Any) -> str:
+    """A record, or what was given in place of one, by its name: whole it is a page long."""
+    return f"{type(found).__name__}(name={found.name!r})" if hasattr(found, "name") else repr(found)
+
+
 def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Friction:
     return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
 
@@ -155,11 +167,13 @@ def driven_carts(
     robot: str,
     record: type = Prototype,
 ) -> list[dict]:
-    """Modifications of the carts of a robot; TypeError for what is no such record or no friction."""
+    """Modifications of the carts of a robot; ModelError for what is no such record or no friction."""
     if not isinstance(prototype, record):
-        raise TypeError(f"{robot}: found {prototype!r}, expected a prototype record such as prototypes.L1")
+        raise WrongRecord(
+            f"{robot}: found {in_words(prototype)}, expected a prototype record such as prototypes.L1"
+        )
     if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
-        raise TypeError(
+        raise WrongRecord(
             f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"
         )
     return [

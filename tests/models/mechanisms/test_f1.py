@@ -242,9 +242,13 @@ def test_members_are_modified_by_name(robots):
 def test_other_records_are_refused():
     f1_robot: Any = F1GantryTau
     three_links: Any = GantryTau
-    with pytest.raises(TypeError, match=r"F1GantryTau: found Prototype\(.*expected a record with turntables"):
+    with pytest.raises(
+        ModelError, match=r"F1GantryTau: found Prototype\(name='L1'\), expected a record with turn"
+    ):
         f1_robot(prototypes.L1)
-    with pytest.raises(TypeError, match=r"GantryTau: found RotatingPrototype\("):
+    with pytest.raises(
+        ModelError, match=r"GantryTau: found RotatingPrototype\(name='F1'\), expected a prototype"
+    ):
         three_links(prototypes.F1)
     with pytest.raises(TypeError, match=r"F1GantryTau: found friction='viscous', expected a class"):
         f1_robot(prototypes.F1, friction="viscous")

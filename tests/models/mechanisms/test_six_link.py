@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import SolveError, Start, check, simulate, translate
+from gantrytau import ModelError, SolveError, Start, check, simulate, translate
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.six_link import quaternion
 from tests.references import six_link as reference
@@ -183,5 +183,5 @@ def test_what_check_tells():
 
 
 def test_wrong_records_are_refused():
-    with pytest.raises(TypeError, match=r"SixLinkGantryTau: found 'L1', expected a prototype record"):
+    with pytest.raises(ModelError, match=r"SixLinkGantryTau: found 'L1', expected a prototype record"):
         SixLinkGantryTau("L1")  # pyright: ignore[reportArgumentType]
