@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.interruption import uninterrupted
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.fingerprint import hash_of, hashes, plain, versions
@@ -84,8 +85,8 @@ def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[s
     path = Path(path)
     text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
     if path.is_dir():
-        path = _reserved(path, record)
-    elif path.suffix.lower() != ".json":
+        return _added(path, record, text)
+    if path.suffix.lower() != ".json":
         raise ModelError(
             f"{path}: found neither a folder nor a name that ends in .json, expected one of them"
         )
@@ -230,18 +231,33 @@ def _written(function: Any, code: CodeType) -> str:
     return f"{code.co_code.hex()} {code.co_names} {constants} {outer}"
 
 
-def _reserved(folder: Path, record: Mapping[str, Any]) -> Path:
-    """A new empty file in the folder: problem, time of the start or of now, and a number if others run as well."""
-    moment = str(record["started"] or datetime.now(UTC).isoformat(timespec="seconds"))
+def _added(folder: Path, record: Mapping[str, Any], text: str) -> Path:
+    """A new file in the folder, whole from its first moment on: problem, time of the start or of now, and a number if
+    others run as well.
+    """
+    moment = str(record.get("started") or datetime.now(UTC).isoformat(timespec="seconds"))
     stem = f"{record['problem']['name']}-{moment[:19].replace(':', '')}"
-    for k in count():
-        path = folder / f"{stem}{f'-{k}' if k else ''}.json"
-        try:
-            path.touch(exist_ok=False)
-        except FileExistsError:
-            continue
-        return path
-    raise AssertionError("unreachable")
+    names = (folder / f"{stem}{f'-{k}' if k else ''}.json" for k in count())
+    partial = folder / f".{stem}.{os.getpid()}.json"
+    try:
+        with uninterrupted():
+            partial.write_text(text + "\n", encoding="utf-8")
+            return next(path for path in names if _linked(partial, path))
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _linked(partial: Path, path: Path) -> bool:
+    """Whether a file got this second name, which none had."""
+    try:
+        os.link(partial, path)
+    except FileExistsError:
+        return False
+    except OSError:  # a file system without second names
+        if path.exists():
+            return False
+        os.replace(partial, path)
+    return True
 
 
 def _differences(where: str, a: Any, b: Any) -> Iterator[tuple[str, str, str]]:
