@@ -20,6 +20,9 @@ from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
+STALLED = 1e-6  # of the algebraics: Newton steps below that which do not shrink are rounding
+TINY = 1e-300  # instead of zero in a divisor
+LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
 OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
 
@@ -33,7 +36,7 @@ class Coordinates:
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
     inputs, their slopes, values of the held variables, modes of the switches); substitutions: all symbols in terms of
     (t, x, z, w), one after the other; pieces: the equations with modes; renewed: what the held variables become at an
-    instant.
+    instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
     """
 
     dae: Translated
@@ -57,6 +60,7 @@ class Coordinates:
     dropped: ca.Function
     renewed: ca.Function
     conditioning: Conditioning
+    sizes: tuple[float, ...] = ()
 
     @property
     def constrained(self) -> bool:
@@ -82,6 +86,7 @@ class Coordinates:
 
         size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
         it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
+        Its states are in units of their sizes.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -99,6 +104,9 @@ class Coordinates:
         own = self.w[self.w.numel() - len(modes) :]
         equations = ca.substitute([self.ode, self.algebraic], [own], [ca.SX(ca.DM(modes))]) if modes else None
         rates, rest = equations or (self.ode, self.algebraic)
+        if any(one != 1 for one in self.sizes):
+            scale = ca.SX(ca.DM(self.sizes))
+            rates, rest = ca.substitute([rates / scale, rest], [self.x], [self.x * scale])
         ode, algebraic = ca.cse(ca.substitute([h * rates, rest], [old], [new]))
         # an integrator needs a state: a model without one gets a constant
         x, ode = (self.x, ode) if self.states else (ca.SX.sym("nothing"), ca.SX(0))
@@ -181,13 +189,14 @@ class Coordinates:
 
         x: (points, n); t: (points,); w: (points, m).
         """
-        x = x.copy()
+        x, least = x.copy(), LEAST * np.array(self.sizes or [1.0] * len(self.states))
         for columns, level, _ in self._levels:
             worst = np.zeros(len(x))
             for _ in range(STEPS):
                 residual, jacobian = (np.array(m) for m in level(x.T, t[None], t[None], w.T))
                 jacobian = jacobian.reshape(len(residual), len(x), len(columns)).transpose(1, 0, 2)
-                scale = np.maximum(np.einsum("kij,kj->ki", np.abs(jacobian), np.abs(x[:, columns])), 1e-3)
+                terms = np.maximum(np.abs(x[:, columns]), least[columns])
+                scale = np.einsum("kij,kj->ki", np.abs(jacobian), terms)
                 worst = np.max(np.abs(residual.T) / scale, axis=1)
                 if not np.any(worst > LARGEST_DRIFT):
                     break
@@ -212,6 +221,7 @@ class Coordinates:
 
     def settle(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
         """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
+        before = np.inf
         for _ in range(STEPS if self.algebraics else 0):
             residual, jacobian = (np.array(m) for m in self._algebra(x.T, z.T, t[None], t[None], w.T))
             jacobian = jacobian.reshape(len(residual), len(x), z.shape[1]).transpose(1, 0, 2)
@@ -222,8 +232,11 @@ class Coordinates:
             if not np.all(np.isfinite(step)):
                 return z
             z = z - step
-            if np.all(np.abs(step) <= LARGEST_DRIFT * (1.0 + np.abs(z))):
-                return z
+            worst = np.max(np.abs(step) / np.maximum(np.abs(z).max(axis=0), TINY))
+            stalled = before / 2 < worst < STALLED
+            if np.all(np.abs(step) <= LARGEST_DRIFT * np.abs(z)) or stalled:
+                return z  # found, or no better for rounding
+            before = worst
         return z
 
     @cached_property

@@ -46,13 +46,17 @@ class Run:
         self.seen = -1  # the last interval that was looked at closely
         self.events: list[float] = []  # times at which states made something switch
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, float(grid[0]), float(grid[-1]))
-        self.sizes = np.ones(len(coordinates.states))  # of states
+        self.sizes = self.integrators.sizes
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics, and what is held, at the output points that were reached."""
         trail = self.trail
         kept = trail.kept[trail.kept <= self.done]
         return trail.t[kept], trail.x[kept], trail.z[kept], trail.held[kept]
+
+    def largest(self) -> np.ndarray:
+        """The largest absolute value of each state so far."""
+        return np.abs(self.trail.x[: self.done + 1]).max(axis=0)
 
     def go(self) -> None:
         trail = self.trail

@@ -22,6 +22,7 @@ class Integrators:
 
     def __init__(self, coordinates: Coordinates, tolerance: float):
         self.coordinates, self.tolerance = coordinates, tolerance
+        self.sizes = np.array(coordinates.sizes or [1.0] * len(coordinates.states))
         self.size, self.by_modes = 1.0, False
         self._made: dict[tuple[int, int, tuple[float, ...]], ca.Function] = {}
 
@@ -69,9 +70,9 @@ class Integrators:
                 count, self.tolerance, size=self.size, steps=most, modes=modes
             )
         with contextlib.redirect_stderr(io.StringIO()):
-            found = self._made[key](x0=x if x.size else 0.0, z0=z, p=p, u=u)
+            found = self._made[key](x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)
         self.steps = int(self._made[key].stats()["nsteps"])
-        reached = np.array(found["xf"]).T if x.size else np.zeros((count, 0))
+        reached = np.array(found["xf"]).T * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")
         return reached, np.array(found["zf"]).T.reshape(count, -1)

@@ -21,14 +21,17 @@ from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
+from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.signals import PiecewiseLinear, Signal, read_signals
+from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
 OFTEN = 1e-2  # of that, where the integrator starts anew at hundreds of instants, in steps of first order
 LEAST = 1e-13  # of a step: rounding
+ROUNDS = 3  # of a run whose states prove to be smaller than was thought
 
 
 def simulate(
@@ -47,8 +50,10 @@ def simulate(
 
     start, stop: s; inputs: name -> number, function of time, or samples (times (n,), values (n,), (n, k) or
     (n, rows, columns)), joined by straight lines; an input that is not named keeps its start value.
-    parameters: name -> value; outputs: names to keep (all); tolerance: relative and absolute, of the result (a step of the
-    integrator gets a tenth, and errors of long motions add up); points: of the result.
+    parameters: name -> value; outputs: names to keep (all); tolerance: relative, and absolute in units of a state's
+    `nominal`, of the result (a step of the integrator gets a tenth, and errors of long motions add up). A state without
+    nominal counts as of size 1, or of that of a start below 1e-3; where all states that hang together stay below a
+    thousandth of their sizes, the run is repeated with the sizes seen. points: of the result.
     starts: name -> other start value, without a new translation: made consistent with the equations as those of the
     model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
     With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
@@ -71,7 +76,31 @@ def simulate(
     signals = read_signals(inputs or {}, dae.flat)
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)
+    coordinates = replace(coordinates, sizes=first_sizes(coordinates))
     grid = np.linspace(start, stop, points)
+    run = _run(coordinates, signals, grid, tolerance, outputs)
+    for _ in range(ROUNDS):
+        sizes = seen_sizes(coordinates, run.largest())
+        if sizes is None:
+            break
+        coordinates = replace(coordinates, sizes=sizes)
+        run = _run(coordinates, signals, grid, tolerance, outputs)
+    result = result_of(coordinates, signals, *run.so_far(), outputs)
+    doubt = doubts(result)
+    if doubt:
+        warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
+    return result
+
+
+def _run(
+    coordinates: Coordinates,
+    signals: Mapping[str, Signal],
+    grid: np.ndarray,
+    tolerance: float,
+    outputs: Sequence[str] | None,
+) -> Run:
+    """One run to its end; SolveError, with the result so far, where it stops before."""
+    dae = coordinates.dae
     margin = MARGIN * (OFTEN if dae.flat.sampled else 1.0)
     run = Run(coordinates, signals, grid, max(margin * tolerance, min(LEAST, MARGIN * tolerance)))
     try:
@@ -86,11 +115,7 @@ def simulate(
             time=float(reached[0][-1]),
             result=result_of(coordinates, signals, *reached, outputs),
         ) from None
-    result = result_of(coordinates, signals, *run.so_far(), outputs)
-    doubt = doubts(result)
-    if doubt:
-        warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
-    return result
+    return run
 
 
 def _check(start: float, stop: float, tolerance: float, points: int) -> None:

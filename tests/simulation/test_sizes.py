@@ -1,0 +1,77 @@
+"""Small is relative to `nominal`, or to what the motion shows: the same digits at every scale."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gantrytau import Input, Model, Parameter, Real, Start, der, if_else, simulate
+from gantrytau_models import Pendulum
+
+NEAR = 1e-5  # of the amplitude: a thousand times the tolerance, over sixteen periods
+
+
+def oscillator(size: float, *, nominal: bool, beside: float = 0.0) -> Model:
+    """x = size cos 5 t, with a decay beside it."""
+    one, five = ({"nominal": size}, {"nominal": 5 * size}) if nominal else ({}, {})
+
+    class Oscillator(Model):
+        x = Real(start=size, fixed=True, **one)
+        v = Real(start=0.0, fixed=True, **five)
+        y = Real(start=beside, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == self.v
+            yield der(self.v) == -25 * self.x
+            yield der(self.y) == -self.y
+
+    return Oscillator()
+
+
+@pytest.mark.parametrize("beside", [0.0, 1.0, 1e15])
+@pytest.mark.parametrize("nominal", [False, True])
+@pytest.mark.parametrize("size", [1.0, 1e-6, 1e-9, 1e-30, 1e15])
+def test_an_oscillator_has_the_same_digits_at_every_size(size, nominal, beside):
+    found = simulate(oscillator(size, nominal=nominal, beside=beside), stop=20.0)
+    np.testing.assert_allclose(found["x"] / size, np.cos(5 * found.time), rtol=0, atol=NEAR)
+    np.testing.assert_allclose(found["y"], beside * np.exp(-found.time), rtol=0, atol=1e-7 * beside)
+
+
+def test_a_small_motion_that_begins_at_rest():
+    class Pushed(Model):
+        f = Input()
+        x = Real(start=0.0, fixed=True)
+        v = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == self.v
+            yield der(self.v) == -25 * self.x + self.f
+
+    found = simulate(Pushed(), stop=20.0, inputs={"f": lambda t: if_else(t > 1, 25e-9, 0.0)})
+    exact = np.where(found.time > 1, 1 - np.cos(5 * (found.time - 1)), 0.0)
+    np.testing.assert_allclose(found["x"] / 1e-9, exact, rtol=0, atol=NEAR)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e-3, 1e3])
+def test_a_pendulum_of_any_length_keeps_its_rod(length):
+    second = math.sqrt(length)  # of the pendulum of one metre
+    model = Pendulum(L=length, x=Start(0.8 * length), y=Start(-0.6 * length))
+    found = simulate(model, stop=10 * second, points=101)
+    alike = simulate(Pendulum(L=1.0, x=Start(0.8), y=Start(-0.6)), stop=10.0, points=101)
+    rod = np.hypot(found["x"], found["y"]) / length
+    np.testing.assert_allclose(rod, 1.0, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(found["x"] / length, alike["x"], rtol=0, atol=NEAR)
+
+
+def test_what_is_given_small_among_large_states_counts():
+    class Mixed(Model):
+        k = Parameter(1.0)
+        large = Real(start=1.0, fixed=True)
+        small = Real(start=1e-9, fixed=True)
+
+        def equations(self):
+            yield der(self.large) == -self.k * self.large
+            yield der(self.small) == -self.large * self.small
+
+    found = simulate(Mixed(), stop=3.0)
+    np.testing.assert_allclose(found["small"] / 1e-9, np.exp(np.exp(-found.time) - 1), rtol=1e-6)
