@@ -23,7 +23,8 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 from gantrytau_optimica.transcription.transcribe import transcribe
 
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
-FINE = 1e-7  # of its size
+FINE, FINEST = 1e-7, 1e-11  # of its size, without and with deviations of the data
+SCATTER = 0.1  # of the scatter of chi-square, by which the mesh may raise it
 CANCELLED = 5.0  # times that: what elements may contribute that cancel each other
 MOST_OF = 0.6  # of the elements: where as many are cut, all are
 MUCH = 200.0  # times its share, from which on an element is cut twice
@@ -36,7 +37,8 @@ class MeshError:
 
     finer, w: the mesh of twice the elements, and the motion on it with the numbers of the fit; jacobian (N, k): slopes
     there; shift (k,): how far the best numbers there are off, about; parts: by phase, contributions (elements, k);
-    deviations (k,): of the numbers there.
+    deviations (k,): of the numbers there; allowed (k,): shifts that hardly matter; misfit: whether chi-square is more
+    than that of the noise because of the mesh.
     """
 
     finer: Residuals
@@ -46,11 +48,17 @@ class MeshError:
     parts: tuple[np.ndarray, ...]
     deviations: np.ndarray
     allowed: np.ndarray
+    misfit: bool = False
 
     @property
     def stands(self) -> bool:
         """Whether the mesh hardly matters."""
-        whole = np.sum([np.sum(np.abs(part), axis=0) for part in self.parts], axis=0)
+        return self.numbers_stand and not self.misfit
+
+    @property
+    def numbers_stand(self) -> bool:
+        """Whether it hardly matters to the numbers."""
+        whole = np.sum([np.sum(np.abs(part), axis=0) for part in self.parts], axis=0) if self.parts else 0.0
         return bool(np.all(np.abs(self.shift) <= self.allowed) and np.all(whole <= CANCELLED * self.allowed))
 
 
@@ -72,13 +80,35 @@ def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
     shift[inner] = bounded_step(weighed, errors, fit.sizes[inner], low[inner], high[inner])
     left = errors + weighed @ shift[inner]
     inverse = _inverse(weighed, fit.sizes[inner])
-    variance = 1.0 if known else float(left @ left) / max(left.size - inner.sum(), 1)
     deviations = np.zeros(shift.size)
-    deviations[inner] = np.sqrt(np.sum(inverse**2, axis=1) * variance)
+    deviations[inner] = np.sqrt(np.sum(inverse**2, axis=1) * _variance(left, inner, known))
     parts = np.zeros((finer.equations.size, shift.size))
     parts[:, inner] = finer.defects(near, -inverse * roots)
-    allowed = np.maximum(COARSE * deviations, FINE * fit.sizes)
-    return MeshError(finer, w, slopes, shift, _by_element(finer, layouts, parts), deviations, allowed)
+    lost = np.sum((fit.errors * roots) ** 2) - np.sum(left**2)
+    return MeshError(
+        finer, w, slopes, shift, _by_element(finer, layouts, parts), deviations, _allowed(deviations, fit, known),
+        misfit=bool(known and lost > SCATTER * np.sqrt(2 * left.size)),
+    )  # fmt: skip
+
+
+def error_against(fit: MeshFit, finer: MeshFit, known: bool) -> MeshError:
+    """The same from a fit on a finer mesh, where limits of the model hold the motion and steps do not tell."""
+    inner, roots = finer.inner, finer.weights.roots
+    inverse = _inverse(finer.jacobian[:, inner] * roots[:, None], finer.sizes[inner])
+    deviations = np.zeros(fit.numbers.size)
+    deviations[inner] = np.sqrt(np.sum(inverse**2, axis=1) * _variance(finer.errors * roots, inner, known))
+    shift = finer.numbers - fit.numbers
+    return MeshError(
+        finer.residuals, finer.w, finer.jacobian, shift, (), deviations, _allowed(deviations, fit, known)
+    )
+
+
+def _variance(errors: np.ndarray, inner: np.ndarray, known: bool) -> float:
+    return 1.0 if known else float(errors @ errors) / max(errors.size - int(inner.sum()), 1)
+
+
+def _allowed(deviations: np.ndarray, fit: MeshFit, known: bool) -> np.ndarray:
+    return np.maximum(COARSE * deviations, (FINEST if known else FINE) * fit.sizes)
 
 
 def carried_over(program: Program, w: np.ndarray, other: Program) -> np.ndarray:

@@ -10,11 +10,17 @@ from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, told_twice
+from gantrytau_optimica.estimation.mesh_error import COARSE
 from gantrytau_optimica.estimation.weights import median_deviation
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
 COMPUTED = 1e-6  # of the data: residuals that no measurement leaves
-ENDS = {"time": "raise max_time=", "lost": "raise elements=, or give guess= of the motion"}
+ENDS = {
+    "time": "raise max_time=",
+    "lost": "raise elements=, or give guess= of the motion",
+    "chosen": "raise elements=, or leave it out",
+    "elements": "raise points=, or split the experiment",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,11 +213,13 @@ class ParameterFit:
         """What the mesh costs, where that matters, and why it was not made finer."""
         if not self.names or self.ended == "":
             return []
-        ways = ENDS.get(self.ended, "raise elements=, or leave it out")
+        ways = ENDS[self.ended]
         moved = {n: abs(self.mesh_shift[n]) / self.finer_deviations[n] for n in self.names}
         if not np.all(np.isfinite(list(moved.values()))):
             return [f"what the mesh costs is not known, as the motion on a finer one was not found; {ways}"]
         worst = max(moved, key=lambda n: moved[n])
+        if moved[worst] <= COARSE:
+            return [f"the mesh is coarse: it adds to the residuals, although hardly to the numbers; {ways}"]
         return [
             f"the mesh is coarse: on twice the elements {worst} moves by {self.mesh_shift[worst]:.2g}, "
             f"{moved[worst]:.2g} of its deviations there; {ways}"

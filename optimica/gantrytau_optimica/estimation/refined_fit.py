@@ -13,6 +13,7 @@ from gantrytau_optimica.estimation.mesh_error import (
     MeshError,
     better_meshes,
     carried_over,
+    error_against,
     halved,
     mesh_error,
 )
@@ -21,11 +22,11 @@ from gantrytau_optimica.estimation.weights import Weighing
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-MOST_ROUNDS = 14
+MOST_ROUNDS, FEW_ROUNDS = 14, 3  # the latter where limits of the model hold the motion
 MOST_ELEMENTS = 6000
 BLIND = 2  # rounds in which all elements are cut because the data seem to tell nothing of a parameter
 
-Ended = Literal["", "time", "lost", "elements"]
+Ended = Literal["", "time", "lost", "elements", "chosen"]
 
 
 class TimeOver(Exception):
@@ -56,23 +57,30 @@ def refined_fit(
     error: MeshError | None = None
     blind = 0
     try:
-        for _ in range(MOST_ROUNDS):
+        for number in range(MOST_ROUNDS + 1):
             step(_cost(fit))
-            error = mesh_error(fit, weighing.known)
-            if not further:
-                return RefinedFit(fit, error, "" if error is not None and error.stands else "elements")
+            error, better = mesh_error(fit, weighing.known), None
+            if fit.limited:
+                better = fit_on(halved(fit), fit, None, weighing, solve, step)
+                error = error_against(fit, better, weighing.known) if better is not None else None
             resolved = error is not None and (blind == BLIND or _resolved(fit, error))
-            if error is not None and error.stands and resolved:
+            if error is not None and error.stands and (resolved or not further):
                 return RefinedFit(fit, error, "")
+            if not further:
+                return RefinedFit(fit, error, "chosen")
+            if number == (FEW_ROUNDS if fit.limited else MOST_ROUNDS):
+                break
             blind += not resolved
-            meshes = better_meshes(fit, error) if error is not None and resolved else halved(fit)
-            if sum(m.elements for m in meshes) > MOST_ELEMENTS:
-                return RefinedFit(fit, error, "elements")
-            better = fit_on(meshes, fit, error, weighing, solve, step)
+            if better is None:
+                whole = error is None or error.numbers_stand or not resolved
+                meshes = halved(fit) if error is None or whole else better_meshes(fit, error)
+                if sum(m.elements for m in meshes) > MOST_ELEMENTS:
+                    break
+                better = fit_on(meshes, fit, error, weighing, solve, step)
             if better is None:
                 return RefinedFit(fit, error, "lost")
+            keep(better)
             fit, error = better, None
-            keep(fit)
     except TimeOver:
         return RefinedFit(fit, error, "time")
     return RefinedFit(fit, error, "elements")

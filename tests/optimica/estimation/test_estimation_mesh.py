@@ -185,3 +185,31 @@ def test_an_input_that_switches_with_a_clock_of_its_own():
         )
     fit = estimate(Clocked, {"T": 0.5}, Experiment({"y": Samples(times, y)}))
     assert fit.parameters["T"] == pytest.approx(T, rel=1e-6)
+
+
+class Fading(Model):
+    """A decay that must not fall below a half."""
+
+    k = Parameter(1.0, unit="1/s")
+    y = Real(start=2.0, fixed=True, min=0.5)
+
+    def equations(self):
+        yield der(self.y) == -self.k * self.y
+
+
+def test_a_limit_of_the_model_that_holds_the_fit_is_told():
+    times = np.linspace(0.0, 3.0, 31)
+    fit = estimate(Fading, {"k": 1.0}, Experiment({"y": (times, 2.0 * np.exp(-0.7 * times))}))
+    assert fit.parameters["k"] == pytest.approx(np.log(4.0) / 3.0, rel=1e-7)  # y(3) = 0.5
+    assert "limits that the model declares for its variables bind and pull the fit" in repr(fit)
+
+
+def test_deviations_finer_than_the_default_mesh():
+    """A thousand millionth of the values: the mesh must not be what chi-square tells."""
+    times = np.linspace(0.0, 1.0, 31)
+    noise = 1e-9 * np.random.default_rng(1).normal(0.0, 1.0, 31)
+    experiment = Experiment({"y": Samples(times, 2.0 * np.exp(-0.7 * times) + noise, deviation=1e-9)})
+    fit = estimate(Fading, {"k": 1.0}, experiment)
+    within(fit, {"k": 0.7})
+    assert 1e-3 < fit.probability < 1 - 1e-3
+    assert fit.warnings == ()
