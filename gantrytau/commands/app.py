@@ -1,5 +1,8 @@
 """The command line. It alone joins the parts of the toolkit; each command imports what it needs."""
 
+from importlib.metadata import version as version_of
+from typing import Annotated
+
 import typer
 
 from gantrytau.commands import fmu
@@ -20,6 +23,22 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_show_locals=False,
 )
+
+
+def _tell(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"gantrytau {version_of('gantrytau')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_tell, is_eager=True)
+    ] = False,
+) -> None:
+    """Acausal models of parallel robots: simulate, optimise, calibrate, export."""
+
 
 app.command()(doctor)
 app.command()(demo)

@@ -13,6 +13,7 @@ from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
     Inputs,
     Json,
+    Kept,
     ModelName,
     Plotted,
     PrototypeName,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 SPELLING = Spelling(
     ("simulate",),
-    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points")}
+    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs")}
     | {"inputs": "--input", "parameters": "--set"},
 )
 
@@ -43,6 +44,7 @@ def simulate(
     tolerance: Annotated[float, typer.Option(help="Relative and absolute error per step.")] = 1e-8,
     points: Annotated[int, typer.Option(help="Number of output times.")] = 501,
     input_: Inputs = None,
+    outputs: Kept = None,
     output: Saved = None,
     plot: Plotted = None,
     to: To = None,
@@ -56,14 +58,16 @@ def simulate(
     """
     with reporting(json, source_of(model), SPELLING):
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
+        kept = listed(outputs)
         result_output.rehearse(output)
         place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
-        dae = _translated(chosen, drawn)
+        dae = _translated(chosen, (*drawn, *kept))
+        policy = dict(stop=stop, start=start, tolerance=tolerance, points=points)
         told: list[str] = []
         try:
             with _heard(told, json):
-                result = _simulated(dae, signals, stop=stop, start=start, tolerance=tolerance, points=points)
+                result = _simulated(dae, signals, outputs=(*kept, *drawn) if kept else None, **policy)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
         files = result_output.save(result, output)
@@ -135,13 +139,14 @@ def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
         f"{summary['model']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
         f"{len(result.names)} variables"
     )
-    if dae.states:
+    states = [name for name in dae.states if name in result]
+    if states:
         table = Table(box=SIMPLE, pad_edge=False)
         table.add_column("state", no_wrap=True)
         for heading in ("start", "end", "least", "greatest"):
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("unit")
-        for name in dae.states:
+        for name in states:
             values = result[name]
             numbers = (values[0], values[-1], values.min(), values.max())
             table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))

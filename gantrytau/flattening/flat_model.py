@@ -162,7 +162,7 @@ class FlatModel:
             return (name,)
         if base in self.absent:
             raise ModelError(f"{self.name}: {base} does not exist: {self.absent[base]}")
-        known = [n for v in self.vectors.values() for n in (v.name, *v.elements)]
+        known = dict.fromkeys(n for v in self.vectors.values() for n in (v.name, *v.elements))
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
 
     def shape(self, name: str) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ def save(result: Series, path: str | os.PathLike[str]) -> Path:
     if writer is None:
         raise ModelError(
             f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
-            f"{did_you_mean(path.suffix.lower(), _WRITERS)}"
+            + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0]
         )
     with replacing(path) as partial:
         writer(result, partial)

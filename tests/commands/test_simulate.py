@@ -48,6 +48,15 @@ def test_a_pushed_cart_goes_as_far_as_newton_says(run, answer, robots):
     ]
 
 
+def test_only_the_outputs_that_are_asked_for_are_kept(run, answer, robots, tmp_path):
+    arguments = ("simulate", f"{robots}:Cart(m=2)", "--input", "f=3", "--stop", "4", "--outputs", "x,der(v)")
+    assert answer(*arguments)["final"] == pytest.approx({"x": 12.0, "der(v)": 1.5}, rel=1e-7)
+    assert run(*arguments, "--output", str(tmp_path / "cart.csv")).exit_code == 0
+    assert list(columns(tmp_path / "cart.csv")) == ["time [s]", "x [m]", "der(v) [m/s2]"]
+    wrong = run(*arguments[:-1], "speed")
+    assert (wrong.exit_code, "no variable or parameter 'speed'" in wrong.stderr) == (FAULT, True)
+
+
 def test_the_mass_may_stand_in_parentheses(answer, robots):
     found = answer("simulate", f"{robots}:Cart(m=2)", "--input", "f=3", "--stop", "4")
     assert found["final"]["v"] == pytest.approx(3 / 2 * 4, rel=1e-7)  # ten times the tolerance

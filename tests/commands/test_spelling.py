@@ -14,6 +14,7 @@ from gantrytau.commands import equations_command, simulate_command
 from gantrytau.commands.arguments import solver_options
 from gantrytau.commands.calibrate import calibration_options, plan_command
 from gantrytau.commands.fmu import export_options, fmu_run
+from gantrytau.commands.printing.spelling import Spelling
 
 OPTIMIZE, CALIBRATE = solver_options.SPELLING, calibration_options.SPELLING
 PLAN, RUN = plan_command.SPELLING, fmu_run.SPELLING
@@ -103,3 +104,8 @@ def test_what_is_said_in_other_words_is_written_in_the_packages():
 def test_arguments_become_options(spelling, said, argument, spoken):
     spoken = spoken or "--start linear for F1: expected 'nominal'"
     assert spelling.of(ModelError(said, argument=argument)) == spoken
+
+
+def test_a_dictionary_is_told_as_name_and_value():
+    said = Spelling((), {"inputs": "--input"}).words("give inputs={'carts[0].f': ...}, or inputs={'f': 2}")
+    assert said == "give --input carts[0].f=..., or --input f=2"

@@ -1,6 +1,7 @@
 """Commands, arguments and options that do not exist, or are missing."""
 
 import json
+from importlib.metadata import version
 
 import pytest
 
@@ -26,3 +27,8 @@ def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
     assert printed.stderr == ""
     assert spoken.stdout == ""
     assert words in spoken.stderr
+
+
+def test_the_version_is_told(run):
+    told = run("--version")
+    assert (told.exit_code, told.stdout) == (0, f"gantrytau {version('gantrytau')}\n")

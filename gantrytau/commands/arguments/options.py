@@ -45,6 +45,15 @@ To = Annotated[
         "--to", help="Where to draw: a picture (.png, .pdf, .svg) or 'window'.", show_default="window"
     ),
 ]
+Kept = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--outputs",
+        metavar="NAMES",
+        help="Keep only these variables, separated by commas.",
+        show_default="all",
+    ),
+]
 Saved = Annotated[
     Path | None,
     typer.Option(help="Save all variables: .csv, .nc, .mat (Dymola) or .parquet.", show_default=False),

@@ -38,13 +38,18 @@ class Spelling:
         for python, here in self.exactly.items():
             message = message.replace(python, here)
         names = "|".join(self.options)
-        keyword = rf"\b({names})=(?!=)('[^']*'|\[[^\]]*\]|[\w.+-]*\w)?" if names else r"(?!)"
+        keyword = (
+            rf"\b({names})=(?!=)('[^']*'|\[[^\]]*\]|{{'[^']*': [^}}]*}}|[\w.+-]*\w)?" if names else r"(?!)"
+        )
         return re.sub(keyword, self._option, message).strip()
 
     def _option(self, found: re.Match[str]) -> str:
         option, value = self.options[found[1]], found[2]
         if value is None or found[1] in self.flags:
             return option
+        pair = re.fullmatch(r"{'([^']*)': ([^}]*)}", value)  # of a dictionary
+        if pair:
+            return f"{option} {pair[1]}={pair[2]}"
         plain = value.strip("'")
         word = re.fullmatch(r"[\w.+-]+", plain)  # a shell needs quotes for the rest
         return f"{option} {plain if word else value}"
