@@ -16,7 +16,7 @@ from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
 
 POOR = 1e4  # condition of the choice of states from which it deserves a remark
-FAR = 1e-6  # how far a start value moves, relative to its size, before that is worth a line
+FAR = 1e-6  # how far a start value moves, relative to the sizes there are, before that is worth a line
 
 
 @dataclass(frozen=True)
@@ -132,14 +132,18 @@ def _sizes(flat: FlatModel, known: int) -> tuple[int, int]:
 
 
 def _moved(dae: Translated) -> tuple[Moved, ...]:
-    """Start values that the start does not have, of aliases too."""
+    """Start values that the start does not have, of aliases too; far is relative to the largest of the same unit."""
     started = [v for v in dae.flat.variables if v.start is not None]
     names = [n for v in started for n in v.elements]
     asked = [x for v in started for x in dae.table.numbers(ca.vertcat(*(v.start or ()))).tolist()]
     found = dae.numbers(names, dae.start).tolist() if names else []
+    units = [v.unit or v.name for v in started for _ in v.elements]
+    sizes: dict[str, float] = {}
+    for unit, a, f in zip(units, asked, found, strict=True):
+        sizes[unit] = max(sizes.get(unit, 0.0), abs(a), abs(f))
     moved = [
         Moved(n, a, f)
-        for n, a, f in zip(names, asked, found, strict=True)
-        if abs(f - a) > FAR * max(1.0, abs(a)) and dae.reduced.aliases[n].root not in dae.known
+        for n, unit, a, f in zip(names, units, asked, found, strict=True)
+        if abs(f - a) > FAR * sizes[unit] and dae.reduced.aliases[n].root not in dae.known
     ]
     return tuple(sorted(moved, key=lambda m: -abs(m.found - m.asked)))

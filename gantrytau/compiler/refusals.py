@@ -44,8 +44,8 @@ def _causes(reduced: Reduced, flat: FlatModel) -> list[str]:
     found = []
     for name, equations in bound.items():
         if _helps(reduced, flat, without=equations):
-            values = ", ".join(str(e.right) for e in equations)
-            value = f"[{values}]" if flat.vectors[name].shape else values
+            texts = np.array([str(e.right) for e in equations]).reshape(flat.vectors[name].shape, order="F")
+            value = str(texts.tolist()).replace("'", "")
             own = name.rpartition(".")[2]
             found.append(
                 f"{name} is set by the modification {own}={value}, which is an equation; a start value is "

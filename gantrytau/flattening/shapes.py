@@ -1,7 +1,7 @@
 """Values given for quantities: one rule of shapes for starts, parameters, inputs, points and guesses.
 
-An array has the shape of the quantity: () or a number, (n,), (rows, columns). A column of CasADi, (n, 1), is a vector.
-Elements run column after column, as `element_names` does.
+An array has the shape of the quantity: () or a number, (n,), (rows, columns). A column (n, 1), as of CasADi, and a vector
+(n,) are the same. Elements run column after column, as `element_names` does.
 """
 
 from typing import Any
@@ -34,7 +34,7 @@ def elements_of(
 def fits(found: Shape, shape: Shape) -> bool:
     """Whether an array of the shape that was found is a value of a quantity of `shape`."""
     single = int(np.prod(found)) == int(np.prod(shape)) == 1
-    return single or found == shape or (len(shape) == 1 and found == (*shape, 1))
+    return single or found == shape or found == (*shape, 1)[:2] or (*found, 1) == shape
 
 
 def check_shape(place: str, found: Shape, shape: Shape) -> None:

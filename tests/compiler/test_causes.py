@@ -24,10 +24,12 @@ from gantrytau.mechanics import multibody, rotational
 class Decay(Model):
     x = Real(start=1.0)
     r = Real(2, start=1.0)
+    R = Real((1, 2), start=1.0)
 
     def equations(self):
         yield der(self.x) == -self.x
         yield der(self.r) == -self.r
+        yield der(self.R) == -self.R
 
 
 class Axis(Model):
@@ -69,6 +71,7 @@ def refused(model, **request):
     [
         (Decay(x=2.5), "x", "x", "2.5"),
         (Decay(r=[2.5, 3.5]), "r", "r", "[2.5, 3.5]"),
+        (Decay(R=[[1.5, 2.5]]), "R", "R", "[[1.5, 2.5]]"),
         (type("Around", (Model,), {"part": Array(Decay, 2, x=2.5)})(), "part[0].x", "x", "2.5"),
         (Hinge(), "joint.phi", "phi", "0.5"),
     ],

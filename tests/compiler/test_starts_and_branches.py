@@ -191,3 +191,17 @@ def test_what_starts_at_a_fixed_place_with_a_fixed_speed_is_a_state():
     assert motions[0]["L"][0] == 1.0
     for name in (*names, "px", "pz"):
         np.testing.assert_allclose(motions[0][name], motions[1][name], rtol=0, atol=1e-7)  # sums of errors
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_a_start_that_moves_is_told_at_every_size(size):
+    class Moved(Model):
+        x = Real(unit="m", start=2 * size)
+        y = Real(unit="m", start=size, fixed=True)
+
+        def equations(self):
+            yield self.x == self.y
+            yield der(self.y) == 0
+
+    (moved,) = translate(Moved(), units=False).diagnosis.moved
+    assert (moved.name, moved.asked, moved.found) == ("x", 2 * size, size)

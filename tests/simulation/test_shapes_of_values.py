@@ -64,6 +64,19 @@ def test_a_column_of_casadi_is_a_vector():
     np.testing.assert_array_equal(translate(Shapes()).evaluate({"u": column})["z"], [1.0, 2.0])
 
 
+@pytest.mark.parametrize("value", [[[1.0], [2.0], [3.0]], [1.0, 2.0, 3.0], lambda t: [[t / t], [2.0], [3.0]]])
+def test_a_column_that_is_a_matrix(value):
+    class Tall(Model):
+        U = Input((3, 1), start=0.0)
+        y = Real((3, 1))
+
+        def equations(self):
+            yield self.y == 1.0 * self.U
+
+    found = simulate(Tall(), stop=1.0, points=2, inputs={"U": value}).final("y")
+    np.testing.assert_array_equal(found, [[1.0], [2.0], [3.0]])
+
+
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
