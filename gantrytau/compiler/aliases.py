@@ -345,7 +345,10 @@ class _Elimination:
             a, b, factor_a, factor_b = b, a, factor_b, factor_a
         if a[1] > 0 or a[0] in self.known or a[0] == b[0] or (b[1] > 0 and not offset.is_zero()):
             return False
-        self.parents[a[0]] = Alias(b[0], b[1], -factor_b / factor_a, _plus(ZERO, -1 / factor_a, offset))
+        factor = -factor_b / factor_a
+        if not 0 < abs(factor) < np.inf:  # the ratio of two numbers may be none
+            return False
+        self.parents[a[0]] = Alias(b[0], b[1], factor, _plus(ZERO, -1 / factor_a, offset))
         return True
 
     def _before(self, a: str, b: str, scaled: bool) -> bool:

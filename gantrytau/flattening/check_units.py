@@ -1,11 +1,12 @@
 """Checks that the two sides of every equation, and the terms of every sum, have one dimension.
 
-A number has no unit of its own: in a product it counts as one, in a sum it takes the unit of its
-neighbours. Quantities declared without a unit fit anywhere. Formulas of parameters, starts and limits are checked as
-equations are. The time times a number is taken as an angle: `sin(3 * time)` is what everybody writes.
+A number has no unit of its own: in a product it counts as one, in a sum it takes the unit of its neighbours. Quantities
+declared without a unit fit anywhere. Formulas of parameters, starts and limits are checked as equations are. The time times
+a number is taken as an angle, and its sine as a number: `0.5 * sin(3 * time)` is what everybody writes.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -148,10 +149,11 @@ def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
     units, words = [term.unit for term in operands], [term.text for term in operands]
     constant = None
     if operator in (ca.OP_POW, ca.OP_CONSTPOW) and units[1] == NUMBER:
-        constant = Fraction(words[1]).limit_denominator(1000)
+        with suppress(ValueError):  # of a function of time, which is a number as well
+            constant = Fraction(words[1]).limit_denominator(1000)
     unit, fault = _unit(operator, units, words, constant)
     if fault and operator in ANGLES and operands[0].clock:
-        fault = None
+        unit, fault = NUMBER, None
     carried = next((term.fault for term in operands if term.fault), "")
     plain = [term for term in operands if term.unit != NUMBER]
     clock = (

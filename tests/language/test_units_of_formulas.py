@@ -130,11 +130,26 @@ class Driven(Model):
         (lambda m: exp(-(time - 1)), math.exp(-1.0)),
         (lambda m: sin(2 * time + time), math.sin(6.0)),
         (lambda m: sin(m.omega * time), math.sin(6.0)),
+        (lambda m: 2.0 ** sin(3 * time), 2.0 ** math.sin(6.0)),
     ],
 )
 def test_the_time_times_a_number_is_an_angle(course, value):
     model = type("Course", (Driven,), {"course": course})()
     assert simulate(model, stop=2.0, points=3).final("x") == pytest.approx(value, rel=1e-12)
+
+
+def test_a_course_of_numbers_and_time_fits_anywhere():
+    class Shaken(Model):
+        omega = Parameter(3.0, unit="rad/s")
+        x = Real(unit="m")
+        y = Real(unit="m")
+
+        def equations(self):
+            yield self.x == 0.5 * sin(3 * time)
+            yield self.y == 0.5 * sin(self.omega * time)
+
+    with pytest.raises(ModelError, match=r"equation 2: .* left side is in 'm', the right side in '1'"):
+        translate(Shaken())
 
 
 @pytest.mark.parametrize(
