@@ -20,6 +20,7 @@ from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
+BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time does not vanish
 STALLED = 1e-6  # of the algebraics: Newton steps below that which do not shrink are rounding
 TINY = 1e-300  # instead of zero in a divisor
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
@@ -80,13 +81,14 @@ class Coordinates:
         size: float = 1.0,
         steps: int = 100_000,
         modes: Sequence[float] = (),
+        longest: float | None = None,
         compiled: bool = False,
     ) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
 
         size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
         it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
-        Its states are in units of their sizes.
+        Its states are in units of their sizes. longest: step, in intervals.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -118,6 +120,8 @@ class Coordinates:
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
         }
+        if longest is not None and np.isfinite(longest):
+            options["max_step_size"] = longest
         if compiled:
             options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
@@ -135,6 +139,27 @@ class Coordinates:
         for substitution in self.substitutions:
             found = substitution.inserted(found)
         return found
+
+    @cached_property
+    def of_time(self) -> ca.SX:
+        """Functions of time alone: known symbols, and equations that name the time, at the start and beside it."""
+        dae, rows = self.dae, []
+        for key, leaves in dae.indexed.incidence.items():
+            if any(leaf.root == time.name() for leaf in leaves):
+                rows.append(dae.indexed.residuals[key])
+        functions = [ca.SX(e) for e in self.known.values()]
+        for beside in (0.0, BESIDE) if rows else ():
+            row = ca.vertcat(*rows)
+            leaves = [leaf for leaf in ca.symvar(row) if leaf.name() != time.name()]
+            steady = dae.table.values
+            values = [
+                steady[n.name()] if n.name() in steady else dae.start[n.name()] * (1 + beside) + beside
+                for n in leaves
+            ]
+            functions.append(ca.substitute(row, ca.vertcat(*leaves), ca.SX(ca.DM(values))) if leaves else row)
+        found = ca.vertcat(*functions) if functions else ca.SX(0, 1)
+        inputs = ca.vertcat(self.w, self.t0)
+        return ca.substitute(found, inputs, 0 * inputs)
 
     def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Consistent states, algebraics and modes at the start, with the inputs as they are then."""

@@ -11,6 +11,7 @@ from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.margins import ROUNDING, Margins
+from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
@@ -37,15 +38,25 @@ class Run:
     """One integration over a grid, in chunks."""
 
     def __init__(
-        self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, tolerance: float
+        self,
+        coordinates: Coordinates,
+        signals: Mapping[str, Signal],
+        grid: np.ndarray,
+        tolerance: float,
+        longest: float | None = None,
     ):
-        self.coordinates, self.integrators = coordinates, Integrators(coordinates, tolerance)
-        self.span = float(grid[-1] - grid[0])
-        self.trail = Trail(coordinates, signals, grid)
+        """longest: step of the integrator, s."""
+        self.coordinates = coordinates
+        begin, end = float(grid[0]), float(grid[-1])
+        self.span = end - begin
+        self.pulses = pulses(coordinates.of_time, begin, end, longest)
+        self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
+        interval = float(np.diff(self.trail.t).max())
+        self.integrators = Integrators(coordinates, tolerance, longest, interval)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.events: list[float] = []  # times at which states made something switch
-        self.by_time = TimeEvents(coordinates.switches, coordinates.w, float(grid[0]), float(grid[-1]))
+        self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, end)
         self.sizes = self.integrators.sizes
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -214,6 +225,8 @@ class Run:
         trail.held[here + 1 : here + count + 1] = trail.held[here]
         ahead = np.arange(here, here + count + 1)
         courses = self._courses(here, count) if self.coordinates.stepwise else None
+        within = self.pulses.within(float(trail.t[here] + trail.t[here + 1]) / 2)
+        self.integrators.shorter = self.pulses.step if within else None
         x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
         if self._too_wide(count):
             return False

@@ -20,11 +20,14 @@ class Integrators:
     size: of algebraics, below which their errors do not count; by_modes: whether each choice of modes has its own.
     """
 
-    def __init__(self, coordinates: Coordinates, tolerance: float):
+    def __init__(self, coordinates: Coordinates, tolerance: float, longest: float | None, interval: float):
+        """longest: step anywhere, s; interval: the longest between two places, s."""
         self.coordinates, self.tolerance = coordinates, tolerance
         self.sizes = np.array(coordinates.sizes or [1.0] * len(coordinates.states))
+        self.longest, self.interval = longest, interval
+        self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
-        self._made: dict[tuple[int, int, tuple[float, ...]], ca.Function] = {}
+        self._made: dict[tuple[int, int, tuple[float, ...], float | None], ca.Function] = {}
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -64,10 +67,12 @@ class Integrators:
         """One call of an integrator, which else writes its complaints to the screen."""
         own = len(self.coordinates.switches) if self.by_modes else 0
         modes = tuple(np.reshape(u, (-1, count), order="F")[-own:, 0].tolist()) if own else ()
-        key = count, most, modes
+        limits = [step for step in (self.longest, self.shorter) if step is not None]
+        longest = min(limits) / self.interval if limits else None
+        key = count, most, modes, longest
         if key not in self._made:
             self._made[key] = self.coordinates.integrator(
-                count, self.tolerance, size=self.size, steps=most, modes=modes
+                count, self.tolerance, size=self.size, steps=most, modes=modes, longest=longest
             )
         with contextlib.redirect_stderr(io.StringIO()):
             found = self._made[key](x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)

@@ -45,6 +45,7 @@ def simulate(
     tolerance: float = 1e-8,
     points: int = 501,
     starts: Mapping[str, Any] | None = None,
+    max_step: float | None = None,
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
@@ -58,11 +59,14 @@ def simulate(
     model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
     With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
     an FMU keeps the states of its export.
+    max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
+    and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
+    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are.
     """
-    _check(start, stop, tolerance, points)
+    _check(start, stop, tolerance, points, max_step)
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
     if parameters:
@@ -76,16 +80,8 @@ def simulate(
     signals = read_signals(inputs or {}, dae.flat)
     _check_inputs(dae, signals, start, stop)
     coordinates = all_coordinates(dae, signals, wanted)
-    coordinates = replace(coordinates, sizes=first_sizes(coordinates))
-    grid = np.linspace(start, stop, points)
-    run = _run(coordinates, signals, grid, tolerance, outputs)
-    for _ in range(ROUNDS):
-        sizes = seen_sizes(coordinates, run.largest())
-        if sizes is None:
-            break
-        coordinates = replace(coordinates, sizes=sizes)
-        run = _run(coordinates, signals, grid, tolerance, outputs)
-    result = result_of(coordinates, signals, *run.so_far(), outputs)
+    run = _run(coordinates, signals, np.linspace(start, stop, points), tolerance, max_step, outputs)
+    result = result_of(run.coordinates, signals, *run.so_far(), outputs)
     doubt = doubts(result)
     if doubt:
         warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
@@ -97,28 +93,42 @@ def _run(
     signals: Mapping[str, Signal],
     grid: np.ndarray,
     tolerance: float,
+    max_step: float | None,
     outputs: Sequence[str] | None,
 ) -> Run:
-    """One run to its end; SolveError, with the result so far, where it stops before."""
-    dae = coordinates.dae
-    margin = MARGIN * (OFTEN if dae.flat.sampled else 1.0)
-    run = Run(coordinates, signals, grid, max(margin * tolerance, min(LEAST, MARGIN * tolerance)))
+    """A run that has ended, with sizes of its states that it bears out."""
+    margin = MARGIN * (OFTEN if coordinates.dae.flat.sampled else 1.0)
+    step = max(margin * tolerance, min(LEAST, MARGIN * tolerance))
+    coordinates = replace(coordinates, sizes=first_sizes(coordinates))
+    run = _to_the_end(Run(coordinates, signals, grid, step, max_step), signals, outputs)
+    for _ in range(ROUNDS):
+        sizes = seen_sizes(coordinates, run.largest())
+        if sizes is None:
+            break
+        coordinates = replace(coordinates, sizes=sizes)
+        run = _to_the_end(Run(coordinates, signals, grid, step, max_step), signals, outputs)
+    return run
+
+
+def _to_the_end(run: Run, signals: Mapping[str, Signal], outputs: Sequence[str] | None) -> Run:
+    """A run when it has ended; SolveError, with the result so far, where it stops before."""
+    coordinates = run.coordinates
     try:
         run.go()
     except SolveError as error:
-        error.result = result_of(coordinates, signals, *run.so_far(), outputs)
+        error.result = result_of(run.coordinates, signals, *run.so_far(), outputs)
         raise
     except KeyboardInterrupt:
         reached = run.so_far()
         raise SolveError(
-            f"{dae.name}: simulation interrupted at t = {reached[0][-1]:.4g} s; .result holds what was computed",
+            f"{coordinates.dae.name}: simulation interrupted at t = {reached[0][-1]:.4g} s; .result holds what was computed",
             time=float(reached[0][-1]),
             result=result_of(coordinates, signals, *reached, outputs),
         ) from None
     return run
 
 
-def _check(start: float, stop: float, tolerance: float, points: int) -> None:
+def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:
     numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
     if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
         raise ModelError(
@@ -129,6 +139,10 @@ def _check(start: float, stop: float, tolerance: float, points: int) -> None:
         raise ModelError(
             f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8",
             argument="tolerance",
+        )
+    if max_step is not None and not (isinstance(max_step, (int, float, np.number)) and 0 < max_step < np.inf):
+        raise ModelError(
+            f"simulate: found max_step={max_step!r}, expected a number above zero, in s", argument="max_step"
         )
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
         raise ModelError(

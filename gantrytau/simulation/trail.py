@@ -19,7 +19,10 @@ class Trail:
     are sampled there; stops: whether an integration ends there; kept: places of the output points.
     """
 
-    def __init__(self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray):
+    def __init__(
+        self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, spans: np.ndarray
+    ):
+        """spans: of time, (n, 2) in s, at whose ends an integration ends."""
         samples = {n: s for n, s in signals.items() if isinstance(s, PiecewiseLinear)}
         self.samples = [samples[n] for n in coordinates.sampled]
         knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
@@ -27,7 +30,7 @@ class Trail:
         parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
         fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
         fine[::parts] = grid
-        watched = coordinates.conditioning.needed or len(coordinates.switches)
+        watched = coordinates.conditioning.needed or len(coordinates.switches) or len(spans)
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
         periods = np.array([table.number(s.period) for s in events])
@@ -35,6 +38,8 @@ class Trail:
         self.t, self.due = found.mesh, found.due
         self.stops = np.asarray(self.due.any(axis=1))
         self.stops[-1] = True
+        self.stops[np.searchsorted(self.t, spans[:, 0], side="right") - 1] = True
+        self.stops[np.minimum(np.searchsorted(self.t, spans[:, 1]), self.last)] = True
         self.kept: np.ndarray = np.searchsorted(self.t, grid)
         size = self.t.size
         self.x = np.full((size, len(coordinates.states)), np.nan)

@@ -1,6 +1,7 @@
 """Small is relative to `nominal`, or to what the motion shows: the same digits at every scale."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ NEAR = 1e-5  # of the amplitude: a thousand times the tolerance, over sixteen pe
 
 def oscillator(size: float, *, nominal: bool, beside: float = 0.0) -> Model:
     """x = size cos 5 t, with a decay beside it."""
-    one, five = ({"nominal": size}, {"nominal": 5 * size}) if nominal else ({}, {})
+    one: dict[str, Any] = {"nominal": size} if nominal else {}
+    five: dict[str, Any] = {"nominal": 5 * size} if nominal else {}
 
     class Oscillator(Model):
         x = Real(start=size, fixed=True, **one)

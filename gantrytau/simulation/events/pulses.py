@@ -1,0 +1,57 @@
+"""Where functions of time rest and then change: an integrator that sees them at rest would step over what follows."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.language.symbols import time
+
+DENSE = 20_000  # steps of the run in which functions of time are looked at
+COARSE = 500  # parts of the run, of each of which is asked whether they rest
+AT_REST = 1e-6  # of all its changes: what a function may change in a part in which it rests
+RESTING = 4  # parts in a row in which a function rests, so that an integrator forgets it
+MOST = 2_000_000  # steps in which it is looked at for the sake of a shorter longest step
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """Spans of time, (n, 2) in s, within which no step must be longer than `step`, s."""
+
+    spans: np.ndarray
+    step: float
+
+    def within(self, t: float) -> bool:
+        """Whether a time lies in one of them."""
+        return bool(np.any((self.spans[:, 0] <= t) & (t < self.spans[:, 1])))
+
+
+def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = None) -> Pulses:
+    """What changes after it was at rest in functions of time between begin and end, as far as 20,000 points show it.
+
+    longest: the longest step allowed anywhere, s, within which nothing is taken to happen.
+    """
+    nothing = Pulses(np.zeros((0, 2)), np.inf)
+    moving = [e for e in functions.elements() if ca.depends_on(e, time)]
+    if not moving:
+        return nothing
+    fine = DENSE // COARSE
+    if longest is not None:
+        fine = max(fine, min(int(np.ceil((end - begin) / longest / COARSE)), MOST // COARSE))
+    t = np.linspace(begin, end, fine * COARSE + 1)
+    values = np.array(ca.Function("functions", [time], [ca.vertcat(*moving)])(t[None]))
+    whole = np.nanmax(values, axis=1) - np.nanmin(values, axis=1)
+    parts = np.stack([values[:, k : k + fine * COARSE : fine] for k in range(fine)] + [values[:, fine::fine]])
+    changes = np.nanmax(parts, axis=0) - np.nanmin(parts, axis=0)  # (functions, COARSE)
+    rests = changes <= AT_REST * whole[:, None]
+    long = np.array([np.convolve(r, np.ones(RESTING), "valid").max() >= RESTING for r in rests])
+    some = long & (whole > 0)
+    if not some.any():
+        return nothing
+    active = np.any(~rests[some], axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
+    spans = begin + (end - begin) / COARSE * edges.reshape(-1, 2)
+    steps = np.abs(np.diff(values[some], axis=1)).reshape(int(some.sum()), COARSE, fine)
+    busy = np.mean(steps > AT_REST * whole[some][:, None, None], axis=2)  # share of an active part
+    narrow = np.any((busy > 0) & (busy < 1 / 2))
+    return Pulses(spans, (end - begin) / COARSE / (fine / 2 if narrow else 4))
