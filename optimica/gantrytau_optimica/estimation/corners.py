@@ -12,6 +12,9 @@ BENT = (
 )
 LOOKED = 4000  # places of a horizon at which switches that are no plain times are looked for
 BISECTIONS = 60
+SAMPLED = 100_000  # places of a horizon at which equations are looked at that depend on time
+UNSEEN = 0.01  # of all that they change over time, by its integral: what points of one element may miss
+CUTS, MOST_CUT = 16, 400  # how often elements are cut for it, and how many may come of it
 BEFORE = 1e-12  # of the horizon: a border stands that much before a switch, as the last point of an element is on it
 
 
@@ -25,9 +28,9 @@ def corners(problem: ControlProblem, phase: Phase) -> np.ndarray:
 
 
 def with_corners(mesh: Mesh, problem: ControlProblem, phase: Phase, most: int) -> Mesh:
-    """The mesh with borders at all corners, if these are not more than `most`."""
+    """The mesh with borders at all corners, if these are not more than `most`, and around what its points would miss."""
     shares = corners(problem, phase)
-    return with_borders(mesh, shares) if 0 < shares.size <= most else mesh
+    return _seeing(with_borders(mesh, shares) if 0 < shares.size <= most else mesh, problem, phase)
 
 
 def _bends(phase: Phase) -> np.ndarray:
@@ -81,3 +84,42 @@ def _changes(mode: ca.Function, grid: np.ndarray) -> np.ndarray:
         same = at(middle) == before if middle.size else np.zeros(0, bool)
         left, right = np.where(same, middle, left), np.where(same, right, middle)
     return right
+
+
+def _seeing(mesh: Mesh, problem: ControlProblem, phase: Phase) -> Mesh:
+    """The mesh cut where functions of time in the equations are not seen by the points of its elements, as narrow pulses."""
+    courses = [c.symbol for c in phase.courses]
+    equations = ca.vertcat(phase.ode, phase.residuals)
+    of_time = np.flatnonzero(ca.which_depends(equations, problem.time, 1, True)) if equations.numel() else []
+    if not len(of_time):
+        return mesh
+    equations = equations[[int(k) for k in of_time]]
+    known = [s.symbol for s in phase.signals] + courses + [n.symbol for n in problem.free]
+    values = [float(s.guess(np.zeros(1))[0]) for s in phase.signals] + [0.0] * len(courses)
+    values += [n.guess for n in problem.free]
+    moving = ca.Function("moving", [problem.time, ca.vertcat(*known)], [equations])
+    start, final = float(phase.start_time), float(phase.final_time)
+    share = (np.arange(SAMPLED) + 0.5) / SAMPLED
+    found = np.array(moving(ca.DM(start + (final - start) * share).T, ca.DM(values)))
+    rows = found[np.all(np.isfinite(found), axis=1)]
+    rows = rows[np.ptp(rows, axis=1) > 0]
+    if not rows.size:
+        return mesh
+    change = rows - np.median(rows, axis=1)[:, None]
+    change /= np.mean(np.abs(change), axis=1)[:, None]
+    for _ in range(CUTS):
+        missed = _missed(mesh, share, change)
+        if not np.any(missed > UNSEEN) or mesh.elements + np.sum(missed > UNSEEN) > MOST_CUT:
+            return mesh
+        middles = (mesh.borders[:-1] + mesh.borders[1:]) / 2
+        mesh = Mesh(np.sort(np.append(mesh.borders, middles[missed > UNSEEN])), (), mesh.shortest)
+    return mesh
+
+
+def _missed(mesh: Mesh, share: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Integral of what straight lines from end to end of each element miss of rows (m, N) at shares (N,), (elements,)."""
+    element, _ = mesh.locate(share)
+    ends = np.array([np.interp(mesh.borders, share, row) for row in change])
+    lines = np.array([np.interp(share, mesh.borders, row) for row in ends])
+    missed = np.abs(change - lines) / share.size
+    return np.max([np.bincount(element, row, mesh.elements) for row in missed], axis=0)

@@ -3,8 +3,9 @@
     minimise   sum over all samples of ((model(t_k, p) - value_k) / deviation_k)^2
     over       parameters and initial values p, within their limits, and the motion of every experiment
 
-All experiments form one nonlinear program, so that the motion is found together with the parameters: it need not be
-computed for bad guesses of them (Bock, 1983, Recent advances in parameter identification techniques for ODE).
+All experiments form one nonlinear program. From the first guesses steps of Gauss and Newton along the motion are tried
+first; where they do not lead to the data, Ipopt finds the motion together with the parameters: it need not be computed
+for bad guesses of them (Bock, 1983, Recent advances in parameter identification techniques for ODE).
 """
 
 import time
@@ -61,10 +62,13 @@ def estimate(
     """Estimate parameters of a model, and initial values, from experiments.
 
     parameters: name in the model -> Free(guess, min=..., max=...) or a guess, the same in all experiments; limits
-    default to those that the model declares. loss: "robust" bounds the influence of stray values (Huber's). elements,
-    points and scheme ("radau" or "gauss"), of every experiment, tolerance, max_iterations, max_time and progress: as for
-    `optimize`. Raises ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError
-    with `.optimum` where no solution is found, or where the data cannot tell parameters apart; its message names them.
+    default to those that the model declares. loss: "robust" bounds the influence of stray values (Huber's). elements of
+    every experiment: those given, and what they cost is told; by default they are cut where they matter until the
+    estimate stands. points, scheme ("radau" or "gauss"), tolerance, max_iterations, max_time and progress: as for
+    `optimize`. Without deviations of the data every measured name has a noise of its own, which the fit leaves. Raises
+    ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError with `.optimum`
+    where no solution is found, where Ctrl-C is pressed, or where the data cannot tell parameters apart; its message
+    names them.
     """
     begin = time.perf_counter()
     asked = policy_of("estimate", MeshKeywords, policy)

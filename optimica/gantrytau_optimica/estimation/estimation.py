@@ -85,7 +85,8 @@ def _refuse_lost(read: Plan, refined: RefinedFit, optimum: Optimum, inner: list[
     point = LocalSlopes((fit.jacobian * roots)[:, inner], fit.numbers[inner])
     finer = None if error is None else LocalSlopes((error.jacobian * roots)[:, inner], point.values)
     sizes = fit.sizes[inner]
-    silent = without_influence(point, sizes)
+    seen = [point] if finer is None else [point, finer]
+    silent = sorted(set.intersection(*(set(without_influence(one, sizes)) for one in seen)))
     kept = [k for k in range(len(inner)) if k not in silent]
     words = [f"{names[k]} has no influence on what was measured" for k in silent]
     if kept:

@@ -131,6 +131,7 @@ class ParameterFit:
     def correlation(self) -> np.ndarray:
         """Correlations of `names`, (k, k)."""
         size = np.sqrt(np.diag(self._covariance))
+        size = np.where(size > 0, size, 1.0)
         return self._covariance / np.outer(size, size)
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
@@ -200,10 +201,10 @@ class ParameterFit:
             whole.setdefault(name, []).append(values.ravel())
         parts = {n: np.linalg.norm(np.concatenate(v)) for n, v in left.items()}
         sizes = {n: np.linalg.norm(np.concatenate(v)) for n, v in whole.items()}
-        names = [n for n in parts if parts[n] <= COMPUTED * sizes[n]]
+        names = [n for n in parts if 0 < sizes[n] and parts[n] <= COMPUTED * sizes[n]]
         if not names:
             return []
-        worst = max((parts[n] / sizes[n] for n in names if sizes[n]), default=0.0)
+        worst = max(parts[n] / sizes[n] for n in names)
         return [
             f"the residuals of {', '.join(names)} are {worst:.1g} of the values, as those of computed data: the deviations "
             "are those of rounding, not of measuring"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, SolveError, between, der, if_else, sin
+from gantrytau import Input, Model, Parameter, Real, SolveError, between, der, exp, if_else, sin
 from gantrytau import time as now
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
@@ -213,3 +213,19 @@ def test_deviations_finer_than_the_default_mesh():
     within(fit, {"k": 0.7})
     assert 1e-3 < fit.probability < 1 - 1e-3
     assert fit.warnings == ()
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-3])
+def test_a_smooth_pulse_that_the_points_of_the_default_mesh_miss(width):
+    """A bell in time of unit area: what follows is a decay, but for its width by its moments, exp(width^2 / (4 T^2))."""
+    times, T, peak = np.linspace(0.0, 2.0, 41), 0.3, 0.78
+    area = np.sqrt(np.pi)
+    y = np.where(
+        times > peak, area / T * np.exp((width / T) ** 2 / 4 - np.maximum(times - peak, 0.0) / T), 0.0
+    )
+    bell = {"u": lambda t: exp(-(((t - peak) / width) ** 2)) / width}
+    far = np.abs(times - peak) > 10 * width
+    fit = estimate(
+        Filter, {"T": Free(0.5, min=1e-3)}, Experiment({"v": Samples(times[far], y[far])}, inputs=bell)
+    )
+    assert fit.parameters["T"] == pytest.approx(T, rel=1e-6)
