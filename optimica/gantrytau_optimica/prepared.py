@@ -24,6 +24,7 @@ from gantrytau_optimica.refinement.refinement import refined, with_ramps, withou
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Pressed, Solver, SolverSettings
 from gantrytau_optimica.solving.moving_points import settled
+from gantrytau_optimica.solving.second_look import moved_aside
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
@@ -36,6 +37,9 @@ MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
+MOST_ASIDE = 3  # times that a solve goes on from a place that is no minimum
+
+NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
     "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
@@ -173,7 +177,7 @@ class Prepared:
             optimum = self._solved(built, program, nearby, first)
             if optimum.success:
                 return optimum
-        optimum = self._solved(built, program, self.solver, first)
+        optimum = self._minimum(built, program, first)
         if optimum.success or self.refine is None or not self._reached.clock.left:
             return optimum
         layouts = program.places.layouts
@@ -186,6 +190,20 @@ class Prepared:
             return optimum
         again = self._solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
+
+    def _minimum(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
+        """From one first guess; if that ends where the objective falls to a side, from there."""
+        found = self._solved(built, program, self.solver, first)
+        for _ in range(MOST_ASIDE):
+            aside = moved_aside(found.program, found.solution, first) if found.success else None
+            if aside is None or not self._reached.clock.left:
+                break
+            better = self._solved(found.built, found.program, self.solver, aside)
+            if not (better.success and better.objective < found.objective):
+                solution = replace(found.solution, status=NO_MINIMUM)
+                return replace(found, solution=solution)
+            found = better
+        return found
 
     def _coarse(self, built: Built) -> Program:
         """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,

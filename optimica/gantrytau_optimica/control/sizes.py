@@ -127,7 +127,7 @@ def _said(
         for n in problem.free
     ]
     declared, limits, guesses = np.vstack([signals, np.array(numbers, dtype=float).reshape(-1, 3)]).T
-    return declared, limits, np.where(np.isnan(guesses), _measured(problem), guesses)
+    return declared, limits, np.fmax(guesses, _measured(problem))
 
 
 def _largest(bounds: Sequence[float]) -> float:

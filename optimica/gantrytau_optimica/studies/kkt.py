@@ -27,6 +27,7 @@ CLEAR = (
     100.0  # times larger than the other must be a multiplier or a distance, both relative, to be told apart
 )
 LEAST = 1e-13  # distance from a limit, below which Ipopt's solutions do not go
+TINY = 1e-30  # in place of zeros on the diagonal: pivots that vanish make SuperLU write to the console
 SINGULAR = 1e14  # condition number from which on nothing is left of 16 digits
 
 
@@ -84,6 +85,13 @@ def slopes(program: Program, solution: Solution, held: np.ndarray) -> Slopes:
     )
 
 
+def objective_slopes(program: Program, solution: Solution, held: np.ndarray) -> np.ndarray:
+    """Derivatives of the objective with respect to unknowns number `held`, (k,), from the multipliers."""
+    scale = program.places.scale
+    gradient, jacobian, _ = _derivatives(program, solution.w / scale, solution.multipliers)
+    return (gradient + jacobian.T @ solution.multipliers)[held] / scale[held]
+
+
 @dataclass(frozen=True, eq=False)
 class _Binding:
     """Which unknowns and rows are fixed or equations, their limits, and whether strong ones are held exactly."""
@@ -106,9 +114,9 @@ def _conditions(
         soft, kept = np.where(b.bounds.weak, soft, 0.0), binding | b.rows.weak
     moving, kept = np.flatnonzero(~outside), np.flatnonzero(kept)
     # conditions that repeat each other leave a singular matrix unless they give a little
-    give = np.where(binding, 0.0 if b.exact else LEAST, 1 / np.maximum(b.rows.weight, LEAST))[kept]
+    give = np.where(binding, TINY if b.exact else LEAST, 1 / np.maximum(b.rows.weight, LEAST))[kept]
     border = jacobian[kept][:, moving]
-    inner = hessian[moving][:, moving] + sparse.diags_array(soft[moving])
+    inner = hessian[moving][:, moving] + sparse.diags_array(soft[moving] + TINY)
     matrix = sparse.block_array([[inner, border.T], [border, -sparse.diags_array(give)]])
     right = -sparse.vstack([hessian[moving][:, held], jacobian[kept][:, held]]).toarray()
     return moving, matrix.tocsc(), right

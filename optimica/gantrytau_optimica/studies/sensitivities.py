@@ -11,8 +11,9 @@ import numpy as np
 from gantrytau import ModelError, heeding_interrupts
 from gantrytau.compiler.request import names
 from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.studies.boundary_arcs import with_free_ends
 from gantrytau_optimica.studies.held_parameters import holding
-from gantrytau_optimica.studies.kkt import ActiveSet, Slopes, slopes
+from gantrytau_optimica.studies.kkt import ActiveSet, Slopes, objective_slopes, slopes
 from gantrytau_optimica.studies.signal_slopes import Movement
 
 PREDICTED = "predicted to first order, not solved"
@@ -36,7 +37,9 @@ class Sensitivities:
 
     @cached_property
     def objective(self) -> dict[str, Any]:
-        """Derivative of the objective by parameter, exact, from the multipliers; of a vector (k,) by its name too."""
+        """Derivative of the objective by parameter, from the multipliers, as exact as the mesh; where limits on states bind,
+        with the ends of these arcs free to move. Of a vector (k,) by its name too.
+        """
         found = dict(zip(self.parameters, self.slopes.objective.tolist(), strict=True))
         return {**found, **{name: self.slopes.objective[columns] for name, columns in self._vectors.items()}}
 
@@ -175,6 +178,12 @@ def sensitivities(optimum: Optimum, parameters: Sequence[str] | None = None) -> 
     program = optimum.program
     place = {n.name: p for n, p in zip(program.problem.free, program.places.free, strict=True)}
     found = slopes(program, optimum.solution, np.array([place[n] for n in wanted]))
+    free = with_free_ends(optimum)
+    if free is not None:
+        program, solution = free
+        place = {n.name: p for n, p in zip(program.problem.free, program.places.free, strict=True)}
+        moved = objective_slopes(program, solution, np.array([place[n] for n in wanted]))
+        found = replace(found, objective=moved)
     return Sensitivities(optimum, tuple(wanted), found)
 
 
