@@ -15,6 +15,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.refusals import open_loops, overdriven
+from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues, start_values
 from gantrytau.errors import InitializationError
@@ -77,8 +78,8 @@ def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[s
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
         raise open_loops(flat, error, _nearest(constraints, guess)) from None
-    matrices = [_matrix(constraints, closed)]
-    matrices += [_matrix(constraints, pose) for pose in _poses(constraints, guess, closed, flat.name)]
+    poses = [closed, *_poses(constraints, guess, closed, flat.name)]
+    matrices = [_matrix(_slopes(constraints, pose)) for pose in poses]
     kept = _independent(matrices, constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
@@ -160,12 +161,18 @@ def _at(numbers: np.ndarray, place: Sequence[int], values: np.ndarray) -> np.nda
     return found
 
 
-def _matrix(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
-    """Jacobian of the rows by unknowns and `known`, each of length one; rows that are zero stay zero."""
+def _slopes(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
+    """Jacobian of the rows by unknowns and `known`."""
     level = constraints.level
     _, slopes = level.look(np.array([values[n] for n in level.leaves]))
     place = {n: k for k, n in enumerate(level.leaves)}
-    found = level.jacobian(slopes)[:, [place[n] for n in (*constraints.moving, *known)]]
+    return level.jacobian(slopes)[:, [place[n] for n in (*constraints.moving, *known)]]
+
+
+def _matrix(slopes: np.ndarray) -> np.ndarray:
+    """The rows by unknowns in sizes of their own, each row of length one; what is zero stays zero."""
+    rows, columns = balance(slopes)
+    found = rows * slopes * columns
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
@@ -180,13 +187,15 @@ def _poses(
     loose = replace(guess, fixed=frozenset(), started=frozenset(), chosen=frozenset())
     here = dict(closed)
     for _ in range(POSES):
-        _, sizes, right = np.linalg.svd(_matrix(constraints, here))
+        slopes = _slopes(constraints, here)
+        rows, columns = balance(slopes)
+        _, sizes, right = np.linalg.svd(_matrix(slopes))
         free = right[np.count_nonzero(sizes > RANK) :]
         if not len(free):
             break
         point = np.array([here[n] for n in names])
         move = random.standard_normal(len(free)) @ free
-        move *= STEP * max(1.0, float(np.abs(point).max())) / np.abs(move).max()
+        move *= STEP * max(1.0, float(np.abs(point / columns).max())) / np.abs(move).max() * columns
         try:
             here = _close(
                 constraints, loose, {**here, **dict(zip(names, (point + move).tolist(), strict=True))}, title
@@ -194,7 +203,7 @@ def _poses(
         except InitializationError:
             continue
         residual, _ = constraints.level.look(np.array([here[n] for n in constraints.level.leaves]))
-        if np.abs(residual).max() < CLOSED:
+        if np.abs(rows.ravel() * residual).max() < CLOSED:
             found.append(here)
     return found
 
@@ -223,7 +232,7 @@ def _refuse_conflicts(
     inputs = [n for n in constraints.level.leaves if n in constraints.known]
     if not inputs:
         return
-    matrix = _matrix(constraints, closed, inputs)
+    matrix = _matrix(_slopes(constraints, closed, inputs))
     firm = constraints.firm
     rows = [*range(firm), *(firm + k for k in sorted(kept))]
     rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)

@@ -15,6 +15,7 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import dependent, no_state
+from gantrytau.compiler.start.balance import balance
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import derivative_name, split_derivative
 
@@ -71,6 +72,8 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
     x = ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in columns))
     f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
     matrix = values_at(ca.jacobian(f, x), sample)
+    sizes_of_rows, sizes_of_columns = balance(matrix)
+    matrix = sizes_of_rows * matrix * sizes_of_columns
     matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
     asked = {split_derivative(n)[0] for n in wanted}
     groups: dict[int, list[int]] = {}

@@ -15,8 +15,8 @@ _TURNING = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN)
 def term_sizes(expressions: Sequence[ca.SX], least: Mapping[str, float] | None = None) -> list[ca.SX]:
     """For each scalar expression the sum of the absolute values of what it adds up, symbols being as large as they are.
 
-    a * b + c has the size |a| |b| + |c|, also where the sum is zero; sin(a) at least the size of a where it is steep.
-    least: symbols that count as at least so large, because they are sums themselves.
+    a + b has the size |a| + |b|, also where the sum is zero; a factor passes the size of the other one on, and sin(a) that
+    of a where it is steep. least: symbols that count as at least so large, because they are sums themselves.
     """
     least = least or {}
     leaves = ca.symvar(ca.vertcat(*expressions))
@@ -41,11 +41,11 @@ def _operation(operator: int, operands: list[_Sized]) -> _Sized:
     if operator == ca.OP_TWICE:
         return value, 2 * a
     if operator == ca.OP_SQ:
-        return value, a**2
+        return value, 2 * ca.fabs(operands[0][0]) * a
     if operator == ca.OP_MUL:
-        return value, a * b
+        return value, a * ca.fabs(operands[1][0]) + ca.fabs(operands[0][0]) * b
     if operator == ca.OP_DIV:
-        return value, a / ca.fabs(operands[1][0])
+        return value, (a + ca.fabs(value) * b) / ca.fabs(operands[1][0])
     if operator == ca.OP_IF_ELSE_ZERO:
         return value, ca.if_else(operands[0][0], b, 0)
     if operator in _TURNING:

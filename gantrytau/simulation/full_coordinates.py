@@ -215,12 +215,14 @@ class Coordinates:
         x: (points, n); t: (points,); w: (points, m).
         """
         x, least = x.copy(), LEAST * np.array(self.sizes or [1.0] * len(self.states))
+        size = 0.0  # of the first level, positions: at rest the others say nothing
         for columns, level, _ in self._levels:
             worst = np.zeros(len(x))
             for _ in range(STEPS):
                 residual, jacobian = (np.array(m) for m in level(x.T, t[None], t[None], w.T))
                 jacobian = jacobian.reshape(len(residual), len(x), len(columns)).transpose(1, 0, 2)
-                terms = np.maximum(np.abs(x[:, columns]), least[columns])
+                size = size or min(1.0, float(np.abs(x[:, columns]).max(initial=0.0))) or 1.0
+                terms = np.maximum(np.abs(x[:, columns]), size * least[columns])
                 scale = np.einsum("kij,kj->ki", np.abs(jacobian), terms)
                 worst = np.max(np.abs(residual.T) / scale, axis=1)
                 if not np.any(worst > LARGEST_DRIFT):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.start.balance import balance
 from gantrytau.errors import SolveError
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
@@ -108,7 +109,9 @@ class Conditioning:
 
 def _scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Lengths of rows and columns, and the smallest singular value of the matrix divided by them."""
-    rows = np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
+    own_rows, own_columns = balance(matrix)
+    sized = own_rows * matrix * own_columns
+    rows = np.maximum(np.linalg.norm(sized, axis=1, keepdims=True), 1e-300) / own_rows
     columns = np.maximum(np.linalg.norm(matrix / rows, axis=0, keepdims=True), 1e-300)
     if matrix.size == 0:
         return rows, columns, 1.0

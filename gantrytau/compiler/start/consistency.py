@@ -11,6 +11,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.start.balance import balance
 from gantrytau.errors import InitializationError
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.term_sizes import term_sizes
@@ -206,16 +207,32 @@ def _solve(
     if propagate:
         missing = {column for k, column in enumerate(columns) if moving[k] not in started}
         around = _propagated(level, around, missing)
-    point = around[columns]
-    point, f, jacobian = newton(at, point, weights)
-    bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+    start = around[columns]
+
+    def met(rows: np.ndarray | float, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where steps of these sizes lead, what is left there, and which equations do not hold."""
+        point, _, _ = newton(lambda x: _scaled_rows(rows, *at(x)), start, weights * sizes)
+        f, jacobian = at(point)
+        bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+        if np.any(bad):
+            small = np.abs(jacobian) @ np.maximum(np.abs(point), 1.0)
+            bad &= ~(np.abs(f) <= np.maximum(SOLVED * level.sizes(around), ROUNDING * small))
+        return point, f, bad
+
+    point, f, bad = met(1.0, 1.0)
     if np.any(bad):
-        small = np.abs(jacobian) @ np.maximum(np.abs(point), 1.0)
-        around[columns] = point
-        bad &= ~(np.abs(f) <= np.maximum(SOLVED * level.sizes(around), ROUNDING * small))
+        rows, sizes = balance(at(start)[1])
+        if np.any(sizes != 1):  # far from metres and radians
+            point, f, bad = met(rows, sizes)
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
+
+
+def _scaled_rows(
+    rows: np.ndarray | float, f: np.ndarray, jacobian: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    return np.ravel(rows) * f, rows * jacobian
 
 
 def _terms(jacobian: np.ndarray, point: np.ndarray) -> np.ndarray:
