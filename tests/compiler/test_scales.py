@@ -77,7 +77,7 @@ class Turned(Model):
         yield self.y == 1
 
 
-@pytest.mark.parametrize("size", [1.0, 1e7, 1e15, 1e100])
+@pytest.mark.parametrize("size", [1.0, 1e7, 1e15, 1e40])
 def test_a_coefficient_is_not_small_because_another_is_large(size):
     final = simulate(Square(x=Fixed(size)), stop=1.0, points=2)
     assert final.final("y") == pytest.approx((size * math.exp(-1)) ** 2, rel=2e-6)
