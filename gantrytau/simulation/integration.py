@@ -75,8 +75,7 @@ class Run:
         trail.held[0, trail.held.shape[1] - modes.size :] = modes
         self._renew(0)
         self._turn()
-        pressed: list[bool] = []
-        with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(lambda: pressed.append(True)):
+        with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
             while self.done < trail.last:
                 count = min(size, trail.stretch(self.done))
@@ -94,7 +93,7 @@ class Run:
                     self._renew(self.done)
                     self._turn(by_states=turned)
                 progress.at(trail.t[self.done])
-                if pressed:
+                if self.integrators.pressed:
                     raise KeyboardInterrupt
 
     def _longest(self) -> int:

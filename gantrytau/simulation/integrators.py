@@ -2,6 +2,8 @@
 
 import contextlib
 import io
+import signal
+from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
@@ -24,6 +26,7 @@ class Integrators:
         """longest: step anywhere, s; interval: the longest between two places, s."""
         self.coordinates, self.tolerance = coordinates, tolerance
         self.sizes = np.array(coordinates.sizes or [1.0] * len(coordinates.states))
+        self.pressed = self.working = False
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
@@ -51,6 +54,25 @@ class Integrators:
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
+    def interrupt(self) -> None:
+        """Act upon Ctrl-C: an integrator at work fails at once, as it would go on after a single interruption."""
+        self.pressed = True
+        if self.working:
+            signal.raise_signal(signal.SIGINT)  # again as soon as it asks whether there was one
+            raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def _at_work(self) -> Iterator[None]:
+        self.working = True
+        try:
+            yield
+        except RuntimeError:
+            if self.pressed:
+                raise KeyboardInterrupt from None
+            raise
+        finally:
+            self.working = False
+
     def rounded(self, z: np.ndarray) -> bool:
         """Whether small algebraics may have the rounding errors of large ones, which they did not so far.
 
@@ -74,7 +96,7 @@ class Integrators:
             self._made[key] = self.coordinates.integrator(
                 count, self.tolerance, size=self.size, steps=most, modes=modes, longest=longest
             )
-        with contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.redirect_stderr(io.StringIO()), self._at_work():
             found = self._made[key](x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)
         self.steps = int(self._made[key].stats()["nsteps"])
         reached = np.array(found["xf"]).T * self.sizes if x.size else np.zeros((count, 0))

@@ -1,8 +1,11 @@
 """What wrong inputs, parameters and policies of a simulation get."""
 
 import math
+import os
 import signal
+import subprocess
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -98,3 +101,22 @@ def test_ctrl_c_stops_a_simulation_and_keeps_what_was_computed(monkeypatch):
         )
     assert 0 < raised.value.time < 3000.0
     assert np.isfinite(raised.value.result["tool.r"]).all()
+
+
+@pytest.mark.parametrize("points", [3, 501])  # one interval alone would take half a minute
+def test_ctrl_c_is_not_swallowed_by_an_integrator_at_work(points):
+    class Fast(Model):
+        x = Real(start=0.0, fixed=True)
+        v = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == 1e6 * self.v
+            yield der(self.v) == -1e6 * self.x
+
+    begin = time.perf_counter()
+    pressed = subprocess.Popen(["sh", "-c", f"sleep 1; kill -INT {os.getpid()}"])
+    with pytest.raises(SolveError, match="Fast: simulation interrupted at t = "):
+        simulate(Fast(), stop=1.0, points=points)
+    assert time.perf_counter() - begin < 4.0
+    assert pressed.wait() == 0
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
