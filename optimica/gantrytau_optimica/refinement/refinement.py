@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.answers.optimum import Optimum
@@ -76,7 +77,8 @@ class Refinement:
 
 def with_ramps(problem: ControlProblem, meshes: Sequence[Mesh]) -> ControlProblem:
     """The problem with its free inputs as straight lines in each element: what keeps to limits at both ends keeps to
-    them between. Inputs in pieces that the caller chose keep the borders that these have on the first mesh.
+    them between. Inputs in pieces that the caller chose keep the borders that these have on the first mesh; where an
+    equality along the path says what they are, which no straight line could follow, inputs stay free.
     """
 
     def pieces(signal: Signal, mesh: Mesh) -> Pieces:
@@ -87,11 +89,26 @@ def with_ramps(problem: ControlProblem, meshes: Sequence[Mesh]) -> ControlProble
         return replace(own, borders=tuple(borders.tolist()))
 
     def changed(phase: Phase, mesh: Mesh) -> Phase:
+        if _follows(phase):
+            return phase
         inputs = tuple(replace(s, pieces=pieces(s, mesh)) for s in phase.inputs)
         return replace(phase, inputs=inputs)
 
     phases = (changed(phase, mesh) for phase, mesh in zip(problem.phases, meshes, strict=True))
     return replace(problem, phases=tuple(phases))
+
+
+def _follows(phase: Phase) -> bool:
+    """Whether inputs follow from an equality along the path, other than a constant ratio of inputs to each other."""
+    symbols = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.inputs))
+    own = {s.symbol.element_hash() for s in phase.inputs}
+
+    def among_inputs(expression: ca.SX) -> bool:
+        leaves = {leaf.element_hash() for leaf in ca.symvar(expression)}
+        return leaves <= own and ca.is_linear(expression, symbols)
+
+    equal = (limit for limit in phase.path_limits if limit.lower == limit.upper)
+    return not all(among_inputs(limit.expression) for limit in equal)
 
 
 def without_ramps(problem: ControlProblem) -> ControlProblem:

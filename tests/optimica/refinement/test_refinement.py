@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, der, sin
+from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, cos, der, sin, time
 from gantrytau.commands.demo.motion_problems import LIMIT, OnLine
 from gantrytau_optimica import Free, Optimization, final, optimize, prepare
 from tests.optimica.control.test_controls import Effort, best_pieces
@@ -141,6 +141,61 @@ def test_what_is_told_to_be_refined_is_accurate(elements):
 def test_a_singular_arc_from_a_fine_mesh():
     optimum = optimize(CatalystMixing, elements=50, refine=ACCURACY)
     assert optimum.objective == near(catalyst_by_switches())
+
+
+class Led(Optimization):
+    """The force that leads a mass along sin(rate t): -rate^2 sin(rate t)."""
+
+    mass: Any = Mass()
+    rate = Parameter(3.0, unit="rad/s", description="of the swing")
+    way = Parameter(1.0, unit="m", description="of the swing")
+    final_time = 2.0
+
+    def integrand(self):
+        return self.mass.u**2
+
+    def constraints(self):
+        yield self.mass.x == self.way * sin(self.rate * time)
+
+
+class LedBySpeed(Led):
+    """The same by the speed."""
+
+    def constraints(self):
+        yield self.mass.v == self.rate * self.way * cos(self.rate * time)
+
+
+@pytest.mark.parametrize("problem", [Led, LedBySpeed])
+def test_inputs_that_follow_from_an_equality_are_refined(problem):
+    optimum = held(optimize(problem, elements=20, refine=ACCURACY))
+    exact = 81 * (1 - np.sin(12.0) / 12)  # the integral of the square
+    assert optimum.objective == near(exact)
+    t = np.linspace(0.01, 1.99, 200)
+    np.testing.assert_allclose(optimum.signal("mass.u")(t), -9 * np.sin(3 * t), atol=0.02)
+
+
+def test_inputs_in_a_fixed_ratio_stay_straight_lines():
+    class Both(FastestMass):
+        mass = Twin(u=dict(min=-1.0, max=1.0))
+
+        def constraints(self):
+            yield from super().constraints()
+            yield self.mass.u == 2 * self.mass.w
+
+    optimum = held(optimize(Both, elements=7, refine=ACCURACY))
+    # u and half of it: three halves of the force
+    assert optimum.final_time == near(2 / np.sqrt(1.5))
+    assert {s.pieces.kind for s in optimum.program.problem.phases[0].inputs} == {"ramps"}
+
+
+class Twin(Mass):
+    """A mass that is pushed by two forces."""
+
+    w = Input(unit="m/s2", description="the other force per mass")
+
+    def equations(self):
+        yield der(self.x) == self.v
+        yield der(self.v) == self.u + self.w
 
 
 class Hanging(Model):
