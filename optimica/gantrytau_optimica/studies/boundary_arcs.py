@@ -14,6 +14,7 @@ import numpy as np
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.ranges import measured
 from gantrytau_optimica.answers.playback.switches import AT_LIMIT, switches
+from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.refinement.refinement import without_ramps
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
 from gantrytau_optimica.solving.warm_start import warm_start
@@ -80,13 +81,18 @@ def _held(program: Program, w: np.ndarray) -> Program:
             places = layout.of(k)[-points:]  # without the start of a state
             for arc in pairwise(knots.tolist()):
                 _hold(x, lbw, ubw, places, arc, early=k < nx)
-        inputs = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in layout.phase.inputs))
-        jumping = {p.name for p in layout.phase.path_limits if ca.depends_on(p.expression, inputs)}
+        jumping = _jumping(layout.phase)
         for group in program.groups:
             if group.kind == "path" and group.phase == number:
                 for arc in pairwise(knots.tolist()):
                     _hold(rows, lbg, ubg, group.rows, arc, early=group.name not in jumping)
     return replace(program, lbw=lbw, ubw=ubw, lbg=lbg, ubg=ubg)
+
+
+def _jumping(phase: Phase) -> set[str]:
+    """Limits in which an input or an algebraic stands, which may jump."""
+    symbols = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in (*phase.algebraics, *phase.inputs)))
+    return {limit.name for limit in phase.path_limits if ca.depends_on(limit.expression, symbols)}
 
 
 def _hold(
@@ -107,9 +113,9 @@ def _hold(
 
 def _mesh(trajectory: Trajectory) -> Mesh:
     """As many equal elements between the ends of arcs, which may move; the same mesh where no limit on states binds."""
-    inputs = {s.name for s in trajectory.phase.inputs}
+    jumping = {s.name for s in trajectory.phase.inputs} | _jumping(trajectory.phase)
     found, borders = switches(trajectory), trajectory.mesh.borders
-    if all(s.name in inputs for s in found):
+    if all(s.name in jumping for s in found):
         return Mesh(borders)
     near = max(np.median(trajectory.mesh.widths), LEAST)
     ends = [0.0]
