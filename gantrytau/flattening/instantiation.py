@@ -194,10 +194,11 @@ class _Builder:
         ):
             # an unnamed declaration replaces this one: mass=Free(9.0)
             new = modification.value
+            said = {key: getattr(new, key, None) for key in ATTRIBUTES}
             attributes |= {
-                key: Leaf(getattr(new, key), modification.scope)
-                for key in ATTRIBUTES
-                if getattr(new, key, None) not in (None, "")
+                key: Leaf(value, modification.scope)
+                for key, value in said.items()
+                if value is not None and not (isinstance(value, str) and value == "")
             }
             declaration = new
         elif modification is not None:

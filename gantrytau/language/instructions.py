@@ -42,7 +42,7 @@ def refuse_calls(place: str, *expressions: ca.SX) -> None:
 
     CasADi evaluates it, but the derivative of such a call ends Python or is NaN (casadi 3.8).
     """
-    whole = ca.SX(ca.vertcat(*(ca.vec(e) for e in expressions)))
+    whole = ca.SX(ca.veccat(*expressions))
     called = ca.Function("calls", ca.symvar(whole), [whole]).find_functions(0)
     if called:
         raise ModelError(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result, SolveError
+from gantrytau.flattening.shapes import elements_of
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
@@ -241,14 +242,12 @@ class Prepared:
         held = [n.name for n in self.built.problem.free if n.held]
         for name, value in parameters.items():
             elements = parameter_names(self.built.read, name)
-            numbers = np.asarray(value, dtype=float).ravel(order="F")
             if any(element not in held for element in elements):
                 raise ModelError(
                     f"{name}: was not named in prepare(parameters=[...]), expected one of {held}"
                 )
-            if numbers.size != len(elements) or not np.all(np.isfinite(numbers)):
-                raise ModelError(f"{name}: found {value!r}, expected {len(elements)} finite numbers")
-            found.update(zip(elements, numbers.tolist(), strict=True))
+            numbers = elements_of(name, value, self.built.read.dae.flat.shape(name))
+            found.update(zip(elements, numbers, strict=True))
         return found
 
     def _number(
@@ -291,8 +290,11 @@ def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
         if isinstance(value, (Result, Answer)):
             found.update(guess_of(value, read.dae, name))
         else:
-            read.dae.expand(name)
-            found[name] = value
+            elements, shape = read.dae.expand(name), read.dae.flat.shape(name)
+            if shape and elements[0] in read.dae.parameter_symbols:  # free numbers are guessed one by one
+                found.update(zip(elements, elements_of(f"guess {name}", value, shape), strict=True))
+            else:
+                found[name] = value
     return found
 
 

@@ -1,5 +1,6 @@
 """An answer of an optimisation, looked up by the model's own names: one just found, or one read from a file."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -157,12 +158,15 @@ class Answer(ABC):
         if name in self.free:
             return self.free[name]
         elements = self._elements(name)
-        some = any(element in self.free for element in elements)
-        return np.array([self.parameters[element] for element in elements]) if some else None
+        if not any(element in self.free for element in elements):
+            return None
+        return np.array([self.parameters[element] for element in elements]).reshape(
+            _shape(elements), order="F"
+        )
 
     def signal(self, name: str) -> Signal:
-        """A variable or derivative as a vectorised function of time: (n,) -> (n,) or (n, k), from the polynomials
-        of the solution; between the collocation points they need not keep to limits.
+        """A variable or derivative as a vectorised function of time: (n,) -> (n,), (n, k) or (n, rows, columns), from
+        the polynomials of the solution; between the collocation points they need not keep to limits.
         """
         elements = self._elements(name)
         whole, rows = elements != (name,), self._rows(elements, self.path_of(elements[0]))
@@ -170,7 +174,7 @@ class Answer(ABC):
         def value(times: Any) -> np.ndarray:
             times = np.asarray(times, dtype=float)
             values = rows(np.atleast_1d(times))
-            found = values.T if whole else values[0]
+            found = values.T.reshape(times.size, *_shape(elements), order="F") if whole else values[0]
             return found if times.ndim else found[0]
 
         return value
@@ -195,3 +199,9 @@ class Answer(ABC):
     def save(self, path: Any):
         """Save all variables over time, as Result.save; outside of its phase a variable is NaN."""
         return self._whole.save(path)
+
+
+def _shape(elements: Sequence[str]) -> tuple[int, ...]:
+    """The shape of a quantity, by the names of its elements, column after column."""
+    last = re.search(r"\[(\d+),(\d+)\]\)*$", elements[-1])
+    return (int(last[1]) + 1, int(last[2]) + 1) if last else (len(elements),)

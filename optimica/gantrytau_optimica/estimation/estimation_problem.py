@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau import Model, ModelError, der
 from gantrytau.errors import did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
-from gantrytau.flattening.shapes import numpy_shape
+from gantrytau.flattening.shapes import check_shape, numpy_shape
 from gantrytau.language.model import Declared
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.estimation.experiments import Experiment, is_free
@@ -214,9 +214,12 @@ class _Change:
         """One expression for each element: numbers, or symbols of free numbers."""
         guess = value.value if is_free(value) else value
         try:
-            given = np.broadcast_to(np.asarray(guess, dtype=float), _shape(quantity, which)).ravel(order="F")
+            given = np.asarray(guess, dtype=float)
         except (TypeError, ValueError):
             raise ModelError(f"{name}: found {guess!r}, expected {len(which)} numbers or Free(...)") from None
+        if given.ndim:  # one number may stand for all
+            check_shape(name, given.shape, _shape(quantity, which))
+        given = np.broadcast_to(given.ravel(order="F"), len(which))
         if not np.all(np.isfinite(given)):
             raise ModelError(f"{name}: found {guess!r}, expected finite numbers")
         if not is_free(value):

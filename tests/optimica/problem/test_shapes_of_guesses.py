@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Real, der
-from gantrytau_optimica import Optimization, Samples, optimize, sum_of_squares
+from gantrytau import Input, Model, ModelError, Parameter, Real, der
+from gantrytau_optimica import Free, Optimization, Samples, optimize, prepare, sum_of_squares
 
 WIDE = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -67,3 +67,39 @@ def test_known_inputs_of_a_matrix_keep_its_rows():
     flat = {"m.U": (TIMES, np.broadcast_to(WIDE.ravel(), (5, 6)))}
     with pytest.raises(ModelError, match=r"input m\.U: found 6 columns, expected 6: .*\(n, rows, columns\)"):
         optimize(type("Flat", (Known,), {"inputs": flat}), elements=2)
+
+
+class Numbers(Optimization):
+    """Each of the numbers has two best values; the guesses decide."""
+
+    m = Slide(U=np.zeros((2, 3)))
+    p = Free(np.zeros((2, 3)), min=-2.0, max=2.0)
+    final_time = 1.0
+
+    def objective(self):
+        return sum((self.p[i, j] ** 2 - 1) ** 2 for i in range(2) for j in range(3))
+
+
+@pytest.mark.parametrize("guess", [SIGNS, SIGNS.tolist()])
+def test_guesses_of_free_numbers_by_the_name_of_their_matrix(guess):
+    found = optimize(Numbers, elements=2, guess={"p": guess})
+    np.testing.assert_allclose(found["p"], SIGNS, atol=1e-6)
+    with pytest.raises(ModelError, match=r"guess p: found shape \(3, 2\), expected \(2, 3\)"):
+        optimize(Numbers, elements=2, guess={"p": SIGNS.T})
+
+
+def test_parameters_of_a_prepared_problem_keep_their_rows():
+    class Driven(Model):
+        p = Parameter(np.zeros((2, 3)))
+        X = Real((2, 3), start=np.zeros((2, 3)), fixed=True)
+
+        def equations(self):
+            yield der(self.X) == self.p
+
+    prepared = prepare(
+        type("Drive", (Optimization,), {"m": Driven(), "final_time": 1.0}), parameters=["m.p"], elements=2
+    )
+    np.testing.assert_allclose(prepared.solve({"m.p": WIDE}).final("m.X"), WIDE, atol=1e-9)
+    for wrong in (WIDE.T, WIDE.ravel()):
+        with pytest.raises(ModelError, match=r"m\.p: found shape \((3, 2|6,)\), expected \(2, 3\)"):
+            prepared.solve({"m.p": wrong})
