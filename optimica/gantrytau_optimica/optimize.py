@@ -73,7 +73,7 @@ def optimize(
     begun, clock = datetime.now(UTC), Clock(max_time, progress)
     reached = BestSoFar(clock)
     with reached.kept():
-        read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
+        read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem, guess=guess)
         details = dict(problem=problem, options=policy.given, started=begun, read_time=max_time - clock.left)
         found: Optimum | None = None
         try:
@@ -103,7 +103,7 @@ def prepare(
 
 def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) -> Prepared:
     """`prepare` with its keywords as a record."""
-    read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem)
+    read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem, guess=policy.guess)
     begin = time.perf_counter()
     near, guess = solution_given(policy.guess), read_guesses(policy.guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Dae, ModelError, Parameter, translate
+from gantrytau import Dae, InitializationError, ModelError, Parameter, StructureError, translate
 from gantrytau.compiler.request import names
 from gantrytau.errors import told
 from gantrytau.flattening.check_units import check_units
@@ -41,14 +41,18 @@ from gantrytau_optimica.problem.symbolic_problem import (
     SymbolicPhase,
     SymbolicProblem,
 )
+from gantrytau_optimica.problem.told_starts import with_told_starts
 
 
 def read_problem(
-    problem: Optimization | type[Optimization], change: Callable[[FlatModel], FlatModel] | None = None
+    problem: Optimization | type[Optimization],
+    change: Callable[[FlatModel], FlatModel] | None = None,
+    guess: Any = None,
 ) -> SymbolicProblem:
     """Read a problem class or instance. Raises ModelError with the place of what is written wrongly.
 
-    change: applied to the model once it is written out, before it is translated.
+    change: applied to the model once it is written out, before it is translated; guess: first guesses of the caller, which
+    with conditions at the start serve a model that has no consistent start of its own.
     """
     if isinstance(problem, type) and issubclass(problem, Optimization):
         problem = problem()
@@ -84,7 +88,12 @@ def read_problem(
         refuse_calls(str(one.symbol), one.expression)
     check_constraints(constraints, asked.targets)
     check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
-    dae = translate(flat, units=False, given=_given(stages, flat), find=mentioned)
+    dae = _translated(
+        flat,
+        _given(stages, flat),
+        mentioned,
+        partial(with_told_starts, flat, constraints, asked.points, guess),
+    )
     links = [_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink)]
     read = SymbolicProblem(
         name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
@@ -93,6 +102,22 @@ def read_problem(
     read = check_objective(read)
     check_times(read)
     return read
+
+
+def _translated(
+    flat: FlatModel, given: Sequence[str], find: Sequence[str], told: Callable[[], FlatModel | None]
+) -> Dae:
+    """The model translated, from the starts that the problem tells if its own are not consistent with its equations."""
+    try:
+        return translate(flat, units=False, given=given, find=find)
+    except (InitializationError, StructureError) as error:
+        started = told()
+        if started is None:
+            raise
+        try:
+            return translate(started, units=False, given=given, find=find)
+        except StructureError:
+            raise error from None  # what is wrong is wrong at any start
 
 
 def _link(name: str, instance: Instance, phases: Sequence[SymbolicPhase], link: PhaseLink) -> LinkedPaths:
