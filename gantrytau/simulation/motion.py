@@ -100,8 +100,8 @@ def _highest_blocks(
     highest: Mapping[str, ca.SX],
     modes: Mapping[str, float],
 ) -> SolvedBlocks:
-    """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones."""
-    guide = Guide({**dae.start, **modes}, dae.table.values, states)
+    """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones, or by value."""
+    guide = Guide({**dae.start, **modes}, dae.table.values, states, careful=True)
     for block in dae.blocks:
         if not highest.keys() & set(block.unknowns):
             block.enter(guide)

@@ -29,17 +29,25 @@ class CFunction:
 
 
 def c_function(
-    graph: ExpressionGraph, name: str, roots: Sequence[int], *, hoisting: bool = False, seldom: bool = False
+    graph: ExpressionGraph,
+    name: str,
+    roots: Sequence[int],
+    *,
+    hoisting: bool = False,
+    seldom: bool = False,
+    flag: int | None = None,
 ) -> CFunction:
     """The function whose results r are the roots, from the arrays of the graph, then the hoisted one.
 
-    hoisting: the one that fills the hoisted array; seldom: small code is worth more than fast one.
+    hoisting: the one that fills the hoisted array; seldom: small code is worth more than fast one; flag: a node whose
+    value goes to w[GT_TRUSTED].
     """
+    flags = [] if flag is None else [flag]
     known = {} if hoisting else graph.hoisted
-    order = [n for n in graph.reached(roots, known=known) if n not in known and graph.inside(n)]
+    order = [n for n in graph.reached([*roots, *flags], known=known) if n not in known and graph.inside(n)]
     cut = [order[k : k + PIECE] for k in range(0, len(order), PIECE)] or [[]]
     home = {number: k for k, part in enumerate(cut) for number in part}
-    uses = Counter(i for n in order for i in graph.inside(n)) + Counter(roots)
+    uses = Counter(i for n in order for i in graph.inside(n)) + Counter([*roots, *flags])
     uses += Counter(i for n in order if graph.nodes[n][0] in REPEATING for i in graph.inside(n))
     shared: dict[int, int] = {}
     for number in order:
@@ -50,7 +58,9 @@ def c_function(
     for piece, part in zip(pieces, cut, strict=True):
         piece.write(part)
     for place, root in enumerate(roots):
-        pieces[home.get(root, 0)].result(place, root)
+        pieces[home.get(root, 0)].result(f"r[{place}]", root)
+    for root in flags:
+        pieces[home.get(root, 0)].result("w[GT_TRUSTED]", root)
     mark = "GT_SELDOM " if seldom else ""
     if len(pieces) == 1:
         return CFunction(name, mark + _whole(name, graph, pieces[0].lines), 0, len(order))
@@ -97,8 +107,8 @@ class _Piece:
             return f"{key[1]}[{key[2]}]"
         return self.texts[node] if self.home[node] == self.number else f"w[{self.shared[node]}]"
 
-    def result(self, place: int, root: int) -> None:
-        self.lines.append(f"  r[{place}] = {self.word(root)};")
+    def result(self, place: str, root: int) -> None:
+        self.lines.append(f"  {place} = {self.word(root)};")
 
 
 def _whole(name: str, graph: ExpressionGraph, body: Sequence[str]) -> str:

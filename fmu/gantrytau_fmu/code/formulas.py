@@ -6,12 +6,14 @@ The force of such a friction is one of the z; its equation depends on the mode.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
 from gantrytau import Dae
+from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.system import System
+from gantrytau.compiler.translated import carefully
 from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
@@ -35,7 +37,8 @@ class ImplicitBlock:
 class Formulas:
     """Expressions in the symbols of `arrays`, by name of the array.
 
-    outputs: expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
+    careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
+    expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
     breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends.
     """
 
@@ -55,6 +58,8 @@ class Formulas:
     roots: Mapping[str, ca.SX]
     starts: Starts
     parameters: tuple[str, ...]
+    margins: ca.SX
+    careful: "Formulas | None" = None
 
     @property
     def residuals(self) -> ca.SX:
@@ -74,6 +79,17 @@ class Formulas:
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     """The formulas of a translated model; outputs: scalar names of what can be read of it, states and all."""
+    careful = carefully(dae, SolvedBlocks(dae.blocks)).blocks
+    pairs = list(zip(dae.blocks, careful, strict=True))
+    # what is left implicit is solved with pivots chosen by value anyway
+    quick = tuple(block if other.solution is not None else other for block, other in pairs)
+    found = _formulas(replace(dae, blocks=quick), outputs)
+    if found.margins.is_constant():
+        return found
+    return replace(found, careful=_formulas(replace(dae, blocks=careful), outputs))
+
+
+def _formulas(dae: Dae, outputs: Sequence[str]) -> Formulas:
     system = dae.system()
     outputs = _evaluated(dae, outputs)
     flat = dae.flat
@@ -124,6 +140,9 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
         roots=roots,
         starts=starts,
         parameters=system.parameters,
+        margins=column(
+            system.to_system([m for b in dae.blocks if b.solution is not None for m in b.margins])
+        ),
     )
 
 

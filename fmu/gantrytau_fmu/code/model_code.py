@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from gantrytau_fmu.code.arrays import numbers_of
 from gantrytau_fmu.code.c_functions import CFunction, c_function
 from gantrytau_fmu.code.contents import Contents
+from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
 from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph
 from gantrytau_fmu.code.operations import number_text
@@ -41,7 +42,8 @@ def model_code(
     """The text of model.c."""
     graph, formulas = model.graph, model.formulas
     pieces = [c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True)]
-    pieces += [c_function(graph, n, roots, seldom=n in SELDOM) for n, roots in model.roots.items()]
+    for n, roots in model.roots.items():
+        pieces += _by_value(model, n, roots) if n in model.careful else [_function(graph, n, roots)]
     defines = dict(
         GT_NAME=_quoted(name),
         GT_TOKEN=_quoted(token),
@@ -62,6 +64,24 @@ def model_code(
     lines += _tables(formulas, contents)
     lines.append(_texts("gt_pivot_names", _moving(model)))
     return ModelCode("\n".join(lines) + "\n", sum(p.operations for p in pieces))
+
+
+def _function(graph: ExpressionGraph, name: str, roots: Sequence[int]) -> CFunction:
+    return c_function(graph, name, roots, seldom=name in SELDOM)
+
+
+def _by_value(model: ModelGraph, name: str, roots: Sequence[int]) -> list[CFunction]:
+    """A function that is computed with the pivots of the closed forms, and anew with others where these are small."""
+    assert model.trusted is not None
+    quick = c_function(model.graph, f"{name}_quick", roots, seldom=name in SELDOM, flag=model.trusted)
+    careful = c_function(model.graph, f"{name}_careful", model.careful[name], seldom=True)
+    lines = [
+        f"static void {name}(const double *const *a, double *restrict r, double *restrict w) {{",
+        f"  {name}_quick(a, r, w);",
+        f"  if (!(w[GT_TRUSTED] > 0)) {name}_careful(a, r, w);",
+        "}",
+    ]
+    return [quick, careful, CFunction(name, "\n".join(lines) + "\n", 0, 0)]
 
 
 def _moving(model: ModelGraph) -> list[str]:
@@ -100,7 +120,8 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_ROOTS=len(formulas.roots),
         GT_ARRAYS=len(ARRAYS),
         GT_HOISTED=len(model.graph.hoisted),
-        GT_WORK=max((p.work for p in pieces), default=0),
+        GT_TRUSTED=max((p.work for p in pieces), default=0),
+        GT_WORK=max((p.work for p in pieces), default=0) + (model.trusted is not None),
         GT_PIVOTS=len(model.roots["gt_pivots"]),
     )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 
 import casadi as ca
 
@@ -17,7 +18,8 @@ ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
 class ModelGraph:
     """The graph, and its nodes that are the results of each function.
 
-    outputs: the expressions that differ; places: name of an output -> place among them.
+    outputs: the expressions that differ; places: name of an output -> place among them; careful: the results of functions
+    that take other pivots where `trusted` is not 1.
     """
 
     formulas: Formulas
@@ -25,25 +27,40 @@ class ModelGraph:
     roots: Mapping[str, list[int]]
     outputs: tuple[ca.SX, ...]
     places: Mapping[str, int]
+    careful: Mapping[str, list[int]]
+    trusted: int | None
 
 
 def entered(formulas: Formulas) -> ModelGraph:
     """The graph of a model, whole: no function is added to it later."""
     graph = ExpressionGraph(ARRAYS)
-    symbols = {**formulas.arrays, **{s: ca.SX.sym(s, formulas.arrays[s[1]].numel()) for s in SEEDS}}
+    symbols = _symbols(formulas)
     found = graph.enter("outputs", symbols, column(list(formulas.outputs.values())))
-    first: dict[int, ca.SX] = {}
-    for expression, root in zip(formulas.outputs.values(), found, strict=True):
-        first.setdefault(root, expression)
+    first: dict[int, str] = {}
+    for name, root in zip(formulas.outputs, found, strict=True):
+        first.setdefault(root, name)
     place = {root: k for k, root in enumerate(first)}
-    outputs = tuple(first.values())
+    outputs = tuple(formulas.outputs[name] for name in first.values())
     places = {name: place[root] for name, root in zip(formulas.outputs, found, strict=True)}
     functions = _functions(formulas, symbols, column(outputs))
     roots = {name: graph.enter(name, symbols, expression) for name, expression in functions.items()}
     solving = [name for name in functions if name == "gt_rates" or name.startswith("gt_residual_")]
     roots["gt_pivots"] = graph.divisors(root for name in solving for root in roots[name])
-    graph.hoist(root for found in roots.values() for root in found)
-    return ModelGraph(formulas, graph, roots, outputs, places)
+    careful, trusted = {}, None
+    if formulas.careful is not None:
+        other = _symbols(formulas.careful)
+        wanted = column([formulas.careful.outputs[name] for name in first.values()])
+        functions = _functions(formulas.careful, other, wanted)
+        careful = {name: graph.enter(name, other, expression) for name, expression in functions.items()}
+        careful = {name: found for name, found in careful.items() if found != roots[name]}
+        holds = [margin > 0 for margin in formulas.margins.elements()]
+        (trusted,) = graph.enter("trusted", symbols, reduce(ca.logic_and, holds))
+    graph.hoist(root for found in (*roots.values(), *careful.values()) for root in found)
+    return ModelGraph(formulas, graph, roots, outputs, places, careful, trusted)
+
+
+def _symbols(formulas: Formulas) -> dict[str, ca.SX]:
+    return {**formulas.arrays, **{s: ca.SX.sym(s, formulas.arrays[s[1]].numel()) for s in SEEDS}}
 
 
 def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dict[str, ca.SX]:

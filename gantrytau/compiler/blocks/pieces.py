@@ -21,6 +21,7 @@ MOST_SWITCHES = 7
 MOST_CANDIDATES = 96
 MOST_UNKNOWNS = 4
 LARGEST = 1e300  # of an unknown: more is a division by zero
+SINGULAR = 1e-12  # of an equation, what may be left of it where equations depend on each other
 ROUNDING = 1e-11  # of a residual relative to its terms, at a border where no piece is strictly consistent
 
 
@@ -221,20 +222,25 @@ def _nearly(found: Switched, candidates: Sequence[_Candidate], y: ca.SX) -> list
     return holds
 
 
-def solve_by_value(matrix: ca.SX, right: ca.SX) -> ca.SX:
-    """Elimination of a few unknowns with the pivots that are largest when it is evaluated."""
+def solve_by_value(matrix: ca.SX, right: ca.SX, rows: Sequence[ca.SX] = ()) -> ca.SX:
+    """Elimination of a few unknowns with the pivots that are largest when it is evaluated.
+
+    rows: how large the equations were before others were inserted; then NaN where the rest of one may be rounding.
+    """
     n = matrix.shape[0]
-    if n == 1:
+    if n == 1 and not rows:
         return right / matrix
     a = [[*(matrix[i, j] for j in range(n)), right[i]] for i in range(n)]
-    for row in a:
-        size = ca.SX(0)
+    for i, row in enumerate(a):
+        size = rows[i] if rows else ca.SX(0)
         for entry in row[:n]:
             size = size if entry.is_zero() else ca.fmax(size, ca.fabs(entry))
         row[:] = [entry / size for entry in row]
     for k in range(n):
         for i in range(k + 1, n):
             _larger_first(a, k, i)
+        if rows:
+            a[k][k] = ca.if_else(ca.fabs(a[k][k]) > SINGULAR, a[k][k], ca.SX.nan())
         for i in range(k + 1, n):
             if not a[i][k].is_zero():
                 factor = a[i][k] / a[k][k]

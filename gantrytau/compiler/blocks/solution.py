@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
-from gantrytau.compiler.blocks.pieces import PieceChoice, in_pieces
+from gantrytau.compiler.blocks.pieces import PieceChoice, in_pieces, solve_by_value
 from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
@@ -21,6 +21,7 @@ from gantrytau.compiler.index_reduction import Key
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import split_derivative
 
+LARGEST_BY_VALUE = 8  # the same with all the ways in which its pivots can be chosen
 LARGEST_CLOSED_FORM = 12  # unknowns of a torn linear block that is solved by unrolled elimination
 
 
@@ -216,6 +217,10 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, scales: Scales 
     if not ca.depends_on(jacobian, y):
         if scales is None:
             return block("explicit", (-_at_zero(f, y) / jacobian,))
+        if guide.careful and len(tears) <= LARGEST_BY_VALUE:
+            units = ca.DM(scales.columns)
+            found = solve_by_value(jacobian @ ca.diag(1 / units), -_at_zero(f, y), scales.rows) / units
+            return block("linear", tuple(found.elements()))
         if len(tears) > LARGEST_CLOSED_FORM or guide.careful:
             return block("linear")
         found = eliminate(jacobian, -_at_zero(f, y), guide, scales)
