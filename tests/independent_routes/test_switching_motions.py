@@ -1,7 +1,6 @@
 """Motions that switch on states and on time end where exact solutions end, however many points are asked for."""
 
 import numpy as np
-import pytest
 
 from gantrytau import simulate, translate
 from tests.independent_routes.switching_motions import END, pulse_of_time, random_motion
@@ -11,7 +10,6 @@ SHARE = 0.2  # of the random models
 CLOSE = 1e-6  # of the size of the states, at a tolerance of 1e-8
 
 
-@pytest.mark.xfail(reason="pulses of time between two steps", strict=False)
 def test_what_a_simulation_finds_does_not_depend_on_its_points():
     wrong, asked = [], 0
     for seed in range(round(MODELS * SHARE)):
