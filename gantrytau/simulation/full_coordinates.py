@@ -21,8 +21,8 @@ from gantrytau.simulation.singular_poses import Conditioning, Point
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
 BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time does not vanish
-STALLED = 1e-6  # of the algebraics: Newton steps below that which do not shrink are rounding
-TINY = 1e-300  # instead of zero in a divisor
+STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink are rounding
+ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
 OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
@@ -248,7 +248,7 @@ class Coordinates:
 
     def settle(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
         """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
-        before = np.inf
+        before: Any = np.inf
         for _ in range(STEPS if self.algebraics else 0):
             residual, jacobian = (np.array(m) for m in self._algebra(x.T, z.T, t[None], t[None], w.T))
             jacobian = jacobian.reshape(len(residual), len(x), z.shape[1]).transpose(1, 0, 2)
@@ -259,11 +259,12 @@ class Coordinates:
             if not np.all(np.isfinite(step)):
                 return z
             z = z - step
-            worst = np.max(np.abs(step) / np.maximum(np.abs(z).max(axis=0), TINY))
-            stalled = before / 2 < worst < STALLED
-            if np.all(np.abs(step) <= LARGEST_DRIFT * np.abs(z)) or stalled:
+            size, largest = np.abs(step), np.abs(z).max(axis=1, keepdims=True)
+            settled = size <= np.maximum(LARGEST_DRIFT * np.abs(z), ROUNDING * largest)
+            near = np.all(size <= STALLED * largest)
+            if np.all(settled | (near & (size > before / 2))):
                 return z  # found, or no better for rounding
-            before = worst
+            before = size
         return z
 
     @cached_property
