@@ -323,6 +323,21 @@ def test_a_header_that_lacks_something_is_told(path, key):
         load_optimum(path)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda h: h.update(phases=[]),
+        lambda h: h["phases"][0].update(final_time=h["phases"][0]["start_time"]),
+        lambda h: h["phases"][0].update(final_time=-1.0),
+    ],
+)
+def test_a_header_without_a_horizon_is_told(path, change):
+    save_optimum(solved(), path)
+    changed(path, change)
+    with pytest.raises(ModelError, match="found no whole saved optimum"):
+        load_optimum(path)
+
+
 def test_compressed_and_pickled_members_are_refused(path):
     save_optimum(solved(), path)
     with zipfile.ZipFile(path) as archive:

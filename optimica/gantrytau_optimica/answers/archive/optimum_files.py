@@ -283,6 +283,8 @@ def _optimum(
 
     w = read("w", "f", None)
     phases = [_phase(part, f"phases/{i}", w, read) for i, part in enumerate(header["phases"])]
+    if not phases:
+        raise ValueError("there is no phase")
 
     def table(key: str, kind: Any) -> dict[str, Any]:
         return {name: kind(value) for name, value in header[key].items()}
@@ -321,6 +323,14 @@ def _phase(part: dict[str, Any], place: str, w: np.ndarray, read: Any) -> SavedP
         raise ValueError(f"{place} has names without values")
     borders, nodes = read(f"{place}/borders", "f", None), read(f"{place}/nodes", "f", None)
     n = borders.size - 1
+    start, final, time = (
+        float(part["start_time"]),
+        float(part["final_time"]),
+        read(f"{place}/time", "f", None),
+    )
+    rising = start < final and time.size and np.all(np.diff(time) >= 0) and np.all(np.diff(borders) > 0)
+    if not rising or (borders[0], borders[-1]) != (0.0, 1.0) or not np.isfinite([start, final]).all():
+        raise ValueError(f"{place} has times that do not rise from a start to an end")
     tracks = []
     for i in range(count):
         at = read(f"{place}/signals/{i}/nodes", "f", n, None)
@@ -331,9 +341,9 @@ def _phase(part: dict[str, Any], place: str, w: np.ndarray, read: Any) -> SavedP
     value = read(f"{place}/affine/value", "f", row.size)
     return SavedPhase(
         name=str(part["name"]),
-        start_time=float(part["start_time"]),
-        final_time=float(part["final_time"]),
-        time=read(f"{place}/time", "f", None),
+        start_time=start,
+        final_time=final,
+        time=time,
         borders=borders,
         tracks=tuple(tracks),
         w=w,
