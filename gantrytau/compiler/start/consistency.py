@@ -215,7 +215,8 @@ def _solve(
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
         if np.any(bad):
-            small = np.abs(jacobian) @ np.maximum(np.abs(point), 1.0)
+            # unknowns that are solved together have the rounding of the largest
+            small = np.abs(jacobian).sum(axis=1) * np.max(np.abs(point), initial=1.0)
             bad &= ~(np.abs(f) <= np.maximum(SOLVED * level.sizes(around), ROUNDING * small))
         return point, f, bad
 
