@@ -11,7 +11,7 @@ from gantrytau.flattening.shapes import elements_of
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.build import with_guesses
+from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
@@ -38,6 +38,7 @@ MOST_TRIED = 300  # iterations from one of several first guesses
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
+FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 MOST_ASIDE = 3  # times that a solve goes on from a place that is no minimum
 
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
@@ -204,7 +205,34 @@ class Prepared:
                 solution = replace(found.solution, status=NO_MINIMUM)
                 return replace(found, solution=solution)
             found = better
-        return found
+        return self._resized(found) if found.success else found
+
+    def _resized(self, found: Optimum) -> Optimum:
+        """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
+        problem, layouts = found.program.problem, found.program.places.layouts
+        sizes = {n.name: n.size for n in problem.free}
+        far = [n for n, x in found.free.items() if not 1 / FAR < abs(x) / sizes[n] < FAR and x != 0.0]
+        if not far or layouts[0].scheme.scheme == "shooting" or not self._reached.clock.left:
+            return found
+        pieces = {s.name: s.pieces for phase in problem.phases for s in phase.inputs}
+        held = [n.name for n in problem.free if n.held]
+        built = build(found.built.read, guess_of(found, found.dae), held, pieces)
+        free = tuple(
+            replace(new, guess=old.guess, min=old.min, max=old.max, nominal=abs(old.guess) or None)
+            if old.held
+            else new
+            for new, old in zip(built.problem.free, problem.free, strict=True)
+        )
+        built = replace(built, problem=replace(built.problem, free=free))
+        meshes = [layout.mesh for layout in layouts]
+        located = (
+            np.array([n.guess for n in free]),
+            [layout.placed(found.solution.w).borders for layout in layouts],
+        )
+        program = transcribe(built.problem, meshes, layouts[0].scheme, located)
+        solver = self._solver(program, replace(self.solver.settings, near=True))
+        again = self._solved(built, program, solver, warm_start(list(found.phases.values()), program))
+        return again if again.success else found
 
     def _coarse(self, built: Built) -> Program:
         """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,

@@ -10,7 +10,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Limit
-from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings
+from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings, objective_size
 from gantrytau_optimica.studies.kkt import stationarity
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -37,9 +37,8 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     if solution is None:  # limits in which the parameters occur are rows of their own now
         solution = Solver(new, SolverSettings()).solve(new, w)
     found = replace(optimum, built=built, program=new, solution=solution)
-    if not found.success or abs(found.objective - optimum.objective) > SAME * max(
-        1.0, abs(optimum.objective)
-    ):
+    size = max(abs(optimum.objective), objective_size(new))
+    if not found.success or abs(found.objective - optimum.objective) > SAME * size:
         raise SolveError(
             f"{optimum.name}: with {', '.join(missing)} held it {found.status}, objective {found.objective:.8g} instead of "
             f"{optimum.objective:.8g}; name them in prepare(parameters=[...]) and solve there",
@@ -54,11 +53,13 @@ def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
     sized = built.problem.with_signals(
         lambda _, s: replace(s, nominal=known[s.name].nominal, guess=known[s.name].guess)
     )
+    sizes = {n.name: n.size for n in old.problem.free}
     numbers = []
     for number in built.problem.free:
         value = float(values.get(number.name, number.guess))
         ends = {"min": value, "max": value} if number.held else {}
-        numbers.append(replace(number, guess=value, **ends))
+        size = sizes.get(number.name, number.size)
+        numbers.append(replace(number, guess=value, nominal=size, **ends))
     phases = tuple(
         replace(
             phase,

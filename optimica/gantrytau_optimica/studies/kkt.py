@@ -130,8 +130,8 @@ def stationarity(program: Program, solution: Solution) -> float:
     gradient = np.array(found).ravel()
     terms = jacobian.T @ solution.multipliers
     total = gradient + terms + solution.bound_multipliers * scale
-    size = max(1.0, float(np.max(np.abs(terms), initial=0.0)))
-    return float(np.max(np.abs(total[program.lbw < program.ubw]), initial=0.0)) / size
+    size = max(float(np.max(np.abs(part), initial=0.0)) for part in (gradient, terms))
+    return float(np.max(np.abs(total[program.lbw < program.ubw]), initial=0.0)) / (size or 1.0)
 
 
 def _derivatives(program: Program, w: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, Any, Any]:

@@ -26,13 +26,13 @@ from tests.optimica.problems import Mass
 SCALES = [(1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]  # m, s
 
 
-def fastest(length: float, time: float) -> list[float]:
+def fastest(length: float, time: float, guess: float = 5.0) -> list[float]:
     """Rest to rest, |u| <= 1, over 1: 2, and its slopes by the limit, -1, and by the way, 1."""
 
     class Fastest(Optimization):
         m = Mass()
         lim, d = Parameter(length / time**2), Parameter(length)
-        final_time = Free(5.0 * time, min=1e-3 * time, max=1e3 * time)
+        final_time = Free(guess * time, min=min(1e-3, 0.1 * guess) * time, max=max(1e3, 10 * guess) * time)
 
         def objective(self):
             return self.final_time
@@ -271,6 +271,11 @@ def test_units_do_not_change_the_answer(problem: Callable, length: float, time: 
     # g of 1e18 is refused by the model itself, whose sums must not vanish beside it
     scales = (length, 1.0) if problem is brachistochrone else (length, time)
     assert problem(*scales) == pytest.approx([1.0] * len(problem(*scales)), abs=1e-6)
+
+
+@pytest.mark.parametrize("guess", [1e-3, 1e3, 1e6])
+def test_a_guess_of_the_time_that_tells_nothing_of_its_size(guess: float):
+    assert fastest(1e-6, 1e-6, guess) == pytest.approx([1.0, 1.0, 1.0], abs=1e-6)
 
 
 @pytest.mark.parametrize("mass", [1e-12, 1.0, 6e24])
