@@ -16,8 +16,12 @@ from gantrytau_optimica.estimation.weights import Weighing, Weights
 from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program
 
-STEPS = 60
+STEPS = 25
 SETTLED = 1e-5  # of a deviation, or
+ROUGH, FIRM = (
+    1e-3,
+    1e-2,
+)  # of it, that rounding may leave, and that limits of the model must cost to be said to bind
 FINE = 1e-11  # of its size: a step of a number that changes nothing more
 SHARES = 0.5 ** np.arange(12)
 RANK = 1e-11  # of the largest singular value of normed slopes: directions in which no step is taken
@@ -80,12 +84,14 @@ def fit_on_mesh(
     for _ in range(REWEIGHED):
         moved = None if limited else descended(found, w, weights, step)
         if moved is None:
-            moved, limited = solve(found, w, weights), True
+            moved = solve(found, w, weights)
             if moved is None:
                 return None
+            _, gained, size = _change(found, moved, weights.roots)
+            limited = gained > FIRM * size and not _inside(found, moved, -LIMIT)
         w = moved
         errors, jacobian = found.values(w), found.jacobian(w)
-        fit = MeshFit(found, w, errors, jacobian, weights, limited and not _inside(found, w, -LIMIT))
+        fit = MeshFit(found, w, errors, jacobian, weights, limited)
         if weighing.steady:
             break
         before, weights = weights, weighing.weights(errors, jacobian, weights)
@@ -97,35 +103,41 @@ def fit_on_mesh(
 def descended(found: Residuals, w: np.ndarray, weights: Weights, step: Step) -> np.ndarray | None:
     """Unknowns of the least sum of squares; None if limits are passed or steps do not lead to it."""
     program, roots = found.program, weights.roots
-    free, scale = program.places.free, program.places.scale
-    low, high = program.lbw[free] * scale[free], program.ubw[free] * scale[free]
-    sizes = scale[free]
+    free, scale = program.places.free, program.places.scale[program.places.free]
+    low, high = program.lbw[free] * scale, program.ubw[free] * scale
     at = found.on_manifold(w, np.clip(w[free], low, high))
     if at is None:
         return None
-    errors = found.values(at) * roots
+    cost = np.linalg.norm(found.values(at) * roots)
     for _ in range(STEPS):
-        step(float(errors @ errors))
-        slopes = found.jacobian(at) * roots[:, None]
-        change = bounded_step(slopes, errors, sizes, low - at[free], high - at[free])
-        size = np.linalg.norm(errors) / np.sqrt(max(errors.size - free.size, 1))
-        gained = np.linalg.norm(slopes @ change)
-        if gained <= SETTLED * size or np.all(
-            np.abs(change) <= FINE * np.maximum(np.abs(at[free]), 1e-3 * sizes)
-        ):
+        step(float(cost**2))
+        change, gained, size = _change(found, at, roots)
+        still = np.abs(change) <= FINE * np.maximum(np.abs(at[free]), 1e-3 * scale)
+        if gained <= SETTLED * size or np.all(still):
             return at if _inside(found, at, LIMIT) else None
+        moved, after = None, np.inf
         for share in SHARES:
             moved = found.on_manifold(at, at[free] + share * change)
-            if moved is None:
-                continue
-            after = found.values(moved) * roots
-            if np.linalg.norm(after) < np.linalg.norm(errors):
+            after = np.inf if moved is None else np.linalg.norm(found.values(moved) * roots)
+            if after < cost:
                 break
-        else:
+        if moved is None or not after < cost:
             # what is left to be gained is lost in the rounding of the residuals
-            return at if gained <= 1e-3 * size and _inside(found, at, LIMIT) else None
-        at, errors = moved, after
+            return at if gained <= ROUGH * size and _inside(found, at, LIMIT) else None
+        at, cost = moved, after
     return None
+
+
+def _change(found: Residuals, at: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """The next step of the free numbers, what it gains, and the deviation of the weighed residuals."""
+    program = found.program
+    free = program.places.free
+    scale = program.places.scale[free]
+    low, high = program.lbw[free] * scale - at[free], program.ubw[free] * scale - at[free]
+    errors, slopes = found.values(at) * roots, found.jacobian(at) * roots[:, None]
+    change = bounded_step(slopes, errors, scale, low, high)
+    size = np.linalg.norm(errors) / np.sqrt(max(errors.size - free.size, 1))
+    return change, float(np.linalg.norm(slopes @ change)), float(size)
 
 
 def bounded_step(
