@@ -28,6 +28,7 @@ RANK = 1e-11  # of the largest singular value of normed slopes: directions in wh
 LIMIT = 1e-7  # of typical sizes, by which a limit of the model may be passed
 AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
 REWEIGHED = 40
+MOST_STALLED = 2  # of them without a way by steps, as on a mesh that is too coarse for weights that settle
 SAME = 1e-4  # relative: a change of the weights that changes nothing more
 
 Solve = Callable[[Residuals, np.ndarray, Weights], np.ndarray | None]
@@ -80,7 +81,7 @@ def fit_on_mesh(
 
     solve: Ipopt's answer from unknowns with weights, for where limits of the model bind.
     """
-    limited, fit = False, None
+    limited, stalled, fit = False, 0, None
     for _ in range(REWEIGHED):
         moved = None if limited else descended(found, w, weights, step)
         if moved is None:
@@ -89,10 +90,11 @@ def fit_on_mesh(
                 return None
             _, gained, size = _change(found, moved, weights.roots)
             limited = gained > FIRM * size and not _inside(found, moved, -LIMIT)
+            stalled += not limited
         w = moved
         errors, jacobian = found.values(w), found.jacobian(w)
         fit = MeshFit(found, w, errors, jacobian, weights, limited)
-        if weighing.steady:
+        if weighing.steady or stalled == MOST_STALLED:
             break
         before, weights = weights, weighing.weights(errors, jacobian, weights)
         if np.max(np.abs(weights.roots / before.roots - 1)) < SAME:
