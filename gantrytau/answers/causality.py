@@ -15,7 +15,7 @@ from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 DROPPED = "constraints that were left out"
-OPEN = 1e-6  # m or rad by which they may be violated
+OPEN = 1e-6  # of the size of a loop, by which they may be violated
 
 
 def function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.Function:
@@ -46,7 +46,7 @@ def _dropped(dae: Translated, given: Sequence[str]) -> ca.SX:
     parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
     if not parameters or not dae.redundant:
         return ca.SX(0, 1)
-    return dae.to_reduced(ca.vertcat(*(e.residual for e in dae.redundant)))
+    return dae.openings
 
 
 def _closed(function: ca.Function) -> ca.Function:

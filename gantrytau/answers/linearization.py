@@ -27,6 +27,7 @@ from gantrytau.language.symbols import split_derivative
 
 POOR = 1e6  # condition of the equations, scaled, above which other states are looked for at the point
 LEAST_COLUMN = 1e-4  # a column that is smaller is meant to be small
+ROUNDING = 1e-9  # of the terms: below, a difference is none
 SINGULAR = 1e13  # above this no digit of a solution would be left
 
 
@@ -256,9 +257,11 @@ class _Slopes:
         vector = column(list(expressions))
         direct, through = ca.jacobian(vector, ca.vertcat(self.x, self.u)), ca.jacobian(vector, self.y)
         assert self.rates is not None
-        total = self._numbers(direct) + self._numbers(through) @ self.rates
-        extra = np.abs(total[:, n + m :])
-        if extra.size and np.max(extra) > 1e-9 * max(1.0, float(np.max(np.abs(total)))):
+        first, then = self._numbers(direct), self._numbers(through)
+        total = first + then @ self.rates
+        terms = np.abs(first) + np.abs(then) @ np.abs(self.rates)
+        extra = np.abs(total[:, n + m :]) - ROUNDING * terms.max(axis=1, keepdims=True, initial=0.0)
+        if np.any(extra > 0):
             i, j = divmod(int(np.argmax(extra)), extra.shape[1])
             raise StructureError(
                 f"{self.dae.name}: {rows[i]} depends on {self.driving[j]}, the derivative of an input, which A, B, C, D "

@@ -1,5 +1,6 @@
 """The translated model: the frozen record that simulation, writing and the answers read."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
+from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.blocks.pattern import Pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_anew, solve_blocks
@@ -132,6 +134,21 @@ class Translated:
     def symbols(self) -> tuple[str, ...]:
         """Names of all reduced symbols but parameters and time: unknowns and what is known, with their derivatives."""
         return tuple(self.indexed.symbols(self.reduced.known))
+
+    @cached_property
+    def openings(self) -> ca.SX:
+        """How far constraints that were left out as redundant are violated: m or rad, in small mechanisms of their length.
+
+        That is the largest length at the start, in whole thousands.
+        """
+        if not self.redundant:
+            return column([])
+        residuals = self.to_reduced(column([e.residual for e in self.redundant])).elements()
+        lengths = [n for v in self.flat.variables if v.unit == "m" for n in v.elements]
+        length = float(np.abs(self.numbers(lengths, self.start)).max(initial=0.0)) or 1.0
+        size = min(1.0, 10.0 ** (3 * round(math.log10(length) / 3)))
+        rows = zip(self.redundant, residuals, strict=True)
+        return column([r if "orientation" in e.name else r / size for e, r in rows])
 
     @property
     def mobility(self) -> int:

@@ -24,7 +24,7 @@ BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time
 STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink are rounding
 ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
-OPEN = 1e-6  # m or rad by which a constraint that was left out may be violated
+OPEN = 1e-6  # of the size of a loop, by which a constraint that was left out may be violated
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
 
 

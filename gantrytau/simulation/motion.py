@@ -45,7 +45,7 @@ def all_coordinates(
     wanted = [
         *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
-        dae.to_reduced(column([e.residual for e in dae.redundant])),
+        dae.openings,
         dae.to_reduced(column([s.expression for s in dae.flat.sampled])),
         *_matrices(solved),
     ]

@@ -255,3 +255,20 @@ def test_rates_of_inputs_are_refused():
     words = "der.mass.v. depends on der.guide.s., the derivative of an input, which A, B, C, D cannot say"
     with pytest.raises(StructureError, match=words):
         linearize(Guided())
+
+
+class Faint(Model):
+    """An output of 1e-12 times the rate of an input."""
+
+    u = Input(start=0.0)
+    x = Real(start=0.0, fixed=True)
+    y = Real()
+
+    def equations(self):
+        yield der(self.x) == self.u - self.x
+        yield self.y == 1e-12 * (self.x + der(self.u))
+
+
+def test_rates_of_inputs_are_refused_however_small_their_factor():
+    with pytest.raises(StructureError, match=r"y depends on der\(u\)"):
+        linearize(Faint(), outputs=["y"])

@@ -142,3 +142,11 @@ def test_a_pendulum_of_any_size_swings_alike_on_a_rod_that_does_not_yield(size):
     assert swing.final("x") / size == pytest.approx(
         0.76539, abs=5e-3
     )  # in metres; small ones at the default tolerance
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-6, 1.0])
+def test_a_loop_of_any_size_is_not_closed_beside_its_plane(size):
+    dae = translate(FourBar(*(size * np.array([1.0, 0.3, 0.9, 0.6]))))
+    function = dae.function(["crank.phi", "base.r"], ["rocker.phi"])
+    assert np.isfinite(float(function(1.3, [size, 0.0, 0.0])))
+    assert np.isnan(float(function(1.3, [size, 0.0, 1e-4 * size])))
