@@ -15,11 +15,16 @@ Shape = tuple[int, ...]
 
 
 def elements_of(
-    place: str, value: Any, shape: Shape, expected: str = "a number or an array of numbers"
+    place: str,
+    value: Any,
+    shape: Shape,
+    expected: str = "a number or an array of numbers",
+    finite: str = "finite numbers",
 ) -> list[float]:
     """The elements of numbers given for a quantity of that shape.
 
-    expected: in words, for what is no number. Raises ModelError for that, for another shape, and for NaN and infinity.
+    expected, finite: in words, for what is no number, and for one that is not finite. Raises ModelError for these, and
+    for another shape.
     """
     try:
         found = np.asarray(value, dtype=float)
@@ -27,7 +32,7 @@ def elements_of(
         raise ModelError(f"{place}: found {value!r}, expected {expected}") from None
     check_shape(place, found.shape, shape)
     if not np.all(np.isfinite(found)):
-        raise ModelError(f"{place}: found {found.tolist()}, expected finite numbers")
+        raise ModelError(f"{place}: found {found.tolist()}, expected {finite}")
     return found.ravel(order="F").tolist()
 
 

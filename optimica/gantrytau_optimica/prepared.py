@@ -274,7 +274,8 @@ class Prepared:
                 raise ModelError(
                     f"{name}: was not named in prepare(parameters=[...]), expected one of {held}"
                 )
-            numbers = elements_of(name, value, self.built.read.dae.flat.shape(name))
+            expected = f"{len(elements)} finite numbers"
+            numbers = elements_of(name, value, self.built.read.dae.flat.shape(name), expected, expected)
             found.update(zip(elements, numbers, strict=True))
         return found
 
