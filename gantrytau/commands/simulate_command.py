@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 SPELLING = Spelling(
     ("simulate",),
     {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs")}
-    | {"inputs": "--input", "parameters": "--set"},
+    | {"inputs": "--input", "parameters": "--set", "max_step": "--max-step"},
 )
 
 
@@ -41,8 +41,13 @@ def simulate(
     model: ModelName,
     stop: Annotated[float, typer.Option(help="Time at which to stop, in s.", show_default=False)],
     start: Annotated[float, typer.Option(help="Time at which to start, in s.")] = 0.0,
-    tolerance: Annotated[float, typer.Option(help="Relative and absolute error per step.")] = 1e-8,
+    tolerance: Annotated[
+        float, typer.Option(help="Error, relative to values and to what is nominal.")
+    ] = 1e-8,
     points: Annotated[int, typer.Option(help="Number of output times.")] = 501,
+    max_step: Annotated[
+        float | None, typer.Option(help="Longest step, in s, for pulses shorter than a 10,000th of the run.")
+    ] = None,
     input_: Inputs = None,
     outputs: Kept = None,
     output: Saved = None,

@@ -267,3 +267,19 @@ def test_a_missing_extra_is_told_before_the_work(fails, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     message = fails(MISUSE, "simulate", "Pendulum", "--stop", "1", "--output", tmp_path / "a.parquet")
     assert "pip install 'gantrytau[results]'" in message
+
+
+def test_what_is_not_finite_is_told_beside_the_answer(run, answer, tmp_path):
+    (tmp_path / "roots.py").write_text(
+        "from gantrytau import Model, Real, der, sqrt\n"
+        "class Root(Model):\n"
+        "    x = Real(start=1.0, fixed=True)\n"
+        "    y = Real()\n"
+        "    def equations(self):\n"
+        "        yield der(self.x) == -1.0\n"
+        "        yield self.y == sqrt(self.x - 0.5)\n"
+    )
+    arguments = ("simulate", f"{tmp_path / 'roots.py'}:Root", "--stop", "1", "--max-step", "0.1")
+    words = "Root: y is not finite from t = 0.5"  # or 0.502, by rounding
+    assert words in run(*arguments).stderr
+    assert words in answer(*arguments)["warnings"][0]

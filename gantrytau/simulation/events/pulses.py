@@ -39,7 +39,7 @@ def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = N
     if longest is not None:
         fine = max(fine, min(int(np.ceil((end - begin) / longest / COARSE)), MOST // COARSE))
     t = np.linspace(begin, end, fine * COARSE + 1)
-    values = np.array(ca.Function("functions", [time], [ca.vertcat(*moving)])(t[None]))
+    values = np.array(ca.Function("functions", [time], [ca.vertcat(*moving)]).map(t.size)(t[None]))
     whole = np.nanmax(values, axis=1) - np.nanmin(values, axis=1)
     parts = np.stack([values[:, k : k + fine * COARSE : fine] for k in range(fine)] + [values[:, fine::fine]])
     changes = np.nanmax(parts, axis=0) - np.nanmin(parts, axis=0)  # (functions, COARSE)

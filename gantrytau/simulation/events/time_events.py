@@ -52,7 +52,8 @@ class TimeEvents:
 
     def _search(self, i: int, w: np.ndarray) -> np.ndarray:
         def at(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            values, rates = (np.array(f) for f in self._function(times[None], w))
+            inputs = np.repeat(w[:, None], times.size, axis=1)
+            values, rates = (np.array(f) for f in self._function.map(times.size)(times[None], inputs))
             return np.broadcast_to(values[i], times.shape), np.broadcast_to(rates[i], times.shape)
 
         t = np.linspace(self.begin, self.end, DENSE + 1)
