@@ -65,25 +65,76 @@ class Settled:
     guess: Mapping[str, float] = field(default_factory=dict)
 
 
-def without_redundant(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Settled:
-    """Leave out the constraints that repeat others. InitializationError if the loops cannot be closed."""
+def without_redundant(
+    flat: FlatModel,
+    table: ParameterTable,
+    known: frozenset[str],
+    course: Sequence[Mapping[str, float]] = (),
+) -> Settled:
+    """Leave out the constraints that repeat others. InitializationError if the loops cannot be closed.
+
+    course: poses of a motion, numbers of positions by symbol: at the last of them the constraints to keep are chosen, by
+    their sizes over all, instead of at poses around the start.
+    """
     duals = [e for e in flat.equations if e.dual]
     if not duals:
         return Settled(flat)
-    bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
-    reduced = eliminate_aliases(bare, table, known)
-    constraints = _constraints(flat, reduced, duals)
-    guess = start_values(flat, reduced, list(constraints.level.leaves))
+    constraints, guess = _read(flat, table, known, duals)
+    if course:
+        guess = replace(guess, values={n: course[-1].get(n, value) for n, value in guess.values.items()})
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
         raise open_loops(flat, error, _nearest(constraints, guess)) from None
-    poses = [closed, *_poses(constraints, guess, closed, flat.name)]
-    matrices = [_matrix(_slopes(constraints, pose)) for pose in poses]
+    if course:
+        matrices = [_over_course(constraints, course)[-1]]
+    else:
+        poses = [closed, *_poses(constraints, guess, closed, flat.name)]
+        matrices = [_matrix(_slopes(constraints, pose)) for pose in poses]
     kept = _independent(matrices, constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
     return Settled(_with_zero_forces(flat, redundant), redundant, closed)
+
+
+def soundness(
+    flat: FlatModel,
+    table: ParameterTable,
+    known: frozenset[str],
+    redundant: Sequence[Equation],
+    course: Sequence[Mapping[str, float]],
+) -> np.ndarray:
+    """How independent the constraints are that were kept, at poses of a motion: 1 as all of them are, 0 not at all."""
+    duals = [e for e in flat.equations if e.dual]
+    constraints, _ = _read(flat, table, known, duals)
+    left_out = {e.name for e in redundant}
+    kept = [k for k, e in enumerate(duals) if e.name not in left_out]
+    found = np.ones(len(course))
+    for k, matrix in enumerate(_over_course(constraints, course) if kept else ()):
+        rest = _beyond(matrix[constraints.firm :], matrix[: constraints.firm])
+        every, own = (np.linalg.svd(rows, compute_uv=False)[len(kept) - 1] for rows in (rest, rest[kept]))
+        found[k] = own / max(every, RANK)
+    return found
+
+
+def _over_course(constraints: Constraints, course: Sequence[Mapping[str, float]]) -> np.ndarray:
+    """The rows at poses of a motion, (poses, rows, unknowns), each of length one where it is longest.
+
+    A row may shrink to nothing at a pose, where others do not: of length one it would look as good as these.
+    """
+    each = np.array([_slopes(constraints, pose) for pose in course])
+    found = each * np.median([balance(slopes)[1] for slopes in each], axis=0)
+    sizes = np.max(np.linalg.norm(found, axis=2, keepdims=True), axis=0)
+    return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
+
+
+def _read(
+    flat: FlatModel, table: ParameterTable, known: frozenset[str], duals: Sequence[Equation]
+) -> tuple[Constraints, StartValues]:
+    """The constraints of positions, and the start values of what occurs in them."""
+    bare = replace(flat, equations=tuple(e for e in flat.equations if not e.dual))
+    constraints = _constraints(flat, reduced := eliminate_aliases(bare, table, known), duals)
+    return constraints, start_values(flat, reduced, list(constraints.level.leaves))
 
 
 def _constraints(flat: FlatModel, reduced: Reduced, duals: Sequence[Equation]) -> Constraints:

@@ -35,11 +35,19 @@ def translate_model(model: Model) -> Translated:
     return translate_flat(flat, Request())
 
 
-def translate_flat(flat: FlatModel, request: Request, start: Mapping[str, float] | None = None) -> Translated:
-    """A system of index one, sorted into blocks; `start`: numbers of symbols that replace start values."""
+def translate_flat(
+    flat: FlatModel,
+    request: Request,
+    start: Mapping[str, float] | None = None,
+    course: Sequence[Mapping[str, float]] = (),
+) -> Translated:
+    """A system of index one, sorted into blocks; `start`: numbers of symbols that replace start values.
+
+    course: poses of a motion at whose end constraints that repeat others are chosen, as of `without_redundant`.
+    """
     table, known = _given(flat, request.given)
     doubtful = any(e.dual for e in flat.equations)
-    settled = without_redundant(flat, table, frozenset(known)) if flat.loops else Settled(flat)
+    settled = without_redundant(flat, table, frozenset(known), course) if flat.loops else Settled(flat)
     try:
         return _translated(settled, flat, table, known, request, start or {})
     except StructureError as error:

@@ -24,6 +24,7 @@ from gantrytau.results.result import Result
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
+from gantrytau.simulation.other_constraints import joined, other_constraints
 from gantrytau.simulation.signals import PiecewiseLinear, Signal, read_signals
 from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
@@ -79,53 +80,70 @@ def simulate(
     dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat)
     _check_inputs(dae, signals, start, stop)
-    coordinates = all_coordinates(dae, signals, wanted)
-    run = _run(coordinates, signals, np.linspace(start, stop, points), tolerance, max_step, outputs)
-    result = result_of(run.coordinates, signals, *run.so_far(), outputs)
+    grid = np.linspace(start, stop, points)
+    result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs)
     doubt = doubts(result)
     if doubt:
         warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
     return result
 
 
-def _run(
+def _all_runs(
+    dae: Translated,
+    signals: Mapping[str, Signal],
+    wanted: Sequence[str],
+    grid: np.ndarray,
+    tolerance: float,
+    max_step: float | None,
+    outputs: Sequence[str] | None,
+) -> Result:
+    """One run over a grid, or several where constraints that repeat others are chosen anew; SolveError with the result so
+    far where it stops before its end.
+    """
+    parts: list[Result] = []
+    left = grid
+    while True:
+        run, error = _sized_run(all_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
+        parts.append(result_of(run.coordinates, signals, *run.so_far(), outputs))
+        found = other_constraints(run, signals) if isinstance(error, SolveError) else None
+        if found is None:
+            break
+        left, dae = found
+    result = joined(parts, grid)
+    if isinstance(error, SolveError):
+        error.result = result
+        raise error
+    if error is not None:
+        raise SolveError(
+            f"{dae.name}: simulation interrupted at t = {result.time[-1]:.4g} s; .result holds what was computed",
+            time=float(result.time[-1]),
+            result=result,
+        )
+    return result
+
+
+def _sized_run(
     coordinates: Coordinates,
     signals: Mapping[str, Signal],
     grid: np.ndarray,
     tolerance: float,
     max_step: float | None,
-    outputs: Sequence[str] | None,
-) -> Run:
-    """A run that has ended, with sizes of its states that it bears out."""
+) -> tuple[Run, SolveError | KeyboardInterrupt | None]:
+    """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
     margin = MARGIN * (OFTEN if coordinates.dae.flat.sampled else 1.0)
-    step = max(margin * tolerance, min(LEAST, MARGIN * tolerance))
+    exact = max(margin * tolerance, min(LEAST, MARGIN * tolerance))
     coordinates = replace(coordinates, sizes=first_sizes(coordinates))
-    run = _to_the_end(Run(coordinates, signals, grid, step, max_step), signals, outputs)
-    for _ in range(ROUNDS):
-        sizes = seen_sizes(coordinates, run.largest())
+    left = ROUNDS
+    while True:
+        run = Run(coordinates, signals, grid, exact, max_step)
+        try:
+            run.go()
+        except (SolveError, KeyboardInterrupt) as error:
+            return run, error
+        sizes = seen_sizes(coordinates, run.largest()) if left else None
         if sizes is None:
-            break
-        coordinates = replace(coordinates, sizes=sizes)
-        run = _to_the_end(Run(coordinates, signals, grid, step, max_step), signals, outputs)
-    return run
-
-
-def _to_the_end(run: Run, signals: Mapping[str, Signal], outputs: Sequence[str] | None) -> Run:
-    """A run when it has ended; SolveError, with the result so far, where it stops before."""
-    coordinates = run.coordinates
-    try:
-        run.go()
-    except SolveError as error:
-        error.result = result_of(run.coordinates, signals, *run.so_far(), outputs)
-        raise
-    except KeyboardInterrupt:
-        reached = run.so_far()
-        raise SolveError(
-            f"{coordinates.dae.name}: simulation interrupted at t = {reached[0][-1]:.4g} s; .result holds what was computed",
-            time=float(reached[0][-1]),
-            result=result_of(coordinates, signals, *reached, outputs),
-        ) from None
-    return run
+            return run, None
+        coordinates, left = replace(coordinates, sizes=sizes), left - 1
 
 
 def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:
