@@ -67,7 +67,14 @@ def link_conditions(read: SymbolicProblem, rates: Rates) -> Conditions:
             zero = ca.SX(0)
             found.append(ConstraintRow(begin - end, zero, zero, f"{state} begins where {before} ends"))
         phases = {p.name: p for p in read.phases}
-        if not phases[link.second].start_time.is_constant():
+        ends, begins = phases[link.first].final_time, phases[link.second].start_time
+        if ends.is_constant() and begins.is_constant() and float(ends) != float(begins):
+            raise ModelError(
+                f"{read.name}: link({link.first}, {link.second}): {link.first} ends at {float(ends):g} s, where "
+                f"{link.second} begins at {float(begins):g} s, expected one time for both; write start_time = {float(ends):g} in "
+                f"{link.second}, or start_time = Free(...)"
+            )
+        if not begins.is_constant():
             gap = phases[link.second].start_time - phases[link.first].final_time
             zero = ca.SX(0)
             found.append(ConstraintRow(gap, zero, zero, f"{link.second} begins when {link.first} ends"))

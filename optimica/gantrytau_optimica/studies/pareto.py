@@ -71,7 +71,11 @@ def _recorded(
 
 
 def _dominated(weight: str, weights: np.ndarray, columns: Mapping[str, np.ndarray]) -> list[str]:
-    """Points to which another one is better in one quantity and no worse in the others."""
+    """Points to which another one is better in one quantity and no worse in the others.
+
+    The objective is none of them: it changes with the weight by itself.
+    """
+    columns = {name: column for name, column in columns.items() if name != "objective"}
     table, found = np.array(list(columns.values())), []
     if len(columns) < 2:
         return found

@@ -5,8 +5,9 @@ from typing import Any
 import pytest
 
 from gantrytau import Input, Model, ModelError, Real
-from gantrytau_optimica import final, link, optimize
+from gantrytau_optimica import Optimization, final, link, optimize
 from tests.optimica.control.test_phases import Ball, First, Leg, ThereAndBack
+from tests.optimica.problems import Mass
 
 
 def message(problem) -> str:
@@ -121,3 +122,20 @@ def test_a_link_of_the_problem_itself():
 def test_a_link_of_a_phase_of_another_problem():
     other = ThereAndBack()
     assert "link" in message(changed(constraints=lambda self: [link(self.out, other.back)]))
+
+
+def test_phases_whose_fixed_times_do_not_meet():
+    class Stretch(Optimization):
+        mass = Mass()
+        final_time = 1.0
+
+    class Twice(Optimization):
+        first, second = Stretch(), Stretch()
+
+        def constraints(self):
+            yield link(self.first, self.second)
+
+    with pytest.raises(
+        ModelError, match=r"first ends at 1 s, where second begins at 0 s.* start_time = 1 in second"
+    ):
+        optimize(Twice)

@@ -253,3 +253,8 @@ def test_quantities_written_wrongly_are_said(along, words):
 def test_a_quantity_that_was_not_recorded(gentle):
     with pytest.raises(ModelError, match=r"the points have no 'fina_time'; did you mean 'final_time'"):
         gentle["fina_time"]
+
+
+def test_an_objective_that_grows_with_its_weight_dominates_nothing():
+    curve = pareto(Gentle, "weight", [0.01, 0.1, 1.0], along=["final_time", "objective"], elements=5)
+    assert not curve.findings
