@@ -71,8 +71,8 @@ def link_conditions(read: SymbolicProblem, rates: Rates) -> Conditions:
         if ends.is_constant() and begins.is_constant() and float(ends) != float(begins):
             raise ModelError(
                 f"{read.name}: link({link.first}, {link.second}): {link.first} ends at {float(ends):g} s, where "
-                f"{link.second} begins at {float(begins):g} s, expected one time for both; write start_time = {float(ends):g} in "
-                f"{link.second}, or start_time = Free(...)"
+                f"{link.second} begins at {float(begins):g} s, expected one time for both; write "
+                f"start_time = {float(ends):g} in {link.second}, or start_time = Free(...)"
             )
         if not begins.is_constant():
             gap = phases[link.second].start_time - phases[link.first].final_time
