@@ -215,9 +215,11 @@ class _Change:
         guess = value.value if is_free(value) else value
         try:
             given = np.asarray(guess, dtype=float)
+            if given.ndim and given.size != len(which):  # one number may stand for all
+                raise ValueError
         except (TypeError, ValueError):
             raise ModelError(f"{name}: found {guess!r}, expected {len(which)} numbers or Free(...)") from None
-        if given.ndim:  # one number may stand for all
+        if given.ndim:
             check_shape(name, given.shape, _shape(quantity, which))
         given = np.broadcast_to(given.ravel(order="F"), len(which))
         if not np.all(np.isfinite(given)):
