@@ -25,7 +25,9 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
 FINE, FINEST = 1e-7, 1e-11  # of its size, without and with deviations of the data
 SCATTER = 0.1  # of the scatter of chi-square, by which the mesh may raise it
-CANCELLED = 5.0  # times that: what elements may contribute that cancel each other
+CANCELLED = (
+    2.0  # times that: the root of the squares of what elements contribute, which may cancel each other
+)
 MOST_OF = 0.6  # of the elements: where as many are cut, all are
 MUCH = 200.0  # times its share, from which on an element is cut twice
 INNER = 0.02  # of an element, off its ends: where it is cut at a corner
@@ -58,7 +60,8 @@ class MeshError:
     @property
     def numbers_stand(self) -> bool:
         """Whether it hardly matters to the numbers."""
-        whole = np.sum([np.sum(np.abs(part), axis=0) for part in self.parts], axis=0) if self.parts else 0.0
+        parts = np.concatenate([np.zeros((1, self.shift.size)), *self.parts])
+        whole = np.linalg.norm(parts, axis=0)
         return bool(np.all(np.abs(self.shift) <= self.allowed) and np.all(whole <= CANCELLED * self.allowed))
 
 
