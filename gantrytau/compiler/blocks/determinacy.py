@@ -19,6 +19,7 @@ from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.term_sizes import term_sizes
 
 NOISE = 1e-12  # of a coefficient relative to the terms that it adds up: below, it is zero but for rounding
+DOUBTFUL = 1e-6  # of the largest coefficient: smaller ones are looked at
 LEAST = 1e-12  # singular value of the coefficients, rows and columns scaled, relative to the largest
 ROUNDS = 4  # of scaling rows and columns
 
@@ -40,9 +41,12 @@ def refuse_undetermined(
         return
     matrices = [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in watched]
     entries = [e for m in matrices for e in m.nonzeros()]
-    sizes = term_sizes(entries, _found_sizes(reduced, asked, sample, flat))
-    values, terms = values_at(ca.horzcat(ca.vertcat(*entries), ca.vertcat(*sizes)), sample).T
-    values = np.where(np.abs(values) <= NOISE * terms, 0.0, values)
+    values = values_at(ca.vertcat(*entries), sample).ravel()
+    small = np.flatnonzero((values != 0) & (np.abs(values) <= DOUBTFUL * np.abs(values).max(initial=1.0)))
+    if small.size:
+        sizes = term_sizes([entries[k] for k in small], _found_sizes(reduced, asked, sample, flat))
+        noise = NOISE * values_at(ca.vertcat(*sizes), sample).ravel()
+        values[small[np.abs(values[small]) <= noise]] = 0.0
     begin = 0
     for block, symbolic in zip(watched, matrices, strict=True):
         matrix = np.zeros(symbolic.shape)

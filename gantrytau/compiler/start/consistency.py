@@ -72,10 +72,10 @@ class Level:
         entries = ca.vertcat(*jacobian.nonzeros()) if jacobian.nnz() else ca.SX(0, 1)
         return ca.Function("level", [x], [residual, ca.densify(entries)])
 
-    def sizes(self, numbers: np.ndarray) -> np.ndarray:
-        """How large the terms of the residuals are, at numbers of the leaves."""
+    def sizes(self, rows: Sequence[int], numbers: np.ndarray) -> np.ndarray:
+        """How large the terms of some residuals are, at numbers of the leaves."""
         x, _, _ = self._symbolic
-        terms = ca.vertcat(*term_sizes(self.residuals))
+        terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
         return np.array(ca.Function("sizes", [x], [terms])(numbers)).ravel()
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -209,15 +209,20 @@ def _solve(
         around = _propagated(level, around, missing)
     start = around[columns]
 
-    def met(rows: np.ndarray | float, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def met(
+        factors: np.ndarray | float, sizes: np.ndarray | float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where steps of these sizes lead, what is left there, and which equations do not hold."""
-        point, _, _ = newton(lambda x: _scaled_rows(rows, *at(x)), start, weights * sizes)
+        point, _, _ = newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
         if np.any(bad):
             # unknowns that are solved together have the rounding of the largest
             small = np.abs(jacobian).sum(axis=1) * np.max(np.abs(point), initial=1.0)
-            bad &= ~(np.abs(f) <= np.maximum(SOLVED * level.sizes(around), ROUNDING * small))
+            bad &= ~(np.abs(f) <= ROUNDING * small)
+            left = np.flatnonzero(bad)
+            if left.size and np.all(np.isfinite(f)):
+                bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
         return point, f, bad
 
     point, f, bad = met(1.0, 1.0)
