@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
 from gantrytau_optimica.estimation.weights import Weighing, Weights
@@ -146,6 +145,8 @@ def bounded_step(
     slopes: np.ndarray, errors: np.ndarray, sizes: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
     """The step (k,) within low and high that makes |errors + slopes step| least; of several the smallest."""
+    from scipy.optimize import lsq_linear
+
     norms = np.linalg.norm(slopes * sizes, axis=0)
     norms = sizes / np.where(norms > 0, norms, 1.0)
     step = norms * np.linalg.lstsq(slopes * norms, -errors, rcond=RANK)[0]
