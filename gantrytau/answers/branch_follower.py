@@ -12,12 +12,12 @@ import numpy as np
 
 from gantrytau.compiler.blocks.pivots import Scales
 
-TRIALS = (16, 8)  # rounds of trials: a round that begins at the end of the way costs nothing
+TRIALS = (24, 8)  # rounds of trials: a round that begins at the end of the way costs nothing
 SMALLEST = 1e-13  # step, of the way
-NEAR = 0.25  # of a step, by which it may be corrected
+NEAR = 0.1  # of a step, by which it may be corrected
 WANTED = 0.7  # of that
 CHANGES = (0.1, 4.0)  # of a step after a trial
-ALIKE = 4.0  # largest ratio of Jacobians before and after a step, pivot by pivot
+ALIKE = 1.5  # largest ratio of Jacobians before and after a step, pivot by pivot
 ROUNDING = 1e-12  # of the unknowns, a correction that is none
 
 

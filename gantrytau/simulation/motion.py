@@ -101,12 +101,19 @@ def _highest_blocks(
     modes: Mapping[str, float],
 ) -> SolvedBlocks:
     """The blocks that give the highest derivatives; pivots are those of the same equations at lower ones, or by value."""
-    guide = Guide({**dae.start, **modes}, dae.table.values, states, careful=True)
-    for block in dae.blocks:
-        if not highest.keys() & set(block.unknowns):
-            block.enter(guide)
     incidence = {key: dae.indexed.incidence[key] for key in last}
-    return solve_blocks(block_pattern(incidence, highest).blocks, last, highest, guide)
+    pattern = block_pattern(incidence, highest).blocks
+
+    def solved(careful: bool) -> SolvedBlocks:
+        guide = Guide({**dae.start, **modes}, dae.table.values, states, careful=careful)
+        for block in dae.blocks:
+            if not highest.keys() & set(block.unknowns):
+                block.enter(guide)
+        return solve_blocks(pattern, last, highest, guide)
+
+    careful = solved(True)
+    # more unknowns of the integrator are no gain: they need consistent starts
+    return solved(False) if careful.implicit else careful
 
 
 def _divisors(

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, c_source, translate
+from gantrytau import Input, Model, Parameter, Real, c_source, cos, exp, translate
 from gantrytau_models import FourBar
 from tests.answers.test_c_code import compiled_only, load
 
@@ -118,6 +118,41 @@ def test_behind_the_pose_where_a_parallelogram_is_flat_nothing_is_known():
     function = translate(FourBar(1.0, 0.3, 1.0, 0.3)).function(["crank.phi"], ["rocker.phi"])
     assert float(function(2.0)) == pytest.approx(2.0, abs=1e-9)
     assert math.isnan(float(function(4.0)))
+
+
+def test_another_root_just_behind_a_fold_is_not_taken():
+    class Wave(Model):
+        """x + exp(cos x) rises to 2.912 at x = 0.40, falls, and rises again from 2.571 on."""
+
+        u = Input(start=0.0)
+        x = Real(start=-1.3)
+
+        def equations(self):
+            yield self.x + exp(cos(self.x)) == self.u
+
+    function = translate(Wave()).function(["u"], ["x"])
+    for u in np.linspace(2.92, 3.5, 30):
+        assert math.isnan(float(function(u)))
+    assert float(function(2.91)) < 0.4
+
+
+def test_curves_meet_where_their_common_curvature_vanishes_along_a_line():
+    class Hyperbolas(Model):
+        """x^2 - y^2 = 1, and a line that comes to lie along an asymptote at k = 1."""
+
+        k = Input(start=0.3)
+        x = Real(start=1.2)
+        y = Real(start=-0.7)
+
+        def equations(self):
+            yield self.x**2 - self.y**2 == 1
+            yield self.x**2 - self.y**2 + self.x - self.k * self.y == 2.5
+
+    function = translate(Hyperbolas()).function(["k"], ["x", "y"])
+    for k in (0.3, 0.9, 1.0, 1.2, 2.0):
+        # (k^2 - 1) y^2 + 3 k y + 1.25 = 0 with the root that stays finite
+        y = -2.5 / (3 * k + math.sqrt(9 * k**2 - 5 * (k**2 - 1)))
+        np.testing.assert_allclose(np.ravel(function(k)), [1.5 + k * y, y], rtol=1e-12)
 
 
 def test_a_sweep_in_one_call_is_the_same_as_pose_by_pose():

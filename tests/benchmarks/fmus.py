@@ -173,10 +173,8 @@ def python_fmu(folder: Path, start: list[float], tolerance: float) -> Path:
     from pythonfmu.builder import FmuBuilder  # pyright: ignore[reportMissingImports]
 
     found = translate(GantryTau(prototypes.GT_A)).function(["tool.r", "tool.v", *FORCES], ["der(tool.v)"])
-    x, f, h = ca.SX.sym("x", 6), ca.SX.sym("f", 3), ca.SX.sym("h")
-    rates = ca.Function(
-        "rates", [x, f], [ca.vertcat(x[3:], found(x[:3], x[3:], f[0], f[1], f[2]))], {"cse": True}
-    )
+    x, f, h = ca.MX.sym("x", 6), ca.MX.sym("f", 3), ca.MX.sym("h")
+    rates = ca.Function("rates", [x, f], [ca.vertcat(x[3:], found(x[:3], x[3:], f[0], f[1], f[2]))])
     k1 = rates(x, f)
     k2 = rates(x + h / 2 * k1, f)
     k3 = rates(x + h / 2 * k2, f)

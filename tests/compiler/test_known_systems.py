@@ -296,8 +296,8 @@ def test_matrices():
 
 def test_algebraic_loops():
     class Nonlinear(Model):
-        x, y = Real(unit="1", start=1.0), Real(unit="1", start=1.0)
-        u = Input(unit="1")
+        x, y = Real(unit="1", start=2.5), Real(unit="1", start=-0.8)
+        u = Input(unit="1", start=3.0)  # the branch of u = 0 ends at 2.912
 
         def equations(self):
             yield self.x + exp(self.y) == self.u

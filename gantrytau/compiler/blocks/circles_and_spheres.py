@@ -6,6 +6,7 @@ where the centres lie on a line.
 """
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.compiler.blocks.pivots import Guide
 
@@ -37,9 +38,12 @@ def intersection(f: ca.SX, y: ca.SX, guide: Guide) -> list[ca.SX] | None:
 
 
 def _same_curvature(jacobian: ca.SX, y: ca.SX) -> bool:
-    """Whether all equations are quadratic with one and the same constant second derivative."""
+    """Whether all equations are quadratic with one and the same constant, definite second derivative."""
     first = ca.densify(ca.jacobian(jacobian[0, :].T, y))
-    if not first.is_constant() or ca.DM(first).is_zero():
+    if not first.is_constant():
+        return False
+    sizes = np.linalg.eigvalsh(np.array(ca.DM(first)))
+    if not sizes[0] * sizes[-1] > 0:  # along some line the curvature vanishes
         return False
     for i in range(1, jacobian.shape[0]):
         other = ca.densify(ca.jacobian(jacobian[i, :].T, y))
