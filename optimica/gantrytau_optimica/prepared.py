@@ -39,6 +39,7 @@ MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another
 LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
+VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
 MOST_ASIDE = 3  # times that a solve goes on from a place that is no minimum
 
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
@@ -211,7 +212,11 @@ class Prepared:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
         problem, layouts = found.program.problem, found.program.places.layouts
         sizes = {n.name: n.size for n in problem.free}
-        far = [n for n, x in found.free.items() if not 1 / FAR < abs(x) / sizes[n] < FAR and x != 0.0]
+        far = [
+            n
+            for n, x in found.free.items()
+            if VANISHED < abs(x) / sizes[n] < 1 / FAR or abs(x) > FAR * sizes[n]
+        ]
         if not far or layouts[0].scheme.scheme == "shooting" or not self._reached.clock.left:
             return found
         pieces = {s.name: s.pieces for phase in problem.phases for s in phase.inputs}
