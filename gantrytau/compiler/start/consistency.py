@@ -216,20 +216,21 @@ def _solve(
         point, _, _ = newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+        left = np.flatnonzero(bad)
+        if left.size and np.all(np.isfinite(f)):
+            bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
         if np.any(bad):
-            # unknowns that are solved together have the rounding of the largest
-            small = np.abs(jacobian).sum(axis=1) * np.max(np.abs(point), initial=1.0)
-            bad &= ~(np.abs(f) <= ROUNDING * small)
-            left = np.flatnonzero(bad)
-            if left.size and np.all(np.isfinite(f)):
-                bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
+            # unknowns that are solved together have the rounding of the largest, in their sizes
+            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
+            bad &= ~((np.abs(f) <= ROUNDING * rounding) & usual)
         return point, f, bad
 
+    rows, sizes = balance(at(start)[1])
+    usual = not np.any(sizes != 1)  # sizes of metres, radians and newtons
     point, f, bad = met(1.0, 1.0)
-    if np.any(bad):
-        rows, sizes = balance(at(start)[1])
-        if np.any(sizes != 1):  # far from metres and radians
-            point, f, bad = met(rows, sizes)
+    if np.any(bad) and not usual:
+        usual = True
+        point, f, bad = met(rows, sizes)
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
