@@ -7,7 +7,7 @@ import casadi as ca
 from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
-from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_blocks
+from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_anew, solve_blocks
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
@@ -104,16 +104,17 @@ def _highest_blocks(
     incidence = {key: dae.indexed.incidence[key] for key in last}
     pattern = block_pattern(incidence, highest).blocks
 
-    def solved(careful: bool) -> SolvedBlocks:
-        guide = Guide({**dae.start, **modes}, dae.table.values, states, careful=careful)
+    def guide(careful: bool) -> Guide:
+        found = Guide({**dae.start, **modes}, dae.table.values, states, careful=careful)
         for block in dae.blocks:
             if not highest.keys() & set(block.unknowns):
-                block.enter(guide)
-        return solve_blocks(pattern, last, highest, guide)
+                block.enter(found)
+        return found
 
-    careful = solved(True)
+    quick = solve_blocks(pattern, last, highest, guide(False))
+    careful = solve_anew(quick, last, highest, guide(True)) if quick.margins else quick
     # more unknowns of the integrator are no gain: they need consistent starts
-    return solved(False) if careful.implicit else careful
+    return quick if len(careful.tears) > len(quick.tears) else careful
 
 
 def _divisors(

@@ -4,7 +4,7 @@ A pivot that is large at one pose may vanish at another one; such a pivot must n
 points are consistent as far as the blocks before have closed forms.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import casadi as ca
@@ -83,13 +83,16 @@ class Scales:
     start: np.ndarray
 
     @classmethod
-    def of(cls, matrix: ca.SX, numbers: np.ndarray) -> "Scales":
-        """Those of a matrix with numbers at the start and around it, (points, n, n)."""
+    def of(cls, matrix: ca.SX, numbers: np.ndarray, needed: Set[int] | None = None) -> "Scales":
+        """Those of the rows of a matrix that are needed (None: all); numbers: at the start and around it, (points, n, n)."""
         largest = np.abs(numbers).max(axis=(0, 2))
         scaled = np.abs(numbers) / np.where(largest > 0, largest, 1.0)[None, :, None]
         sizes = scaled.max(axis=(0, 1), initial=0.0)
         sizes = np.where(sizes > 0, sizes, 1.0)
-        rows = tuple(extent(matrix[i, :], sizes) for i in range(matrix.shape[0]))
+        rows = tuple(
+            extent(matrix[i, :], sizes) if needed is None or i in needed else ca.SX(0)
+            for i in range(matrix.shape[0])
+        )
         return cls(sizes, rows, (np.abs(numbers[0]) / sizes).sum(axis=1))
 
     def at(self, rows: Sequence[int], columns: Sequence[int]) -> "Scales":

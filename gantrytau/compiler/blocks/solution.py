@@ -142,7 +142,7 @@ def solve_block(
     jacobian = ca.jacobian(smooth.expressions[0], x)
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     if len(unknowns) == 1:
-        block = _finish(equations, unknowns, (x,), (f,), (), guide, None)
+        block = _finish(equations, unknowns, (x,), (f,), (), guide, None, bool(smooth.switches))
         return replace(block, pairs=((equations[0], unknowns[0]),), firm=equations)
     (present,) = with_modes(smooth, [jacobian])
     numbers = guide.around(ca.densify(present))
@@ -173,10 +173,11 @@ def solve_block(
     tears = tuple(columns[j] for j in torn.tears)
     left = [rows[i] for i in torn.residuals]
     left = Substitution(tuple(inner)).inserted(left)
-    whole = Scales.of(present, numbers)
-    scales = whole.at(torn.residuals, torn.tears) if linear and not smooth.switches else None
-    block = _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, scales)
     divided = sorted(doubtful.intersection(torn.assignments))
+    whole = Scales.of(present, numbers, {*torn.residuals, *(i for i, _ in divided)})
+    scales = whole.at(torn.residuals, torn.tears) if linear and not smooth.switches else None
+    switching = bool(smooth.switches)
+    block = _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, scales, switching)
     margins = (whole.margin(i, j, present[i, j], numbers[0, i, j]) for i, j in divided)
     return replace(
         block,
@@ -186,7 +187,9 @@ def solve_block(
     )
 
 
-def _finish(equations, unknowns, tears, residuals, inner, guide, scales: Scales | None) -> Block:
+def _finish(
+    equations, unknowns, tears, residuals, inner, guide, scales: Scales | None, switching: bool
+) -> Block:
     """Closed form for what is left after tearing, if there is one."""
 
     def block(kind: str, solution=None, root=None, pieces=None, margins=()) -> Block:
@@ -209,8 +212,8 @@ def _finish(equations, unknowns, tears, residuals, inner, guide, scales: Scales 
     if not tears:
         return block("explicit", ())
     y, f = ca.vertcat(*tears), ca.vertcat(*residuals)
-    smooth = switched([f], {tear.name() for tear in tears})
-    if smooth.switches:
+    smooth = switched([f], {tear.name() for tear in tears}) if switching else None
+    if smooth is not None and smooth.switches:
         found = in_pieces(smooth, y, guide)
         return block("nonlinear") if found is None else block("piecewise", found[0], pieces=found[1])
     jacobian = ca.jacobian(f, y)
