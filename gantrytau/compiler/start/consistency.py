@@ -216,13 +216,13 @@ def _solve(
         point, _, _ = newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+        if np.any(bad) and usual:
+            # unknowns that are solved together have the rounding of the largest, in their sizes
+            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
+            bad &= ~(np.abs(f) <= ROUNDING * rounding)
         left = np.flatnonzero(bad)
         if left.size and np.all(np.isfinite(f)):
             bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        if np.any(bad):
-            # unknowns that are solved together have the rounding of the largest, in their sizes
-            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
-            bad &= ~((np.abs(f) <= ROUNDING * rounding) & usual)
         return point, f, bad
 
     rows, sizes = balance(at(start)[1])
