@@ -66,7 +66,8 @@ class SolveError(GantryTauError):
     def interrupted(self) -> bool:
         """Whether it stopped because Ctrl-C was pressed."""
         status = getattr(self.optimum, "status", "")
-        return isinstance(self.__context__, KeyboardInterrupt) or status == "interrupted"
+        pressed = isinstance(self.__cause__ or self.__context__, KeyboardInterrupt)
+        return pressed or status == "interrupted"
 
 
 class DoubtfulResult(UserWarning):

@@ -118,7 +118,7 @@ def _all_runs(
             f"{dae.name}: simulation interrupted at t = {result.time[-1]:.4g} s; .result holds what was computed",
             time=float(result.time[-1]),
             result=result,
-        )
+        ) from error
     return result
 
 

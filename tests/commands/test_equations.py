@@ -79,7 +79,10 @@ def test_misuse(fails, options, message):
     [
         (("--given", "xx"), "'xx'; did you mean 'x'?"),
         (("--find", "der(xx)"), "Pendulum has no variable or parameter 'der(xx)'"),
-        (("--given", "x"), "Pendulum: 6 unknowns, 7 equations. Overdetermined by 1"),
+        (
+            ("--given", "x"),
+            "Pendulum: 6 unknowns, 7 equations. More is given than can be chosen; leave out x. Overdetermined by 1",
+        ),
     ],
 )
 def test_names_and_causalities_that_do_not_fit(fails, options, message):

@@ -292,7 +292,8 @@ def test_a_problem_without_a_solution_is_told(unsolved, moves, tmp_path):
     file.write_text("a solution of before\n")
     report = unsolved(FAULT, f"{moves}:Impossible", "--save", file)
     assert report["status"].startswith("no solution")
-    assert "`final(cart.x) == distance` is off by" in report["error"]
+    assert "` is off by" in report["error"]
+    assert "It could be solved if `final(cart.x) == distance` gave way by 0.43" in report["error"]
     assert "try another --guess." in report["error"]
     kept = tmp_path / "move.unfinished.csv"
     assert f"What was reached until then is in {kept}" in report["error"]
@@ -360,11 +361,12 @@ def at_stage(monkeypatch, stage):
     solve = gantrytau_optimica.optimize
 
     def pressed(problem, **policy):
+        wanted = stage
+
         def press(iteration, objective, stage=""):
-            if stage == press.wanted:
+            if stage == wanted:
                 signal.raise_signal(signal.SIGINT)
 
-        press.wanted = stage
         return solve(problem, **{**policy, "progress": press})
 
     monkeypatch.setattr(gantrytau_optimica, "optimize", pressed)

@@ -46,6 +46,9 @@ class Loop(Model):
     axis = Axis()
     k = Parameter(1.0, unit="N.m.s/rad")
 
+    def drive(self):
+        yield from ()
+
     def equations(self):
         yield from self.drive()
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from gantrytau import Dae, SolveError, simulate, translate
 from tests.fmu.exported import export
@@ -16,15 +15,16 @@ from tests.independent_routes.linkages import (
     random_pose,
 )
 from tests.independent_routes.routes import COMPILER, Point, called, compiled, flat, initialised, or_none
-from tests.independent_routes.test_cells import EVERY, FEW, MODELS
+from tests.independent_routes.test_cells import EVERY, MODELS
 
 SHARE = 0.2  # of the random models
 CLOSE = 1e-7  # of the largest acceleration
+USUAL = (0.5, 1.0, 2.0)  # kg
+SOME = 0.2  # of the answers may be refusals where bodies have 1e-12 kg or 6e24 kg
 
 
-@pytest.mark.xfail(reason="bodies of 1e-12 kg and of 6e24 kg", strict=False)
 def test_all_routes_give_the_accelerations_of_newton_and_euler(tmp_path):
-    wrong, refused, asked = [], [], 0
+    wrong, refused, unusual, asked = [], [], [], 0
     for seed in range(round(MODELS * SHARE)):
         rng = np.random.default_rng(seed)
         linkage = random_linkage(rng)
@@ -34,11 +34,12 @@ def test_all_routes_give_the_accelerations_of_newton_and_euler(tmp_path):
             asked += 1
             told = f"seed {seed}, {linkage.kinds}, closed {linkage.closed}, {route}: {found}, expected {expected}"
             if not np.all(np.isfinite(found)):
-                refused.append(told)
+                (unusual if linkage.masses.max() not in USUAL else refused).append(told)
             elif np.abs(found - expected).max() > CLOSE * (1 + np.abs(expected).max()):
                 wrong.append(told)
     assert not wrong, f"{len(wrong)} of {asked} wrong:\n" + "\n".join(wrong)
-    assert len(refused) <= FEW * asked, f"{len(refused)} of {asked} refused:\n" + "\n".join(refused)
+    assert not refused, f"{len(refused)} of {asked} refused:\n" + "\n".join(refused)
+    assert len(unusual) <= SOME * asked, f"{len(unusual)} of {asked} refused:\n" + "\n".join(unusual)
 
 
 def compared(linkage: Linkage, rng: np.random.Generator, folder: Path, *, fmu: bool):

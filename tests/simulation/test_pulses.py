@@ -1,6 +1,7 @@
 """Smooth functions of time that rest and then change are not stepped over."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,6 +55,7 @@ def test_pulses_within_the_model_and_those_whose_factor_is_zero_at_first(points)
 
 
 def test_the_longest_step_is_a_number_above_zero():
-    for wrong in (0.0, -1.0, np.inf, "short"):
+    wrongs: list[Any] = [0.0, -1.0, np.inf, "short"]
+    for wrong in wrongs:
         with pytest.raises(ModelError, match=r"found max_step=.*, expected a number above zero, in s"):
             simulate(Pushed(), stop=5.0, inputs={"f": 1.0}, max_step=wrong)
