@@ -30,8 +30,10 @@ def nominal_sizes(dae: Translated) -> dict[str, float]:
 def first_sizes(coordinates: Coordinates) -> tuple[float, ...]:
     """Sizes of the states before anything is known of the motion: `nominal`, a small start that is given, else 1."""
     dae, nominal = coordinates.dae, nominal_sizes(coordinates.dae)
-    starts = {n: abs(dae.start[n]) for n in coordinates.states if n in dae.asked.started}
-    small = {n: start for n, start in starts.items() if 0 < start < SMALL}
+    given = {n: dae.asked.values[n] for n in coordinates.states if n in dae.asked.started}
+    # a start that was moved from zero is rounding
+    kept = {n: abs(v) for n, v in given.items() if abs(dae.start[n] - v) <= SMALL * abs(v)}
+    small = {n: start for n, start in kept.items() if 0 < start < SMALL}
     return _rounded(nominal.get(n) or small.get(n, 1.0) for n in coordinates.states)
 
 
