@@ -78,7 +78,7 @@ class Run:
         with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
             while self.done < trail.last:
-                count = min(size, trail.stretch(self.done))
+                before, count = self.done, min(size, trail.stretch(self.done))
                 try:
                     turned = self._advance(count)
                 except RuntimeError as error:
@@ -89,8 +89,12 @@ class Run:
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
                 size = min(CHUNK if turned else size * GROWTH, most)
-                if trail.stops[self.done] or turned:
-                    self._renew(self.done)
+                forward = (
+                    self.done > before
+                )  # else places were only laid closer, and nothing is sampled twice
+                if turned or (forward and trail.stops[self.done]):
+                    if forward:
+                        self._renew(self.done)
                     self._turn(by_states=turned)
                 progress.at(trail.t[self.done])
                 if self.integrators.pressed:
