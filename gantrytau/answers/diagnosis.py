@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.answers.other_assemblies import Assembly, assemblies
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
@@ -34,8 +35,9 @@ class Diagnosis:
 
     mobility: number of ways in which the positions can change; redundant: equations that repeat others;
     assumed: parameters of which nobody gave the value, and what it is; moved: start values that were moved, the farthest
-    first; assemblies: where the positions have several
-    solutions, the one taken and others; missing: what keeps the model from being translated, else "".
+    first; assemblies: where the positions have several solutions, the one taken and others; ambiguous: unknowns of
+    equations that switch on them and hold several solutions at the start, of which the nearest is taken; missing: what
+    keeps the model from being translated, else "".
     Prints itself.
     """
 
@@ -53,6 +55,7 @@ class Diagnosis:
     assumed: tuple[str, ...] = ()
     moved: tuple[Moved, ...] = ()
     assemblies: tuple[Assembly, ...] = ()
+    ambiguous: tuple[str, ...] = ()
     missing: str = ""
 
     def __str__(self) -> str:
@@ -75,6 +78,11 @@ class Diagnosis:
             *(_listed("assumed", self.assumed) if self.assumed else []),
             *_listed("start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved]),
             *(f"  {assembly}" for assembly in self.assemblies),
+            *(
+                _listed("several solutions at the start, of which the nearest is taken", self.ambiguous)
+                if self.ambiguous
+                else []
+            ),
         ]
         return "\n".join(lines)
 
@@ -124,11 +132,23 @@ def diagnose(dae: Translated) -> Diagnosis:
         assumed=tuple(f"{p.name}: {p.assumed}" for p in dae.flat.parameters if p.assumed),
         moved=_moved(dae),
         assemblies=assemblies(dae),
+        ambiguous=_ambiguous(dae),
     )
 
 
 def _sizes(flat: FlatModel, known: int) -> tuple[int, int]:
     return sum(len(v.elements) for v in flat.variables) - known, len(flat.equations)
+
+
+def _ambiguous(dae: Translated) -> tuple[str, ...]:
+    """Unknowns of piecewise equations with several solutions at the start."""
+    piecewise = [(block, block.held) for block in dae.blocks if block.held is not None]
+    counts = [float(values_at(held, {**dae.start, **dae.table.values})[0, 0]) for _, held in piecewise]
+    return tuple(
+        f"{', '.join(map(dae.spoken, block.unknowns))} ({count:.0f})"
+        for (block, _), count in zip(piecewise, counts, strict=True)
+        if count > 1
+    )
 
 
 def _moved(dae: Translated) -> tuple[Moved, ...]:

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, der, fabs, if_else, translate
+from gantrytau import Input, Model, Parameter, Real, check, der, fabs, fmax, fmin, if_else, translate
 from tests.independent_routes.routes import answers
 
 
@@ -191,3 +191,16 @@ def test_every_route_takes_the_piece_that_agrees_with_itself_or_refuses(name, tm
                 assert np.isnan(value), (route, u, value)
             else:
                 assert value == pytest.approx(x, abs=1e-9 * size, rel=1e-9), (route, u)
+
+
+def test_several_solutions_of_a_switch_are_told_by_name():
+    class Backwards(Model):
+        u = Input(start=0.2)
+        x = Real(start=1.0)
+
+        def equations(self):
+            yield self.x - 2 * fmax(fmin(self.x, 1), -1) == -self.u  # three branches between -1 and 1
+
+    found = check(Backwards())
+    assert found.ambiguous == ("x (3)",)
+    assert "several solutions at the start, of which the nearest is taken:\n    x (3)" in str(found)

@@ -26,14 +26,6 @@ ROUNDING = 1e-11  # of a residual relative to its terms, at a border where no pi
 
 
 @dataclass(frozen=True, eq=False)
-class PieceChoice:
-    """How many pieces hold a solution, and which one is taken (its number, or 0 where there is none)."""
-
-    count: ca.SX
-    taken: ca.SX
-
-
-@dataclass(frozen=True, eq=False)
 class _Forms:
     """Residuals curvature/2 y^2 + matrix y + constant, in modes; curvature is zero where all pieces are linear."""
 
@@ -72,8 +64,8 @@ class _Candidate:
     sound: ca.SX
 
 
-def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...], PieceChoice] | None:
-    """The unknowns y of residuals with modes, and what is known of the choice; None if they have too many pieces."""
+def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...], ca.SX] | None:
+    """The unknowns y of residuals with modes, and how many pieces hold a solution; None if there are too many pieces."""
     turns = found.switches
     if len(turns) > MOST_SWITCHES or y.numel() > MOST_UNKNOWNS:
         return None
@@ -93,8 +85,7 @@ def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...
         for of in ([c.modes for c in candidates], [c.side for c in candidates])
     )
     solution = forms.at(modes).solution(side) + ca.if_else(missing, ca.SX.nan(), 0)
-    number = sum((k + 1) * t for k, t in enumerate(taken))
-    return tuple(solution.elements()), PieceChoice(count, ca.SX(number))
+    return tuple(solution.elements()), count
 
 
 def _forms(found: Switched, y: ca.SX) -> _Forms | None:

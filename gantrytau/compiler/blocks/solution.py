@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
-from gantrytau.compiler.blocks.pieces import PieceChoice, in_pieces, solve_by_value
+from gantrytau.compiler.blocks.pieces import in_pieces, solve_by_value
 from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
@@ -31,7 +31,8 @@ class Block:
 
     kind: "explicit", "linear", "quadratic", "spheres", "piecewise" or "nonlinear"; tears: symbols found from
     `residuals` first; inner: the other unknowns as (symbol, expression of tears and earlier unknowns), in order;
-    solution: the tears in closed form, or None; root: the square root among them, or None; pieces: of a piecewise one;
+    solution: the tears in closed form, or None; root: the square root among them, or None; held: how many pieces of a
+    piecewise one hold a solution;
     margins: positive where all pivots that were divided by are large enough, of those that may vanish.
     """
 
@@ -43,7 +44,7 @@ class Block:
     inner: tuple[tuple[ca.SX, ca.SX], ...]
     solution: tuple[ca.SX, ...] | None
     root: QuadraticRoot | None = None
-    pieces: PieceChoice | None = None
+    held: ca.SX | None = None
     pairs: tuple[tuple[Key, str], ...] = ()  # equations solved for one unknown each
     margins: tuple[ca.SX, ...] = ()
     firm: tuple[Key, ...] = ()  # equations of pairs whose pivots do not vanish
@@ -192,7 +193,7 @@ def _finish(
 ) -> Block:
     """Closed form for what is left after tearing, if there is one."""
 
-    def block(kind: str, solution=None, root=None, pieces=None, margins=()) -> Block:
+    def block(kind: str, solution=None, root=None, held=None, margins=()) -> Block:
         return Block(
             kind,
             equations,
@@ -202,7 +203,7 @@ def _finish(
             inner,
             solution,
             root,
-            pieces,
+            held,
             (),
             margins,
             (),
@@ -215,7 +216,7 @@ def _finish(
     smooth = switched([f], {tear.name() for tear in tears}) if switching else None
     if smooth is not None and smooth.switches:
         found = in_pieces(smooth, y, guide)
-        return block("nonlinear") if found is None else block("piecewise", found[0], pieces=found[1])
+        return block("nonlinear") if found is None else block("piecewise", found[0], held=found[1])
     jacobian = ca.jacobian(f, y)
     if not ca.depends_on(jacobian, y):
         if scales is None:
