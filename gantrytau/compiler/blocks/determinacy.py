@@ -13,7 +13,6 @@ from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import undetermined, without_inertia
-from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import StructureError
 from gantrytau.flattening.flat_model import FlatModel
@@ -22,6 +21,7 @@ from gantrytau.language.term_sizes import term_sizes
 NOISE = 1e-12  # of a coefficient relative to the terms that it adds up: below, it is zero but for rounding
 DOUBTFUL = 1e-6  # of the largest coefficient: smaller ones are looked at
 LEAST = 1e-12  # singular value of the coefficients, rows and columns scaled, relative to the largest
+ROUNDS = 4  # of scaling rows and columns
 
 
 def refuse_undetermined(
@@ -75,9 +75,9 @@ def _free(block: Block, matrix: np.ndarray) -> list[str]:
     """Unknowns that a matrix leaves free."""
     if not np.all(np.isfinite(matrix)):
         return []
-    rows, columns = balance(matrix)  # units and sizes of bodies count for nothing
-    matrix = rows * matrix * columns
-    matrix = matrix / np.maximum(np.abs(matrix).max(axis=1, keepdims=True), 1e-150)
+    for _ in range(ROUNDS):  # units and sizes of bodies count for nothing
+        matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=1, keepdims=True)), 1e-150)
+        matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=0, keepdims=True)), 1e-150)
     _, values, right = np.linalg.svd(matrix)
     if values[-1] > LEAST * values[0]:
         return []

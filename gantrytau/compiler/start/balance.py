@@ -6,14 +6,14 @@ whole thousands, so that models of usual sizes are treated as they are.
 
 import numpy as np
 
-NOISE = 1e-13  # of the largest entries of its row and of its column, below both of which an entry is rounding
+NOISE = 1e-13  # of the largest entry of a row and of a column, below which an entry is rounding
 ROUNDS = 30
 
 
 def balance(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Factors of rows and of columns, (m, 1) and (n,)."""
     size = np.abs(np.nan_to_num(matrix))
-    there = (size > NOISE * size.max(axis=0, initial=0.0)) | (
+    there = (size > NOISE * size.max(axis=0, initial=0.0)) & (
         size > NOISE * size.max(axis=1, keepdims=True, initial=0.0)
     )
     logs = np.where(there, np.log10(np.where(there, size, 1.0)), 0.0)

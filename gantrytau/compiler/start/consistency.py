@@ -209,35 +209,28 @@ def _solve(
         around = _propagated(level, around, missing)
     start = around[columns]
 
-    rows, sizes = balance(at(start)[1])
-    usual = not np.any(sizes != 1)  # those of metres, radians and newtons
-
-    def left(point: np.ndarray, units: np.ndarray | float, granted: bool) -> tuple[np.ndarray, bool]:
-        """Which equations do not hold at a point, and whether what is left is rounding of unknowns of these units."""
+    def met(
+        factors: np.ndarray | float, sizes: np.ndarray | float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where steps of these sizes lead, what is left there, and which equations do not hold."""
+        point, _, _ = newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
-        # unknowns that are solved together have the rounding of the largest
-        largest = np.max(np.abs(point / units), initial=1.0)
-        noise = np.abs(f) <= ROUNDING * largest * np.abs(jacobian * units).sum(axis=1)
-        if granted:
-            bad &= ~noise
-        rest = np.flatnonzero(bad)
-        if rest.size and np.all(np.isfinite(f)):
-            bad[rest] = np.abs(f[rest]) > SOLVED * level.sizes(rest.tolist(), around)
-        return bad, bool(np.all(noise | ~bad))
+        if np.any(bad) and usual:
+            # unknowns that are solved together have the rounding of the largest, in their sizes
+            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
+            bad &= ~(np.abs(f) <= ROUNDING * rounding)
+        left = np.flatnonzero(bad)
+        if left.size and np.all(np.isfinite(f)):
+            bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
+        return point, f, bad
 
-    point, _, _ = newton(at, start, weights)
-    bad, noise = left(point, 1.0, usual)
+    rows, sizes = balance(at(start)[1])
+    usual = not np.any(sizes != 1)  # sizes of metres, radians and newtons
+    point, f, bad = met(1.0, 1.0)
     if np.any(bad) and not usual:
-        begin = point if noise else start
-        there, _, _ = newton(lambda x: _scaled_rows(rows, *at(x)), begin, weights * sizes)
-        change, reach = np.abs(there - point) / sizes, np.max(np.abs(there / sizes), initial=1.0)
-        if noise and np.all(change <= SOLVED * reach):  # what is left is rounding also in sizes of their own
-            bad = np.zeros_like(bad)
-        else:
-            point = there
-            bad, _ = left(point, sizes, True)
-    f = at(point)[0]
+        usual = True
+        point, f, bad = met(rows, sizes)
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
