@@ -3,6 +3,8 @@
 from gantrytau.answers.c_code import c_source
 from gantrytau.answers.diagnosis import Diagnosis, check
 from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.answers.linearization import Linearization, linearize
 from gantrytau.dae import Dae, translate
 from gantrytau.errors import (
@@ -77,6 +79,7 @@ __all__ = [
     "GantryTauError",
     "InitializationError",
     "Input",
+    "LinearSystem",
     "Linearization",
     "Mechanism",
     "Model",
@@ -89,6 +92,7 @@ __all__ = [
     "SolveError",
     "Start",
     "StateSelect",
+    "StateSpace",
     "StructureError",
     "acos",
     "asin",

@@ -14,6 +14,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
+from gantrytau.answers.linear_systems.discretisation import held
+from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_period
+from gantrytau.answers.linear_systems.sample_to_sample import DrivenRows, from_sample_to_sample
 from gantrytau.compiler.alphabets import column, values_at
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
@@ -21,9 +24,10 @@ from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
-from gantrytau.flattening.flat_checks import refuse_events
+from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
+from gantrytau.simulation.to_result import labels
 
 POOR = 1e6  # condition of the equations, scaled, above which other states are looked for at the point
 LEAST_COLUMN = 1e-4  # a column that is smaller is meant to be small
@@ -32,11 +36,12 @@ SINGULAR = 1e13  # above this no digit of a solution would be left
 
 
 @dataclass(frozen=True, eq=False)
-class Linearization:
-    """dx' = A dx + B du, dy = C dx + D du about `point`; prints itself.
+class Linearization(LinearSystem):
+    """dx' = A dx + B du, dy = C dx + D du about `point`, or from sample to sample with a `period`; prints itself.
 
     A (n, n), B (n, m), C (k, n), D (k, m), in SI units of the named quantities; states, inputs, outputs: scalar names,
-    in the order of rows and columns; point: values of all variables there, by name.
+    in the order of rows and columns; point: values of all variables there, by name; period: s, None if continuous;
+    units: by name. What it answers besides stands at `LinearSystem`.
     """
 
     model: str
@@ -48,27 +53,33 @@ class Linearization:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     point: Mapping[str, Any] = field(repr=False)
+    period: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
-    def eigenvalues(self) -> np.ndarray:
-        """Poles of the system, (n,) complex, in 1/s, the slowest first."""
-        found = np.asarray(np.linalg.eigvals(self.A), dtype=complex)
-        return found[np.lexsort((np.imag(found), np.real(found), np.abs(found).round(9)))]
+    @property
+    def title(self) -> str:
+        """The model, for figures and messages."""
+        return f"{self.model}, linear" if self.period is None else f"{self.model}, every {self.period:g} s"
 
     def __str__(self) -> str:
-        states, outputs = [f"der({n})" for n in self.states], list(self.outputs)
+        after = "der({})" if self.period is None else "{} a sample later"
+        states, outputs = [after.format(n) for n in self.states], list(self.outputs)
         columns = [*self.states, *self.inputs]
         rows = np.vstack([np.hstack([self.A, self.B]), np.hstack([self.C, self.D])])
         width = max([len(n) for n in (*states, *outputs)], default=0)
         widths = [max(len(n), 11) for n in columns]
+        every = "" if self.period is None else f", every {self.period:g} s"
         lines = [
-            f"{self.model}, linear about its operating point",
+            f"{self.model}, linear about its operating point{every}",
             " " * width + "".join(f"  {n:>{w}}" for n, w in zip(columns, widths, strict=True)),
         ]
         for name, row in zip([*states, *outputs], rows, strict=True):
             cells = "".join(f"  {v:>{w}.5g}" for v, w in zip(row, widths, strict=True))
             lines.append(f"{name:<{width}}{cells}")
-        poles = ", ".join(_complex_text(p) for p in self.eigenvalues())
-        return "\n".join([*lines, f"eigenvalues, 1/s: {poles or 'none'}"])
+        unit = ", 1/s" if self.period is None else ""
+        told = zip(self.poles, self.eigenfrequencies, self.damping, strict=True)
+        found = (f"{_complex_text(p)} ({f:.4g} Hz, damping {d:.3g})" for p, f, d in told)
+        return "\n".join([*lines, f"poles{unit}: {', '.join(found) or 'none'}"])
 
 
 def _complex_text(value: complex) -> str:
@@ -83,24 +94,31 @@ def linearize(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
+    period: float | None = None,
 ) -> Linearization:
-    """The linear system about an operating point.
+    """The linear system about an operating point; of a model with `sampled` variables the one from sample to sample.
 
     at: name -> value, held exactly, the rest is completed from the start values as in `Dae.evaluate`;
-    steady: look for a point at rest instead, where every derivative is zero and the values of `at` hold: inputs
-    keep their start values if there is one, else those not in `at` are found as well; inputs: names (all);
-    outputs: names of any variables and derivatives (the declared ones, else the states); parameters: name -> value.
+    steady: look for a point at rest instead, where every derivative is zero, what is sampled stays, and the values of
+    `at` hold: inputs keep their start values if there is one, else those not in `at` are found as well; inputs: names
+    (all); outputs: names of any variables and derivatives (the declared ones, else the states); parameters: name ->
+    value. period: s, from one instant to the next with inputs held in between (zero-order hold), exactly. A model that
+    samples has one of its own, after which all its rates come together; its states are those just before an instant,
+    of what moves and of what is held, its outputs those just after it.
     States that cannot be states at the point are replaced by others. Raises InitializationError if there is
-    no such point, StructureError if the equations are singular there, ModelError for unknown names.
+    no such point, StructureError if the equations are singular there, ModelError for unknown names and a period that
+    does not fit.
     """
     dae = model if isinstance(model, Translated) else translate_model(model)
-    refuse_events(dae.flat)
+    refuse_sticking(dae.flat)
+    if period is not None:
+        check_period(f"linearize {dae.name}", period)
     if parameters:
         dae = _with_parameters(dae, parameters)
-    columns = dae.known if inputs is None else tuple(n for name in names(inputs) for n in dae.expand(name))
+    columns = dae.inputs if inputs is None else tuple(n for name in names(inputs) for n in dae.expand(name))
     for name in columns:
-        if name not in dae.known:
-            raise ModelError(f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.known)}")
+        if name not in dae.inputs:
+            raise ModelError(f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}")
     dae = _with_outputs(dae, names(outputs or ()))
     values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
     slopes = _Slopes(dae, values)
@@ -111,13 +129,42 @@ def linearize(
     slopes.require_regular()
     wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
     rows = tuple(n for name in wanted for n in dae.expand(name))
-    chosen = [dae.known.index(n) for n in columns]
-    A, B = slopes.of(
-        [dae.reduced.chains.rate(n) for n in dae.choice.states], [f"der({n})" for n in dae.states]
-    )
-    C, D = slopes.of([dae.expression(n) for n in rows], rows)
+    (A, B, C, D), period = _matrices(dae, slopes, rows, columns, period)
+    states = (*dae.states, *(s.name for s in dae.flat.sampled))
+    # what is held, and not asked for at the next instant, is no state
+    kept = [k for k in range(len(A)) if k < len(dae.states) or np.any(A[:, k]) or np.any(C[:, k])]
+    matrices = A[np.ix_(kept, kept)], B[kept], C[:, kept], D
     point = named_values(dae, values)
-    return Linearization(dae.name, A, B[:, chosen], C, D[:, chosen], dae.states, columns, rows, point)
+    units, _ = labels(dae)
+    names_of_states = tuple(states[k] for k in kept)
+    return Linearization(dae.name, *matrices, names_of_states, columns, rows, point, period, units)
+
+
+def _matrices(
+    dae: Translated,
+    slopes: "_Slopes",
+    rows: Sequence[str],
+    columns: Sequence[str],
+    period: float | None,
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], float | None]:
+    """A, B, C, D for these inputs, continuous, or from sample to sample, and the period."""
+    sampled = dae.flat.sampled
+    chosen, kept = ([dae.known.index(n) for n in names] for names in (columns, [s.name for s in sampled]))
+
+    def of(expressions: Sequence[ca.SX], words: Sequence[str]) -> DrivenRows:
+        by_states, by_known = slopes.of(expressions, words)
+        return DrivenRows(by_states, by_known[:, kept], by_known[:, chosen])
+
+    rates = of([dae.reduced.chains.rate(n) for n in dae.choice.states], [f"der({n})" for n in dae.states])
+    outputs = of([dae.expression(n) for n in rows], rows)
+    if sampled:
+        updates = of([dae.to_reduced(s.expression) for s in sampled], [s.label for s in sampled])
+        periods = [dae.number(s.period) for s in sampled]
+        *found, period = from_sample_to_sample(dae.name, rates, updates, outputs, periods, period)
+        A, B, C, D = found
+        return (A, B, C, D), period
+    A, B = (rates.x, rates.u) if period is None else held(rates.x, rates.u, period)
+    return (A, B, outputs.x, outputs.u), period
 
 
 def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translated:
@@ -165,15 +212,17 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
     held = _hold(dae, _checked(dae, at), values)
     still = {dae.reduced.chains.named(n): 0.0 for n in symbols if split_derivative(n)[1]}
     residuals = [dae.indexed.residuals[i, 0] for i in range(len(dae.indexed.counts))]
+    residuals += [dae.reduced.chains.named(s.name) - dae.to_reduced(s.expression) for s in dae.flat.sampled]
     if still and residuals:
         rest = ca.vertcat(*residuals)
         residuals = ca.substitute(rest, ca.vertcat(*still), ca.DM(list(still.values()))).elements()
-    equations = tuple(e.name for e in dae.reduced.equations)
+    equations = (*(e.name for e in dae.reduced.equations), *(s.label for s in dae.flat.sampled))
     started = dae.asked.started
-    free = tuple(n for n in dae.known if n not in held)
+    sampled = tuple(s.name for s in dae.flat.sampled)
+    free = tuple(n for n in dae.inputs if n not in held)
     title = f"steady state of {dae.name}"
     failures: list[InitializationError] = []
-    for unknowns in (tuple(dae.indexed.orders), (*dae.indexed.orders, *free)):
+    for unknowns in ((*dae.indexed.orders, *sampled), (*dae.indexed.orders, *sampled, *free)):
         level = Level(tuple(residuals), equations, unknowns)
         try:
             return solve_levels([level], values, held=held, started=started, title=title)

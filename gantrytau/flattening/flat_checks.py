@@ -65,8 +65,8 @@ def refuse_events(flat: FlatModel) -> None:
     refuse_sticking(flat)
     for event in flat.sampled:
         raise ModelError(
-            f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate and FMUs "
-            "sample it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a "
+            f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate, "
+            "linearize and FMUs sample it; optimisation and extraction cannot: leave it out there, or write it as a "
             "continuous equation. translate(..., events=True) takes it as known"
         )
 

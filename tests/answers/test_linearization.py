@@ -103,7 +103,7 @@ def test_oscillator_has_the_matrices_of_the_textbook():
     np.testing.assert_allclose(linear.B, [[0], [1 / 2]], atol=1e-14)
     np.testing.assert_allclose(linear.C, [[50, 0]], atol=1e-14)
     np.testing.assert_allclose(linear.D, [[0]], atol=1e-14)
-    poles = linear.eigenvalues()
+    poles = linear.poles
     np.testing.assert_allclose(poles, np.roots([2, 3, 50])[::-1], rtol=1e-14)
 
 
@@ -128,11 +128,11 @@ def test_pendulum_at_rest_has_its_eigenfrequency():
     assert linear.point["y"] == pytest.approx(-0.7, rel=1e-12)
     # at its lowest the height is no coordinate, whatever it was at the start
     assert linear.states == ("x", "v_x")
-    poles = linear.eigenvalues()
+    poles = linear.poles
     np.testing.assert_allclose(np.imag(poles), [-np.sqrt(9.81 / 0.7), np.sqrt(9.81 / 0.7)], rtol=1e-12)
     np.testing.assert_allclose(np.real(poles), 0.0, atol=1e-12)
     upright = linearize(Pendulum(), at={"x": 0.0, "y": 1.0}, steady=True)
-    np.testing.assert_allclose(upright.eigenvalues(), [-np.sqrt(9.81), np.sqrt(9.81)], rtol=1e-12)
+    np.testing.assert_allclose(upright.poles, [-np.sqrt(9.81), np.sqrt(9.81)], rtol=1e-12)
 
 
 def test_pendulum_in_motion_follows_the_equation_of_the_angle():
@@ -211,7 +211,7 @@ def test_linear_system_prints_itself_with_names():
     text = str(linearize(Oscillator()))
     assert "der(mass.v)" in text
     assert "force.f" in text
-    assert "eigenvalues, 1/s: -0.75-4.943j, -0.75+4.943j" in text
+    assert "poles, 1/s: -0.75-4.943j (0.7958 Hz, damping 0.15), -0.75+4.943j" in text
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Linear systems: what they answer in time and in frequency, and their pictures."""

@@ -1,0 +1,25 @@
+"""Linear systems from sample to sample: inputs held, or joined by straight lines, in between."""
+
+import numpy as np
+from scipy.linalg import expm
+
+
+def held(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """exp(A T) and its integral times B: x(t + T) of x' = A x + B u with u held for T = period, s.
+
+    Van Loan, Computing integrals involving the matrix exponential, IEEE Trans. Automatic Control 23 (1978).
+    """
+    n, m = B.shape
+    whole = expm(period * np.block([[A, B], [np.zeros((m, n + m))]]))
+    return whole[:n, :n], whole[:n, n:]
+
+
+def ramped(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Phi, G0, G1 with x(t + T) = Phi x + G0 u(t) + G1 u(t + T), u on a straight line in between."""
+    n, m = B.shape
+    whole = np.zeros((n + 2 * m, n + 2 * m))
+    whole[:n, : n + m] = period * np.hstack([A, B])
+    whole[n : n + m, n + m :] = np.eye(m)
+    found = expm(whole)
+    first, slope = found[:n, n : n + m], found[:n, n + m :]
+    return found[:n, :n], first - slope, slope

@@ -1,0 +1,178 @@
+"""The face of linear systems: what one answers, in a line each."""
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gantrytau.answers.linear_systems import bode_and_poles
+from gantrytau.answers.linear_systems.discretisation import held
+from gantrytau.answers.linear_systems.poles_and_zeros import (
+    damping_of,
+    in_s,
+    sorted_poles,
+    transmission_zeros,
+)
+from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
+from gantrytau.errors import ModelError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class LinearSystem:
+    """x' = A x + B u, y = C x + D u; with a period x[k + 1] = A x[k] + B u[k], y[k] = C x[k] + D u[k].
+
+    A (n, n), B (n, m), C (k, n), D (k, m); period: s, None for a continuous system. states, inputs, outputs: names of the
+    rows and columns; units: of these, by name.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    period: float | None
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    units: Mapping[str, str]
+
+    @property
+    def title(self) -> str:
+        """What it is, for figures and messages."""
+        return "linear system"
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A, (n,) complex, the smallest first: in 1/s, or of a discrete system in z."""
+        return sorted_poles(self.A)
+
+    @property
+    def zeros(self) -> np.ndarray:
+        """Transmission zeros, complex, sorted like poles: values of s (z) at which some input is not seen at the outputs."""
+        return transmission_zeros(self.A, self.B, self.C, self.D)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping ratio of each pole, (n,): -Re(s) / |s|, below zero where it is unstable; 1 for a pole at s = 0."""
+        return damping_of(self.poles, self.period)
+
+    @property
+    def eigenfrequencies(self) -> np.ndarray:
+        """|s| / 2 pi of each pole, (n,), in Hz."""
+        return np.abs(in_s(self.poles, self.period)) / (2 * np.pi)
+
+    def response(self, frequencies: Any) -> np.ndarray:
+        """The frequency response at frequencies (N,) in Hz, (outputs, inputs, N) complex.
+
+        C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for what are no
+        frequencies, and above half the sampling frequency of a discrete system, where it only repeats itself.
+        """
+        hertz = np.atleast_1d(np.asarray(frequencies, dtype=float))
+        if hertz.ndim != 1 or not np.all(np.isfinite(hertz)) or np.any(hertz < 0):
+            raise ModelError(f"{self.title}: found frequencies {frequencies!r}, expected numbers in Hz, (N,)")
+        if self.period is not None and np.any(hertz > (0.5 + 1e-12) / self.period):
+            raise ModelError(
+                f"{self.title}: found a frequency of {hertz.max():g} Hz, expected none above {0.5 / self.period:g} Hz, half "
+                "of the sampling frequency"
+            )
+        s = 2j * np.pi * hertz
+        points = s if self.period is None else np.exp(s * self.period)
+        return frequency_response(self.A, self.B, self.C, self.D, points)
+
+    def discrete(self, period: float) -> "LinearSystem":
+        """The same from sample to sample, inputs held in between (zero-order hold), exactly.
+
+        period: s. ModelError for a system that is discrete already, or a period that is none.
+        """
+        if self.period is not None:
+            raise ModelError(
+                f"{self.title}: found a discrete system with a period of {self.period:g} s, expected a continuous one; "
+                "take it as it is, or linearize with another period="
+            )
+        check_period(self.title, period)
+        A, B = held(self.A, self.B, float(period))
+        return _Plain(self, A, B, float(period))
+
+    def simulate(self, u: Any, *, x: Any = None) -> np.ndarray:
+        """Outputs (N, outputs) to samples of the inputs.
+
+        u: of a discrete system (N, inputs), one row every period; of a continuous one (times (N,), values (N, inputs)),
+        joined by straight lines, and the outputs are those of these times, exactly. (N,) will do for one input.
+        x: the state at the first sample, (n,), else zero. Of a linearization all are differences from its point.
+        """
+        name = f"{self.title}.simulate"
+        start = np.zeros(len(self.A)) if x is None else np.asarray(x, dtype=float)
+        if start.shape != (len(self.A),):
+            raise ModelError(f"{name}: x has shape {start.shape}, expected ({len(self.A)},), the states")
+        if self.period is not None:
+            if isinstance(u, tuple):
+                raise ModelError(
+                    f"{name}: found (times, values), expected values (N, {len(self.inputs)}) alone, one row every "
+                    f"{self.period:g} s"
+                )
+            return stepped(self.A, self.B, self.C, self.D, checked_inputs(name, u, len(self.inputs)), start)
+        if not (isinstance(u, tuple) and len(u) == 2):
+            raise ModelError(
+                f"{name}: found {type(u).__name__}, expected (times, values): the system is continuous"
+            )
+        times, values = np.asarray(u[0], dtype=float), checked_inputs(name, u[1], len(self.inputs))
+        if times.shape != (len(values),) or not np.all(np.diff(times) > 0):
+            raise ModelError(
+                f"{name}: found times of shape {times.shape} for {len(values)} samples, expected one each, rising"
+            )
+        return driven(self.A, self.B, self.C, self.D, times, values, start)
+
+    def plot_bode(self, frequencies: Any = None, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """Gain and phase over frequency in Hz, each output over each input; saved to `file` if one is named.
+
+        frequencies: (N,) in Hz, else around all poles and zeros.
+        """
+        hertz = bode_and_poles.frequencies_to_draw(self) if frequencies is None else np.asarray(frequencies)
+        return bode_and_poles.draw_bode(self, hertz, self.response(hertz), file)
+
+    def plot_poles(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """Poles (crosses) and zeros (circles) in the complex plane; saved to `file` if one is named."""
+        return bode_and_poles.draw_poles(self, file)
+
+    def unit(self, name: str) -> str:
+        """The unit of a state, input or output; "" where none was declared."""
+        return self.units.get(name, "")
+
+
+class _Plain(LinearSystem):
+    """Another system of the same inputs and outputs."""
+
+    def __init__(self, of: LinearSystem, A: np.ndarray, B: np.ndarray, period: float):
+        self.A, self.B, self.C, self.D, self.period = A, B, of.C, of.D, period
+        self.states, self.inputs, self.outputs = of.states, of.inputs, of.outputs
+        self.units, self._of = of.units, of.title
+
+    @property
+    def title(self) -> str:
+        """What it was made of, and its period."""
+        return f"{self._of}, every {self.period:g} s"
+
+
+def check_period(place: str, period: Any) -> None:
+    """ModelError for what is no sampling period."""
+    number = isinstance(period, (int, float, np.number)) and not isinstance(period, bool)
+    if not number or not 0 < period < np.inf:
+        raise ModelError(f"{place}: found period={period!r}, expected a finite number above zero, in s")
+
+
+def check_matrices(place: str, A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> None:
+    """ModelError where matrices do not fit together, or are not finite."""
+    n, m, k = len(A), B.shape[1] if B.ndim == 2 else 0, len(C)
+    expected: Sequence[tuple[str, np.ndarray, tuple[int, ...], str]] = (
+        ("A", A, (n, n), "a row and a column for each state"),
+        ("B", B, (n, m), "a row for each state, a column for each input"),
+        ("C", C, (k, n), "a row for each output, a column for each state"),
+        ("D", D, (k, m), "a row for each output, a column for each input"),
+    )
+    for name, matrix, shape, words in expected:
+        if matrix.shape != shape:
+            raise ModelError(f"{place}: {name} has shape {matrix.shape}, expected {shape}: {words}")
+        if not np.all(np.isfinite(matrix)):
+            raise ModelError(f"{place}: {name} has elements that are not finite; repair them")

@@ -1,0 +1,75 @@
+"""What linear systems answer: over frequency, and over time to samples."""
+
+import numpy as np
+
+from gantrytau.answers.linear_systems.discretisation import ramped
+from gantrytau.errors import ModelError
+
+AT_ONCE = 4_000_000  # numbers in the matrices that are solved in one call
+
+
+def frequency_response(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """C (s I - A)^-1 B + D at points s (N,), (k, m, N) complex; infinite at a pole."""
+    n = len(A)
+    found = np.repeat(D[:, :, None].astype(complex), len(points), axis=2)
+    chunk = max(1, AT_ONCE // max(1, n * n))
+    for first in range(0, len(points) if n else 0, chunk):
+        some = slice(first, first + chunk)
+        matrices = points[some, None, None] * np.eye(n) - A
+        try:
+            found[:, :, some] += np.moveaxis(C @ np.linalg.solve(matrices, B), 0, 2)
+        except np.linalg.LinAlgError:  # one of them is exactly singular
+            poles = np.linalg.matrix_rank(matrices) < n
+            matrices[poles] = np.eye(n)
+            found[:, :, some] += np.moveaxis(C @ np.linalg.solve(matrices, B), 0, 2)
+            found[:, :, some][:, :, poles] = np.inf
+    return found
+
+
+def stepped(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, u: np.ndarray, x: np.ndarray
+) -> np.ndarray:
+    """y[k] = C x[k] + D u[k] with x[k + 1] = A x[k] + B u[k], for u (N, m) from x (n,); (N, k)."""
+    states = np.empty((len(u), len(A)))
+    driven = u @ B.T
+    for k, push in enumerate(driven):
+        states[k] = x
+        x = A @ x + push
+    return states @ C.T + u @ D.T
+
+
+def driven(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, t: np.ndarray, u: np.ndarray, x: np.ndarray
+) -> np.ndarray:
+    """Y (N, k) at times t (N,) of x' = A x + B u, y = C x + D u, exactly, for u (N, m) joined by straight lines."""
+    states = np.empty((len(t), len(A)))
+    known: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+    states[0] = x
+    for k, h in enumerate(np.diff(t).tolist()):
+        if h not in known:
+            known[h] = ramped(A, B, h)
+        Phi, first, last = known[h]
+        states[k + 1] = Phi @ states[k] + first @ u[k] + last @ u[k + 1]
+    return states @ C.T + u @ D.T
+
+
+def checked_inputs(name: str, u: object, count: int) -> np.ndarray:
+    """Samples of `count` inputs as (N, count); ModelError for another shape or what is not finite."""
+    try:
+        found = np.asarray(u, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{name}: found {type(u).__name__}, expected samples of the inputs, (N, {count})"
+        ) from None
+    if found.ndim == 1 and count == 1:
+        found = found[:, None]
+    if found.ndim != 2 or found.shape[1] != count or not len(found):
+        raise ModelError(
+            f"{name}: samples of the inputs have shape {found.shape}, expected (N, {count}), a column for each input"
+        )
+    if not np.all(np.isfinite(found)):
+        row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
+        raise ModelError(f"{name}: sample {row} of the inputs is not finite; remove or repair it")
+    return found
