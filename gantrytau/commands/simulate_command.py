@@ -1,8 +1,5 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and picture_output."""
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -24,7 +21,7 @@ from gantrytau.commands.arguments.options import (
 )
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing import picture_output, result_output
-from gantrytau.commands.printing.reporting import as_json, busy, note, reporting
+from gantrytau.commands.printing.reporting import as_json, busy, noted, reporting
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
@@ -71,7 +68,7 @@ def simulate(
         policy = dict(stop=stop, start=start, tolerance=tolerance, points=points)
         told: list[str] = []
         try:
-            with _heard(told, json):
+            with noted(DoubtfulResult, told, json):
                 result = _simulated(dae, signals, outputs=(*kept, *drawn) if kept else None, **policy)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
@@ -95,24 +92,6 @@ def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
     for name in drawn:
         dae.expand(name)
     return dae
-
-
-@contextmanager
-def _heard(told: list[str], json: bool) -> Iterator[None]:
-    """While it lasts, what a simulation warns of is kept, and printed beside the answer."""
-
-    def hear(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-        if not issubclass(category, DoubtfulResult):
-            show(message, category, *where, **more)
-            return
-        told.append(str(message))
-        if not json:
-            note(f"Note: {message}")
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", DoubtfulResult)
-        show, warnings.showwarning = warnings.showwarning, hear
-        yield
 
 
 def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":

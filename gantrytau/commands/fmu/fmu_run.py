@@ -1,8 +1,6 @@
 """`gantrytau fmu run`: an FMU, or a system of them, over time."""
 
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +14,6 @@ from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     CommandError,
     as_json,
-    note,
     reporting,
 )
 from gantrytau.commands.printing.spelling import Spelling
@@ -78,6 +75,8 @@ def run(
 
     Its binaries are code: trust them. Ctrl-C stops early; what was computed until then is saved to --output.
     """
+    from gantrytau_fmu import UnconnectedInputs
+
     with reporting(json, spelling=SPELLING):
         present(file)
         _check(file, order, me, isolate)
@@ -88,7 +87,7 @@ def run(
         policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
         told: list[str] = []
         try:
-            with _noted(told, json):
+            with noted(UnconnectedInputs, told, json, SPELLING):
                 result = _result(file, policy, order=order or DEFAULT_ORDER, me=me, isolate=isolate)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
@@ -127,25 +126,6 @@ def _check(file: Path, order: str | None, me: bool, isolate: bool) -> None:
         raise CommandError(
             "--me --isolate: Model Exchange runs in this process, expected one of them; leave the other out"
         )
-
-
-@contextmanager
-def _noted(told: list[str], json: bool) -> Iterator[None]:
-    """Inputs that nothing drives become a line that is printed at once, or with the JSON."""
-    from gantrytau_fmu import UnconnectedInputs
-
-    def hear(message: Warning | str, kind: type[Warning], *place: Any, **more: Any) -> None:
-        if not issubclass(kind, UnconnectedInputs):
-            show(message, kind, *place, **more)
-            return
-        told.append(SPELLING.words(str(message)))
-        if not json:
-            note(f"Note: {told[-1]}")
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", UnconnectedInputs)
-        show, warnings.showwarning = warnings.showwarning, hear
-        yield
 
 
 def _setting(text: str) -> tuple[str, Any]:

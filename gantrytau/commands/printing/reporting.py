@@ -5,6 +5,7 @@ import math
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -180,3 +181,21 @@ def writable(file: Path) -> Iterator[None]:
             yield
     except OSError as error:
         raise CommandError(f"Cannot write {file}: {error.strerror}; name another place") from error
+
+
+@contextmanager
+def noted(kind: type[Warning], told: list[str], json: bool, spelling: Spelling = PLAIN) -> Iterator[None]:
+    """While it lasts, warnings of a kind become lines of `told`, printed at once, or with the JSON."""
+
+    def hear(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if not issubclass(category, kind):
+            show(message, category, *where, **more)
+            return
+        told.append(spelling.words(str(message)))
+        if not json:
+            note(f"Note: {told[-1]}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", kind)
+        show, warnings.showwarning = warnings.showwarning, hear
+        yield
