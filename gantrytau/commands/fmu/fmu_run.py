@@ -14,6 +14,7 @@ from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     CommandError,
     as_json,
+    noted,
     reporting,
 )
 from gantrytau.commands.printing.spelling import Spelling
