@@ -22,6 +22,7 @@ from gantrytau.interruption import heeding_interrupts
 from gantrytau.language.declarations import (
     Array,
     Bounds,
+    Discrete,
     Fixed,
     Flow,
     Input,
@@ -32,22 +33,29 @@ from gantrytau.language.declarations import (
     Start,
     StateSelect,
 )
-from gantrytau.language.events import sampled, stick_slip
+from gantrytau.language.events import reinit, sampled, stick_slip, terminate, when
 from gantrytau.language.functions import (
     acos,
     asin,
     atan,
     atan2,
     between,
+    ceil,
     cos,
     cross,
     dot,
     exp,
     fabs,
+    floor,
     fmax,
     fmin,
     if_else,
+    limit,
     log,
+    logic_and,
+    logic_not,
+    logic_or,
+    mod,
     norm_2,
     sign,
     sin,
@@ -59,7 +67,7 @@ from gantrytau.language.model import Connector, Declared, Model, check_member, o
 from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
-from gantrytau.language.symbols import der, split_derivative, time
+from gantrytau.language.symbols import der, pre, split_derivative, time
 from gantrytau.results.figures import has_windows
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
@@ -72,6 +80,7 @@ __all__ = [
     "Dae",
     "Declared",
     "Diagnosis",
+    "Discrete",
     "DoubtfulResult",
     "Fixed",
     "FlatModel",
@@ -101,6 +110,7 @@ __all__ = [
     "between",
     "branch",
     "c_source",
+    "ceil",
     "check",
     "check_member",
     "connect",
@@ -114,19 +124,27 @@ __all__ = [
     "extract_mechanism",
     "fabs",
     "flatten",
+    "floor",
     "fmax",
     "fmin",
     "has_windows",
     "heeding_interrupts",
     "if_else",
+    "limit",
     "linearize",
     "log",
+    "logic_and",
+    "logic_not",
+    "logic_or",
+    "mod",
     "norm_2",
     "outer",
     "parameter_text",
     "parameters_of",
+    "pre",
     "read_parameters",
     "read_toml",
+    "reinit",
     "replacing",
     "require",
     "root",
@@ -139,7 +157,9 @@ __all__ = [
     "stick_slip",
     "tan",
     "tanh",
+    "terminate",
     "time",
     "translate",
+    "when",
     "with_setting",
 ]

@@ -83,9 +83,9 @@ def translate(
 
     given: names that are known instead of the declared inputs, as functions of time (parameters named here
     stay symbols); find: names and derivatives that must be available; states: names preferred as states;
-    units: check the dimensions of all equations; events: accept what is sampled, and friction that sticks, as
-    known after the inputs. Raises ModelError for faults of writing, StructureError if the equations cannot
-    determine the unknowns, InitializationError if no consistent start is found.
+    units: check the dimensions of all equations; events: accept what is sampled, Discretes that whens set, and
+    friction that sticks, as known after the inputs. Raises ModelError for faults of writing, StructureError if the
+    equations cannot determine the unknowns, InitializationError if no consistent start is found.
     """
     request = Request(names(given), names(find), names(states or ()))
     flat = model if isinstance(model, FlatModel) else flatten(model)

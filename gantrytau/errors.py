@@ -9,7 +9,7 @@ from typing import Any
 
 HINTS = {
     "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; use if_else, between, "
-    "casadi.fmax, casadi.vertcat",
+    "logic_and, logic_or, logic_not, casadi.fmax, casadi.vertcat",
     "Dimension mismatch": "the two operands have different shapes",
     "not iterable": "a method yields its equations one by one: `yield a == b`",
     "Wrong number or type of arguments": "found something that is no number or expression among symbols; join lists with "

@@ -12,7 +12,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.check_units import check_units
-from gantrytau.flattening.flat_model import FlatModel, Loop
+from gantrytau.flattening.flat_model import FlatModel, Loop, When
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
 
@@ -36,7 +36,8 @@ class Diagnosis:
     mobility: number of ways in which the positions can change; redundant: equations that repeat others;
     assumed: parameters of which nobody gave the value, and what it is; moved: start values that were moved, the farthest
     first; assemblies: where the positions have several solutions, the one taken and others; ambiguous: unknowns of
-    equations that switch on them and hold several solutions at the start, of which the nearest is taken; missing: what
+    equations that switch on them and hold several solutions at the start, of which the nearest is taken; conditions: of
+    whens, and what is done there; missing: what
     keeps the model from being translated, else "".
     Prints itself.
     """
@@ -56,6 +57,7 @@ class Diagnosis:
     moved: tuple[Moved, ...] = ()
     assemblies: tuple[Assembly, ...] = ()
     ambiguous: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
     missing: str = ""
 
     def __str__(self) -> str:
@@ -83,6 +85,7 @@ class Diagnosis:
                 if self.ambiguous
                 else []
             ),
+            *(_listed("conditions", self.conditions) if self.conditions else []),
         ]
         return "\n".join(lines)
 
@@ -133,6 +136,7 @@ def diagnose(dae: Translated) -> Diagnosis:
         moved=_moved(dae),
         assemblies=assemblies(dae),
         ambiguous=_ambiguous(dae),
+        conditions=tuple(_condition(one) for one in dae.flat.whens),
     )
 
 
@@ -149,6 +153,13 @@ def _ambiguous(dae: Translated) -> tuple[str, ...]:
         for (block, _), count in zip(piecewise, counts, strict=True)
         if count > 1
     )
+
+
+def _condition(one: When) -> str:
+    """A when in words: where it stands, its condition, and what its actions set."""
+    done = [f"reinit {n}" for n, _ in one.reinits] + [n for n, _ in one.assignments]
+    done += [f"terminate: {one.message}"] if one.message else []
+    return f"{one.label}: {', '.join(done)}"
 
 
 def _moved(dae: Translated) -> tuple[Moved, ...]:

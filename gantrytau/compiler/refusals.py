@@ -55,6 +55,14 @@ def _causes(reduced: Reduced, flat: FlatModel) -> list[str]:
         if len(equations) > 1 and _helps(reduced, flat, without=equations[-1:]):
             places = " and by ".join(_quoted(e) for e in equations)
             found.append(f"{name}, an input, is driven more than once, by {places}; leave one out")
+    discretes = set(flat.discretes)
+    for equation in flat.equations:
+        sides = {side.name() for side in (equation.left, equation.right) if side.is_symbolic()} & discretes
+        if sides and _helps(reduced, flat, without=[equation]):
+            found.append(
+                f"{min(sides)}, a Discrete, counts as known, and {_quoted(equation)} seems to set it; only actions of when "
+                "set a Discrete: move it there, or declare it a Real"
+            )
     known = [n for n in reduced.known if n not in flat.event_names]
     given = [n for n in known if n not in inputs and _helps(reduced, flat, open=n)]
     if given:
@@ -179,6 +187,15 @@ def no_state(title: str, name: str, states: Sequence[str]) -> StructureError:
         f"{title}: {name} cannot be a state together with the others asked for; the states of this model can be "
         f"{', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer",
         argument="states",
+    )
+
+
+def no_reinit(place: str, name: str, states: Sequence[str]) -> ModelError:
+    """A variable that an action gives a new value although it follows from others."""
+    shown = ", ".join(states[:8]) + (", ..." if len(states) > 8 else "")
+    return ModelError(
+        f"{place}: found reinit({name}, ...), but {name} is no state, as it follows from others; expected one of the "
+        f"states, {shown or 'of which there is none'}; what jumps with them follows by itself"
     )
 
 

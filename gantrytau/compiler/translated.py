@@ -42,8 +42,8 @@ class Translated:
     """A differential-algebraic system of index one, sorted into blocks that are solved one after another.
 
     Names are those of the model; a vector's name stands for its elements.
-    known: the inputs, then sampled variables, then the forces of friction that sticks; asked: start values as the model
-    gives them; start: consistent numbers of all symbols; redundant: constraints that were left out.
+    known: the inputs, then sampled variables, then Discretes, then the forces of friction that sticks; asked: start
+    values as the model gives them; start: consistent numbers of all symbols; redundant: constraints that were left out.
     """
 
     request: Request

@@ -13,7 +13,7 @@ from gantrytau.compiler.blocks.solution import solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.parameters import ParameterTable, parameter_table
 from gantrytau.compiler.redundancy import Settled, without_redundant
-from gantrytau.compiler.refusals import differentiated
+from gantrytau.compiler.refusals import differentiated, no_reinit
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import start_values
@@ -82,7 +82,7 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
             )
         if name in events:
             raise ModelError(
-                f"given: {name} is set at instants (by sampled or stick_slip), expected another variable; leave it "
+                f"given: {name} is set at instants (by sampled, when or stick_slip), expected another variable; leave it "
                 "out, it is known anyway",
                 argument="given",
             )
@@ -118,9 +118,11 @@ def _translated(
     guide = Guide(sample, table.values, choice.states)
     blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
     refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
-    return Translated(
+    found = Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )
+    _refuse_reinits(found)
+    return found
 
 
 def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
@@ -133,7 +135,20 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
     for name, alias in reduced.aliases.items():
         if alias.root is not None and alias.root != name:
             found[alias.root] = max(found[alias.root], found[name])
+    for one in flat.whens:
+        for name, _ in one.reinits:
+            alias = reduced.aliases[name]
+            if alias.root is not None:
+                found[alias.root] = max(found[alias.root], int(StateSelect.ALWAYS))
     return found
+
+
+def _refuse_reinits(dae: Translated) -> None:
+    """ModelError for a variable that a when gives a new value although it is no state."""
+    for one in dae.flat.whens:
+        for name, _ in one.reinits:
+            if dae.reduced.aliases[name].symbol not in dae.choice.states:
+                raise no_reinit(one.label, name, dae.states)
 
 
 def retranslate(dae: Translated, flat: FlatModel) -> Translated:
@@ -157,9 +172,12 @@ def _wanted_derivatives(flat: FlatModel, find: Sequence[str]) -> tuple[str, ...]
 
 def _sampled_derivatives(flat: FlatModel) -> list[str]:
     """Derivatives of variables that only what is set at instants depends on."""
-    if not (flat.sampled or flat.frictions):
+    if not (flat.sampled or flat.frictions or flat.whens):
         return []
     used = [s.expression for s in flat.sampled]
+    used += [
+        e for one in flat.whens for e in (one.condition, *(v for _, v in (*one.reinits, *one.assignments)))
+    ]
     used += [e for f in flat.frictions for e in (f.coulomb, f.smooth, f.breakaway)]
     variables = {n for v in flat.variables for n in v.elements}
     there = {leaf.name() for e in flat.equations for leaf in ca.symvar(e.residual)}
@@ -181,5 +199,6 @@ def _refuse_differentiated(
         where += [(*occurring, reduced.equations[i].name) for occurring in row]
     for name, order, place in where:
         if name in events and order:
-            what = "sampled" if any(s.name == name for s in flat.sampled) else "friction that sticks"
+            what = "friction that sticks" if any(f.force == name for f in flat.frictions) else "a Discrete"
+            what = "sampled" if any(s.name == name for s in flat.sampled) else what
             raise differentiated(name, what, place)

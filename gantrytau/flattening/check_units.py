@@ -15,6 +15,7 @@ import casadi as ca
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instants import unit_equations
+from gantrytau.flattening.whens import when_units
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
@@ -78,8 +79,9 @@ def check_units(flat: FlatModel) -> None:
             if s.is_symbolic()
         ),
     ]
-    symbols += list(flat.derivatives.values())
-    for equations in (flat.equations, flat.initial_equations, unit_equations(flat), _attributes(flat)):
+    symbols += [*flat.derivatives.values(), *flat.before.values()]
+    events = [*unit_equations(flat), *when_units(flat)]
+    for equations in (flat.equations, flat.initial_equations, events, _attributes(flat)):
         sides = [side for e in equations for side in (e.left, e.right)]
         terms = _terms(symbols, units, sides)
         for equation, *pair in zip(equations, terms[::2], terms[1::2], strict=True):
@@ -121,6 +123,7 @@ def symbol_units(flat: FlatModel) -> Mapping[str, Unit]:
         base, order = split_derivative(name)
         unit = units.get(base, ANY)
         units[name] = unit if isinstance(unit, str) else _times(unit, dimension("s"), Fraction(-order))
+    units.update((symbol.name(), units[name]) for name, symbol in flat.before.items())
     return units
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 import casadi as ca
 
 from gantrytau.errors import ModelError
-from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.statements import Equation
@@ -60,14 +60,47 @@ def refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
             )
 
 
+def refuse_before(equations: Iterable[Equation]) -> None:
+    """ModelError for a value just before an instant where there is none."""
+    for equation in equations:
+        for leaf in ca.symvar(equation.residual):
+            if leaf.name().startswith("pre("):
+                raise ModelError(
+                    f"{equation.name}: found {leaf.name()}, expected it in when(...) only: an equation holds at all times, "
+                    "and sampled(...) sees the values before anyway; keep the value in a Discrete that a when sets"
+                )
+
+
+def refuse_bound(discretes: Iterable[FlatVariable], equations: Iterable[Equation]) -> None:
+    """ModelError for a Discrete that a modification sets by an equation."""
+    names = {v.name for v in discretes}
+    for equation in equations:
+        if equation.model == "binding" and equation.path in names:
+            own = equation.path.rpartition(".")[2]
+            raise ModelError(
+                f"{equation.path}: found the modification {own}={equation.right}, an equation, but only actions of when set "
+                f"a Discrete; its start value is {own}=Start({equation.right})"
+            )
+
+
 def refuse_events(flat: FlatModel) -> None:
     """ModelError naming the first component whose values or equations change at instants."""
     refuse_sticking(flat)
+    refuse_whens(flat)
     for event in flat.sampled:
         raise ModelError(
             f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate, "
             "linearize and FMUs sample it; optimisation and extraction cannot: leave it out there, or write it as a "
             "continuous equation. translate(..., events=True) takes it as known"
+        )
+
+
+def refuse_whens(flat: FlatModel) -> None:
+    """ModelError naming the first when of a model."""
+    for event in flat.whens:
+        raise ModelError(
+            f"{event.label}: found a condition at which variables jump, expected continuous equations. simulate acts upon "
+            "it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a continuous equation"
         )
 
 

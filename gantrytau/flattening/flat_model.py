@@ -1,7 +1,7 @@
 """The record of a flattened model: what crosses from the language to the compiler."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
@@ -110,6 +110,33 @@ class StickSlip:
 
 
 @dataclass(frozen=True, eq=False)
+class When:
+    """What happens at the instants at which `condition` becomes true, if nothing before it in its chain does.
+
+    reinits: states and their new values; assignments: Discretes and theirs; all in flat symbols, which stand for values
+    just before, but those of Discretes for new ones (`FlatModel.before` are the old ones); message: of terminate, "" if the
+    run goes on; path, model, number: where it is stated; after: place in `FlatModel.whens` of the one before it in its
+    chain, -1 if it is the first.
+    """
+
+    condition: ca.SX
+    reinits: tuple[tuple[str, ca.SX], ...]
+    assignments: tuple[tuple[str, ca.SX], ...]
+    message: str
+    path: str
+    model: str
+    number: int
+    after: int = -1
+
+    @property
+    def label(self) -> str:
+        """Where it is stated, and on what condition."""
+        words = str(self.condition)
+        place = f"{self.path or 'the model'} ({self.model}), equation {self.number}"
+        return f"{place}, when({words if len(words) <= 60 else words[:57] + '...'})"
+
+
+@dataclass(frozen=True, eq=False)
 class FlatModel:
     """A model written out: variables, parameters and scalar equations between their symbols.
 
@@ -117,7 +144,8 @@ class FlatModel:
     are no unknowns but `definitions`: expressions, by scalar name, of variables and of definitions before
     them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
     scalars known from outside; absent: declared names that this model has no use for, and why;
-    requirements: conditions on parameters; sampled, frictions: scalars that are set at instants, no unknowns either;
+    requirements: conditions on parameters; sampled, discretes, frictions: scalars that are set at instants, no unknowns
+    either, discretes by `whens`; before: symbols of the values of discretes just before an instant, by their names;
     rods: what a robot says of its links, by name.
     """
 
@@ -137,6 +165,9 @@ class FlatModel:
     requirements: tuple[Requirement, ...]
     sampled: tuple[Sampled, ...] = ()
     frictions: tuple[StickSlip, ...] = ()
+    whens: tuple[When, ...] = ()
+    discretes: tuple[str, ...] = ()
+    before: Mapping[str, ca.SX] = field(default_factory=dict)
     rods: Rods | None = None
 
     @cached_property
@@ -178,5 +209,5 @@ class FlatModel:
 
     @property
     def event_names(self) -> tuple[str, ...]:
-        """Scalars that are set at instants: sampled variables, then forces of friction that sticks."""
-        return (*(s.name for s in self.sampled), *(f.force for f in self.frictions))
+        """Scalars that are set at instants: sampled variables, Discretes, then forces of friction that sticks."""
+        return (*(s.name for s in self.sampled), *self.discretes, *(f.force for f in self.frictions))

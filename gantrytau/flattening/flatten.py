@@ -1,20 +1,28 @@
 """Writes an instantiated model out as one flat list of variables, parameters and scalar equations."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gantrytau.errors import told
 from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
-from gantrytau.flattening.flat_checks import refuse_absent, refuse_nan, refuse_starts, refuse_tables
-from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.flattening.flat_checks import (
+    refuse_absent,
+    refuse_before,
+    refuse_bound,
+    refuse_nan,
+    refuse_starts,
+    refuse_tables,
+)
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip, When
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.instants import expressed, read_events, with_expressions, with_starts
+from gantrytau.flattening.instants import Events, expressed, read_events, with_expressions, with_starts
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
+from gantrytau.flattening.whens import read_whens, refuse_unassigned, when_sides, with_sides
 from gantrytau.language.declarations import Parameter
-from gantrytau.language.events import Sampling, Sticking
+from gantrytau.language.events import Sampling, Sticking, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
@@ -36,6 +44,7 @@ class _Stated:
     ways: list[tuple[str, str, int, Branch | Root]] = field(default_factory=list)
     requirements: list[Requirement] = field(default_factory=list)
     events: list[tuple[str, str, int, Sampling | Sticking]] = field(default_factory=list)
+    whens: list[tuple[str, str, int, WhenChain]] = field(default_factory=list)
 
 
 def _stated(instance: Instance) -> _Stated:
@@ -49,6 +58,8 @@ def _stated(instance: Instance) -> _Stated:
                 found.requirements.append(replace(statement, path=path, model=name))
             elif isinstance(statement, (Sampling, Sticking)):
                 found.events.append((path, name, number, statement))
+            elif isinstance(statement, WhenChain):
+                found.whens.append((path, name, number, statement))
             elif isinstance(statement, (Branch, Root)):
                 found.ways.append((path, name, number, statement))
             else:
@@ -79,10 +90,9 @@ def write_out(instance: Instance) -> FlatModel:
         spread = Spread(instance, tree)
         written = spread.substituted(equations)
         written_initial = spread.substituted(stated.initial)
-        events = read_events(stated.events, instance.symbols)
-        written_events = spread.substituted(expressed(events, instance.symbols))
-        sampled, frictions = with_expressions(events, written_events)
-        everything = (*written, *written_initial, *written_events)
+        events, sampled, frictions, whens, sides = _events(stated, instance, spread)
+        refuse_before((*written, *written_initial))
+        everything = (*written, *written_initial, *sides)
         refuse_tables(everything)
         refuse_nan(everything)
         spread.refuse_undefined(everything)
@@ -92,10 +102,9 @@ def write_out(instance: Instance) -> FlatModel:
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
         kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
         parameters = tuple(flat_parameter(p) for p in placed if kinds[p.name] == "parameter")
-        variables = tuple(
-            flat_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated")
-        )
-        variables = with_starts(variables, events)
+        moving = (flat_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated"))
+        variables = with_starts(tuple(moving), events)
+        discretes = _discretes(variables, whens, written)
         passed = tuple(flat_variable(p) for p in placed if kinds[p.name] == "propagated")
     return FlatModel(
         name=type(instance.root).__name__,
@@ -114,8 +123,35 @@ def write_out(instance: Instance) -> FlatModel:
         requirements=(*stated.requirements, *events.requirements),
         sampled=sampled,
         frictions=frictions,
+        whens=whens,
+        discretes=discretes,
+        before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
         rods=rods_of(instance.root),
     )
+
+
+def _events(
+    stated: _Stated, instance: Instance, spread: Spread
+) -> tuple[Events, tuple[Sampled, ...], tuple[StickSlip, ...], tuple[When, ...], tuple[Equation, ...]]:
+    """What happens at instants: as it is read, the records of it, and their expressions as right sides of equations."""
+    events = read_events(stated.events, instance.symbols)
+    written = spread.substituted(expressed(events, instance.symbols))
+    refuse_before(written)
+    sampled, frictions = with_expressions(events, written)
+    whens = read_whens(stated.whens, instance.symbols, {s.name for s in sampled})
+    of_whens = spread.substituted(when_sides(whens))
+    return events, sampled, frictions, with_sides(whens, of_whens), (*written, *of_whens)
+
+
+def _discretes(
+    variables: Iterable[FlatVariable], whens: Sequence[When], equations: Iterable[Equation]
+) -> tuple[str, ...]:
+    """Names of the Discretes, scalars. ModelError for one that no when sets, or something else."""
+    own = [v for v in variables if v.kind == "discrete"]
+    names = tuple(n for v in own for n in v.elements)
+    refuse_bound(own, equations)
+    refuse_unassigned(names, whens)
+    return names
 
 
 def _of_the_ways(ways: list[tuple[str, str, int, Branch | Root]], tree: Tree) -> list[Equation]:

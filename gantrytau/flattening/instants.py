@@ -39,9 +39,9 @@ def read_events(stated: Sequence[tuple[str, str, int, Sampling | Sticking]], sym
 
 def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where: tuple[str, str, str]):
     path, model, place = where
-    names = [s.name for s in _declared(statement.variable, symbols, place, "sampled", ("real", "output"))]
+    names = [s.name for s in declared(statement.variable, symbols, place, "sampled", ("real", "output"))]
     shape = statement.variable.shape
-    expressions = _sized(statement.expression, shape, place, "the expression")
+    expressions = sized(statement.expression, shape, place, "the expression")
     period = _of_parameters(statement.period, (1, 1), symbols, place, "period")[0]
     if period.is_constant() and not 0 < float(period) < float("inf"):
         raise ModelError(f"{place}: found period={period}, expected a finite number above zero, in s")
@@ -59,10 +59,10 @@ def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where:
 
 def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where: tuple[str, str, str]):
     path, model, place = where
-    force = _single(_declared(statement.force, symbols, place, "the force", ("real", "output")), place)
-    speed = _single(_declared(statement.speed, symbols, place, "the speed", ("real", "output")), place)
+    force = _single(declared(statement.force, symbols, place, "the force", ("real", "output")), place)
+    speed = _single(declared(statement.speed, symbols, place, "the speed", ("real", "output")), place)
     parts = {
-        key: _sized(getattr(statement, key), (1, 1), place, key)[0]
+        key: sized(getattr(statement, key), (1, 1), place, key)[0]
         for key in ("coulomb", "smooth", "breakaway")
     }
     _take(events, force, place)
@@ -88,7 +88,7 @@ def _take(events: Events, name: str, place: str) -> None:
     events.places[name] = place
 
 
-def _declared(variable: Any, symbols: Symbols, place: str, role: str, kinds: Sequence[str]) -> list[Symbol]:
+def declared(variable: Any, symbols: Symbols, place: str, role: str, kinds: Sequence[str]) -> list[Symbol]:
     """The symbols of a declared variable."""
     elements = scalars(variable) if isinstance(variable, ca.SX) else []
     found = [symbol for element in elements if (symbol := symbols.find(element)) is not None]
@@ -113,7 +113,7 @@ def _single(found: Sequence[Symbol], place: str) -> str:
     return found[0].name
 
 
-def _sized(value: Any, shape: tuple[int, int], place: str, role: str) -> list[ca.SX]:
+def sized(value: Any, shape: tuple[int, int], place: str, role: str) -> list[ca.SX]:
     """An expression as scalars, column after column, of a wanted shape."""
     try:
         found = joined(value)
@@ -130,7 +130,7 @@ def _of_parameters(
     value: Any, shape: tuple[int, int], symbols: Symbols, place: str, role: str
 ) -> list[ca.SX]:
     """Numbers or expressions of parameters; one number may stand for all."""
-    whole = _sized(value, (1, 1) if isinstance(value, (int, float)) else shape, place, role)
+    whole = sized(value, (1, 1) if isinstance(value, (int, float)) else shape, place, role)
     for leaf in ca.symvar(ca.vertcat(*whole)):
         symbol = symbols.find(leaf)
         if symbol is None or symbol.kind != "parameter":
@@ -186,7 +186,7 @@ def with_starts(variables: Sequence[FlatVariable], events: Events) -> tuple[Flat
 
 
 def unit_equations(flat: FlatModel) -> list[Equation]:
-    """Equations whose units agree if those of the events do."""
+    """Equations whose units agree if those of what is sampled and of frictions do."""
     symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
     periods = [
         Equation(s.period, flat.time, s.path, s.model, 0, label=f"{s.label}, period") for s in flat.sampled

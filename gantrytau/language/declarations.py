@@ -131,7 +131,7 @@ def evaluate(value: Any, scope: Any) -> Any:
 
 
 class Quantity(Formula):
-    """Base of Real, Parameter, Input, Output, Flow and Propagated."""
+    """Base of Real, Parameter, Input, Output, Discrete, Flow and Propagated."""
 
     kind = "real"
 
@@ -206,6 +206,32 @@ class Output(Quantity):
     """A variable that the model offers to the outside."""
 
     kind = "output"
+
+
+class Discrete(Quantity):
+    """A variable that only actions of `when` set, and that holds its value in between: `Discrete(0)`, `Discrete([0, 0])`.
+
+    start: its value until then, a number, an array of its shape, or an expression of parameters (then `shape`, if it is
+    no scalar); True and False are 1 and 0. It has no derivative, and counts as known in the equations.
+    """
+
+    kind = "discrete"
+
+    def __init__(
+        self,
+        start: Any = 0.0,
+        *,
+        shape: Any = None,
+        unit: str | None = None,
+        description: str = "",
+        min: Any = None,
+        max: Any = None,
+        nominal: Any = None,
+    ):
+        if shape is None:
+            shape = () if callable(start) or isinstance(start, Formula) else np.shape(start)
+        limits = dict(min=min, max=max, nominal=nominal)
+        super().__init__(shape, unit=unit, description=description, start=start, **limits)
 
 
 class Flow(Quantity):

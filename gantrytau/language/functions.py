@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -36,6 +37,8 @@ fabs = _lifted(ca.fabs, "fabs", "Absolute value.")
 fmin = _lifted(ca.fmin, "fmin", "The smaller of two values, element by element.")
 fmax = _lifted(ca.fmax, "fmax", "The larger of two values, element by element.")
 sign = _lifted(ca.sign, "sign", "-1, 0 or 1.")
+floor = _lifted(ca.floor, "floor", "The largest whole number that is not above a value.")
+ceil = _lifted(ca.ceil, "ceil", "The smallest whole number that is not below a value.")
 dot = _lifted(ca.dot, "dot", "Scalar product of two vectors.")
 cross = _lifted(ca.cross, "cross", "Vector product of two vectors of three.")
 norm_2 = _lifted(ca.norm_2, "norm_2", "Euclidean length of a vector.")
@@ -62,12 +65,53 @@ def between(lower: Any, expression: Any, upper: Any) -> Between:
     return Between(lower, expression, upper)
 
 
+def mod(x: Any, y: Any) -> Any:
+    """X - y * floor(x / y), what is left of x above the next lower multiple of y; it has the sign of y."""
+    if isinstance(x, Formula) or isinstance(y, Formula):
+        return Formula(mod, x, y)
+    return x - y * ca.floor(x / y)
+
+
+def limit(x: Any, low: Any, high: Any) -> Any:
+    """x, but not below `low` and not above `high`, element by element."""
+    return fmin(fmax(x, low), high)
+
+
+def logic_and(*conditions: Any) -> Any:
+    """Whether all of some conditions hold, for `if_else` and `when`; Python's `and` cannot say it on symbols."""
+    return _joined(logic_and, ca.logic_and, conditions)
+
+
+def logic_or(*conditions: Any) -> Any:
+    """Whether at least one of some conditions holds, for `if_else` and `when`."""
+    return _joined(logic_or, ca.logic_or, conditions)
+
+
+def logic_not(condition: Any) -> Any:
+    """Whether a condition does not hold, for `if_else` and `when`."""
+    if isinstance(condition, Formula):
+        return Formula(logic_not, condition)
+    return ca.logic_not(plain_condition(condition))
+
+
+def _joined(function: Callable[..., Any], join: Callable[..., Any], conditions: tuple[Any, ...]) -> Any:
+    if any(isinstance(condition, Formula) for condition in conditions):
+        return Formula(function, *conditions)
+    if not conditions:
+        raise ModelError(f"{function.__name__}: found no condition, expected at least one")
+    return reduce(join, (plain_condition(condition) for condition in conditions))
+
+
+def plain_condition(condition: Any) -> Any:
+    """A condition as an expression of CasADi; `between` is one."""
+    return condition.condition() if isinstance(condition, Between) else condition
+
+
 def if_else(condition: Any, then: Any, otherwise: Any) -> Any:
     """`then` where `condition` (`<`, `>=`, `between`) holds, else `otherwise`; both are evaluated."""
     if any(isinstance(argument, Formula) for argument in (condition, then, otherwise)):
         return Formula(if_else, condition, then, otherwise)
-    if isinstance(condition, Between):
-        condition = condition.condition()
+    condition = plain_condition(condition)
     if isinstance(condition, ca.SX) and condition.numel() != 1:
         raise ModelError(f"if_else: the condition has shape {condition.shape}, expected one number")
     return ca.if_else(condition, then, otherwise)

@@ -33,7 +33,9 @@ class Symbol:
 
     name: str
     sx: ca.SX
-    kind: str  # real, input, output, flow, parameter, propagated
+    kind: (
+        str  # real, input, output, discrete, flow, parameter, propagated; pre: a value just before an instant
+    )
     base: str
     order: int
 
@@ -61,19 +63,35 @@ class Symbols:
         name = derivative_name(symbol.base, symbol.order + 1)
         return self.by_name.get(name) or self.add(name, symbol.kind, symbol.base, symbol.order + 1)
 
+    def before(self, symbol: Symbol) -> Symbol:
+        """The value of a variable just before an instant, made when it is first asked for."""
+        name = f"pre({symbol.name})"
+        return self.by_name.get(name) or self.add(name, "pre", symbol.name)
+
     def total_derivative(self, expression: ca.SX) -> ca.SX:
         """d/dt of a scalar expression by the chain rule; parameters are constant."""
         found = self.find(expression)
         if found is not None:
+            _refuse_jump(found)
             return ca.SX(0) if found.kind == "parameter" else self.derivative(found).sx
         refuse_calls("der()", expression)
         inside, rates = [time], [ca.SX(1)]
         for leaf in ca.symvar(expression):
             symbol = self.find(leaf)
             if symbol is not None and symbol.kind != "parameter":
+                _refuse_jump(symbol)
                 inside.append(leaf)
                 rates.append(self.derivative(symbol).sx)
         return ca.jtimes(expression, ca.vertcat(*inside), ca.vertcat(*rates))
+
+
+def _refuse_jump(symbol: Symbol) -> None:
+    """ModelError for what jumps at instants and has no derivative there."""
+    if symbol.kind in ("discrete", "pre"):
+        raise ModelError(
+            f"der(): found {symbol.name}, which jumps at instants and is constant between them, expected what has a "
+            "derivative; pass it through a filter (gantrytau.mechanics.filters.LowPass), or differentiate the rest alone"
+        )
 
 
 def derivative_name(base: str, order: int) -> str:
@@ -135,6 +153,31 @@ def der(expression: Any, order: int = 1) -> ca.SX:
     for _ in range(order):
         elements = [symbols.total_derivative(element) for element in elements]
     return ca.reshape(ca.vertcat(*elements), *expression.shape)
+
+
+def pre(expression: Any) -> ca.SX:
+    """The value of a variable or expression just before an instant, of the same shape; for use in `when`.
+
+    Raises ModelError outside of the equations of a model.
+    """
+    symbols = _current.get()
+    if symbols is None:
+        raise ModelError(
+            "pre() was called outside of equations(self), where there are no symbols yet; "
+            "a result has both sides of a jump, at two equal times"
+        )
+    expression = ca.densify(ca.SX(expression))
+    leaves = [(leaf, symbols.find(leaf)) for leaf in ca.symvar(expression)]
+    moving = [(leaf, s) for leaf, s in leaves if s is not None and s.kind != "parameter"]
+    for _, symbol in moving:
+        if symbol.kind == "pre":
+            raise ModelError(
+                f"pre(): found {symbol.name}, a value just before, expected a variable; keep older values in a Discrete"
+            )
+    if not moving:
+        return expression
+    before = [symbols.before(symbol).sx for _, symbol in moving]
+    return ca.substitute(expression, ca.vertcat(*(leaf for leaf, _ in moving)), ca.vertcat(*before))
 
 
 def scalars(expression: Iterable[Any] | Any) -> list[ca.SX]:

@@ -17,7 +17,7 @@ from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import DoubtfulResult, ModelError, SolveError
-from gantrytau.flattening.flat_checks import refuse_sticking
+from gantrytau.flattening.flat_checks import refuse_sticking, refuse_whens
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
@@ -70,6 +70,7 @@ def simulate(
     _check(start, stop, tolerance, points, max_step)
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
+    refuse_whens(dae.flat)
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
     wanted = names(outputs or ())

@@ -37,8 +37,9 @@ def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> Start
         size = float(np.max(np.abs(numbers)))
         for name, number in zip(variable.elements, numbers, strict=True):
             _place(variable, name, float(number), size, reduced, values, owners, fixed)
-    for event in flat.sampled:  # not the start of an alias: only its own is held until the first instant
-        values[event.name] = _own_start(flat, table, event.name)
+    held = (*(s.name for s in flat.sampled), *flat.discretes)
+    for name in held:  # not the start of an alias: only its own is held until the first instant
+        values[name] = _own_start(flat, table, name)
     values.update(table.values)
     values[flat.time.name()] = 0.0
     chosen = frozenset(n for n, (_, by_author, _) in owners.items() if not by_author)
