@@ -7,6 +7,8 @@ from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.answers.linearization import Linearization, linearize
 from gantrytau.dae import Dae, translate
+from gantrytau.ensembles.study import study
+from gantrytau.ensembles.study_record import Study
 from gantrytau.errors import (
     DoubtfulResult,
     GantryTauError,
@@ -103,6 +105,7 @@ __all__ = [
     "StateSelect",
     "StateSpace",
     "StructureError",
+    "Study",
     "acos",
     "asin",
     "atan",
@@ -155,6 +158,7 @@ __all__ = [
     "split_derivative",
     "sqrt",
     "stick_slip",
+    "study",
     "tan",
     "tanh",
     "terminate",

@@ -1,16 +1,31 @@
 """A bar on the screen for what takes long."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 LONG = 2.0  # s of waiting after which progress is shown
 
+_silent: ContextVar[bool] = ContextVar("silent", default=False)
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """While it lasts, no bar is shown: what is computed is part of something that shows its own."""
+    token = _silent.set(True)
+    try:
+        yield
+    finally:
+        _silent.reset(token)
+
 
 class Progress:
-    """A bar on the screen for runs that take long, nothing otherwise."""
+    """A bar on the screen, with the time that is left, for runs that take long, nothing otherwise."""
 
-    def __init__(self, start: float, stop: float):
-        self.start, self.stop, self.bar, self.task = start, stop, None, None
+    def __init__(self, start: float, stop: float, words: str = "simulating"):
+        self.start, self.stop, self.words, self.bar, self.task = start, stop, words, None, None
 
     def __enter__(self) -> "Progress":
         from time import monotonic
@@ -20,15 +35,18 @@ class Progress:
         return self
 
     def at(self, t: float) -> None:
-        if self.bar is None and self.clock() - self.since > LONG and sys.stderr.isatty():
+        if self.bar is None and self._wanted():
             from rich.console import Console
             from rich.progress import Progress
 
             self.bar = Progress(console=Console(stderr=True), transient=True)
-            self.task = self.bar.add_task("simulating", total=self.stop - self.start)
+            self.task = self.bar.add_task(self.words, total=self.stop - self.start)
             self.bar.start()
         if self.bar is not None and self.task is not None:
             self.bar.update(self.task, completed=t - self.start)
+
+    def _wanted(self) -> bool:
+        return not _silent.get() and self.clock() - self.since > LONG and sys.stderr.isatty()
 
     def __exit__(self, *exception: Any) -> None:
         if self.bar is not None:

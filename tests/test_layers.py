@@ -20,7 +20,7 @@ PACKAGES = {
 }
 ORDER = {  # a room imports the rooms before it
     "gantrytau": "errors interruption whole_files progress language flattening compiler results simulation writing "
-    "answers dae __init__ kinematics mechanics commands cli",
+    "answers dae ensembles __init__ kinematics mechanics commands cli",
     "gantrytau_models": "prototypes mechanisms control __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "
     "studies estimation paths calibration procedure __init__",

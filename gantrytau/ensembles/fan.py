@@ -1,0 +1,81 @@
+"""Figures of studies: a variable of all cases over time, as lines or as bands."""
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gantrytau.ensembles.cases import Case
+from gantrytau.ensembles.labelled_array import common_times, on_times
+from gantrytau.errors import ModelError
+from gantrytau.results.figures import check_suffix, finished
+from gantrytau.results.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LINES = 40  # of one axis, which are still seen one by one
+LABELS = 8  # of lines, that a legend still tells apart
+BANDS = ((5.0, 95.0), (25.0, 75.0))  # %
+
+
+def draw_fan(
+    cases: Sequence[tuple[Case, Result]],
+    names: Sequence[str],
+    file: str | os.PathLike[str] | None,
+    title: str,
+) -> "Figure":
+    """The figure of the named variables of all cases, an axis for each, saved to `file` if one is named."""
+    import matplotlib.pyplot as plt
+
+    if file is not None:
+        check_suffix(file)
+    first = cases[0][1]
+    for name in names:
+        first[name]  # an unknown name raises
+    scalars = [
+        str(n) for name in names for n in (first.arrays[name].flat if name in first.arrays else [name])
+    ]
+    if not scalars:
+        raise ModelError(f"{title}: plot() found no names, expected those of variables, as plot('x')")
+    figure, axes = plt.subplots(
+        len(scalars),
+        sharex=True,
+        squeeze=False,
+        figsize=(7.0, 1.2 + 2.4 * len(scalars)),
+        layout="constrained",
+    )
+    for axis, name in zip(axes[:, 0], scalars, strict=True):
+        (_lines if len(cases) <= LINES else _bands)(axis, cases, name)
+        unit = first.unit(name)
+        axis.set_ylabel(f"{name} [{unit}]" if unit else name)
+        axis.grid(alpha=0.3)
+    axes[-1, 0].set_xlabel("time [s]")
+    told = {label: line for line, label in zip(*axes[0, 0].get_legend_handles_labels(), strict=True)}
+    if 0 < len(told) <= LABELS:
+        axes[0, 0].legend(told.values(), told.keys(), fontsize="small")
+    figure.suptitle(f"{title}, {len(cases)} cases")
+    return finished(figure, file)
+
+
+def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
+    """One line for each case, from dark to light in their order; labelled where they are few."""
+    import matplotlib.pyplot as plt
+
+    colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(cases)))
+    for colour, (case, result) in zip(colours, cases, strict=True):
+        label = str(case) if len(cases) <= LABELS else None
+        axis.plot(result.time, result[name], color=colour, linewidth=1.0, label=label)
+
+
+def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
+    """The median of all cases, and bands that hold half and nine tenths of those that have not ended."""
+    times = common_times([result for _, result in cases])
+    table = np.array([on_times(result, name, times) for _, result in cases])
+    for low, high in BANDS:
+        below, above = np.nanpercentile(table, (low, high), axis=0)
+        axis.fill_between(
+            times, below, above, color="C0", alpha=0.25, linewidth=0, label=f"{high - low:.0f} %"
+        )
+    axis.plot(times, np.nanmedian(table, axis=0), color="C0", label="median")

@@ -1,0 +1,1 @@
+"""Where cases are computed, and what is sent there and back."""

@@ -1,0 +1,34 @@
+"""Where cases are computed: in this process, in processes of this machine, on a Dask cluster."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from gantrytau.ensembles.cases import Case
+from gantrytau.ensembles.workers.cluster import on_cluster
+from gantrytau.ensembles.workers.processes import in_processes
+from gantrytau.ensembles.workers.worker import Outcome, Task, here, processors, within_a_case
+from gantrytau.errors import ModelError, did_you_mean
+
+Place = str
+NAMES = ("processes", "dask")
+
+
+def read_place(where: Any) -> Place:
+    """Where cases are to be computed; ModelError for what is neither a name nor an address."""
+    if where in NAMES or (isinstance(where, str) and "://" in where):
+        return where
+    hint = did_you_mean(where, NAMES) if isinstance(where, str) else ""
+    raise ModelError(
+        f"study: found where={where!r}, expected 'processes', 'dask' or an address, as 'tcp://host:8786'{hint}",
+        argument="where",
+    )
+
+
+def outcomes(task: Task, cases: Sequence[Case], place: Place) -> Iterator[Outcome]:
+    """Outcomes of cases as they are finished; one case, one processor and a study within a case need no processes."""
+    here_is_enough = place == "processes" and (processors() == 1 or len(cases) == 1)
+    if within_a_case() or here_is_enough:
+        return here(task, cases)
+    if place == "processes":
+        return in_processes(task, cases)
+    return on_cluster(task, cases, place)

@@ -1,0 +1,172 @@
+"""Studies of models and functions: exact solutions, one answer wherever it is computed, cases that fail."""
+
+import os
+
+import numpy as np
+import pytest
+
+from gantrytau import (
+    Input,
+    Model,
+    ModelError,
+    Parameter,
+    Real,
+    der,
+    exp,
+    simulate,
+    sin,
+    study,
+    time,
+    translate,
+)
+from gantrytau.ensembles.workers import places
+
+TOLERANCE = 1e-10
+ERROR = 100 * TOLERANCE  # errors of steps add up
+
+
+class Decay(Model):
+    """A quantity that decays and is driven: x' = -k x + b sin(time) + u."""
+
+    k = Parameter(1.0, unit="1/s", min=0.0, description="rate of decay")
+    b = Parameter([0.0, 0.0], unit="1/s", description="amplitudes of the drive")
+    x = Real(unit="1", start=1.0, fixed=True, description="what decays")
+    u = Input(unit="1/s", start=0.0, description="what drives it")
+
+    def equations(self):
+        yield der(self.x) == -self.k * self.x + self.b[0] * sin(time) + self.b[1] + self.u
+
+
+def same(a, b) -> bool:
+    """Whether two results are equal bit by bit."""
+    return a.names == b.names and all(np.array_equal(a[n], b[n]) for n in (*a.names, "time"))
+
+
+def test_every_case_has_its_exact_solution():
+    rates, starts = [0.5, 1.0, 2.0], [1.0, -3.0]
+    found = study(Decay(), stop=2.0, over={"k": rates, "x": starts}, inputs={"u": 0.5}, tolerance=TOLERANCE)
+    table = found.to_xarray()
+    k, x = table["k"], table["x.start"]
+    exact = 0.5 / k + (x - 0.5 / k) * np.exp(-k * table["time"])
+    assert abs(table["x"] - exact.transpose(*table["x"].dims)).max() < 3 * ERROR  # of values up to 3
+    assert table["x"].dims == ("k", "x.start", "time")
+    assert table["x"].attrs["units"] == "1"
+    assert len(found) == len(found.cases) == 6
+    assert not found.failures
+    assert repr(found) == "<Study Decay: 6 cases over k (3) x x.start (2)>"
+
+
+def test_values_that_go_together_have_one_axis():
+    found = study(
+        Decay(),
+        stop=1.0,
+        over={"k": [1.0, 2.0], "b": [[0.0, 1.0], [0.0, 4.0]]},
+        combine="zip",
+        outputs=["x"],
+        tolerance=TOLERANCE,
+    )
+    table = found.to_xarray()
+    assert table["x"].dims == ("case", "time")
+    assert table["b values"].values.tolist() == [[0.0, 1.0], [0.0, 4.0]]
+    k, level = table["k"].values[:, None], np.array([[1.0], [4.0]])
+    exact = level / k + (1.0 - level / k) * np.exp(-k * table["time"].values)
+    assert np.abs(table["x"].values - exact).max() < ERROR
+
+
+@pytest.mark.parametrize("translated", [False, True], ids=["model", "translated"])
+def test_processes_and_this_process_agree_bit_by_bit(translated, monkeypatch):
+    model = translate(Decay()) if translated else Decay()
+    asked = dict(stop=3.0, over={"k": [0.7, 1.3], "x": [1.0, 2.0]}, inputs={"u": lambda t: exp(-t)})
+    asked |= dict(parameters={"b": [1.5, 0.0]}, points=101)
+    there = study(model, **asked)
+    monkeypatch.setattr(places, "processors", lambda: 1)
+    here = study(model, **asked)
+    for case, a, b in zip(there.cases, there.values, here.values, strict=True):
+        alone = simulate(
+            model,
+            stop=3.0,
+            points=101,
+            inputs=asked["inputs"],
+            parameters={"b": [1.5, 0.0], "k": case.chosen["k"]},
+            starts={"x": case.chosen["x"]},
+        )
+        assert same(a, b)
+        assert same(a, alone)
+
+
+def test_a_result_is_found_by_what_was_chosen():
+    found = study(Decay(), stop=1.0, over={"k": [0.1, 0.2], "x": [1.0, 2.0]})
+    assert found.result(k=0.1 + 1e-17, x=2.0).final("x") == pytest.approx(2 * np.exp(-0.1), rel=1e-7)
+    assert [case.chosen for case, _ in found][1] == {"k": 0.1, "x": 2.0}
+    with pytest.raises(ModelError, match=r"Decay: 2 cases have these values; say x too"):
+        found.result(k=0.1)
+    with pytest.raises(ModelError, match=r"found k=0\.3, expected a value of the study; there is 0\.1, 0\.2"):
+        found.result(k=0.3)
+    with pytest.raises(ModelError, match=r"nothing varies by the name 'kk'; did you mean 'k'\?"):
+        found.result(kk=0.1)
+
+
+def test_a_function_is_called_with_every_seed():
+    offset = 0.5
+    found = study(
+        lambda a, seed: np.random.default_rng(seed).normal() + a + offset, over={"a": [1, 2]}, seeds=3
+    )
+    drawn = [np.random.default_rng(seed).normal() for seed in range(3)]
+    assert found.values == tuple(draw + a + 0.5 for a in (1, 2) for draw in drawn)
+    table = found.to_xarray()
+    assert table["value"].dims == ("a", "seed")
+    assert found.result(a=2, seed=1) == table["value"].sel(a=2, seed=1)
+
+
+def test_mappings_become_variables_and_a_failed_case_is_not_a_number():
+    def sides(a):
+        if a == 2:
+            raise ValueError("no triangle")
+        return {"sum": a + 1.0, "powers": [a, a**2]}
+
+    found = study(sides, over={"a": [1, 2, 3]})
+    table = found.to_xarray()
+    assert np.array_equal(table["sum"], [2.0, np.nan, 4.0], equal_nan=True)
+    assert np.array_equal(table["powers"], [[1, 1], [np.nan, np.nan], [3, 9]], equal_nan=True)
+    assert str(found.failures[0]) == "a=2: ValueError: no triangle"
+    with pytest.raises(ModelError, match=r"sides: a=2 failed: ValueError: no triangle"):
+        found.result(a=2)
+
+
+def test_a_simulation_that_fails_is_a_row_and_not_the_end():
+    found = study(Decay(), stop=1.0, over={"k": [1.0, -1.0, 2.0]})
+    (failure,) = found.failures
+    assert failure.case.chosen == {"k": -1.0}
+    assert failure.kind == "ModelError"
+    assert "k: value is -1, expected at least 0" in failure.message
+    assert [value is None for value in found.values] == [False, True, False]
+
+
+def test_a_process_that_dies_is_a_row_with_a_name_and_the_others_are_finished():
+    def deadly(a):
+        if a == 3:
+            os._exit(9)
+        return a**2
+
+    found = study(deadly, over={"a": range(6)})
+    assert found.values == (0, 1, 4, None, 16, 25)
+    (failure,) = found.failures
+    assert failure.kind == "WorkerDied"
+    assert str(failure).startswith("a=3: WorkerDied: its process died twice")
+
+
+def test_workers_have_one_thread_and_a_study_within_a_case_starts_no_others():
+    def inner(a, b):
+        return os.getpid(), a * b
+
+    def outer(a):
+        return os.getpid(), os.environ["OMP_NUM_THREADS"], study(partial(inner, a), over={"b": [1, 2]}).values
+
+    from functools import partial
+
+    found = study(outer, over={"a": [3, 4]})
+    assert not found.failures
+    for a, (process, threads, values) in zip((3, 4), found.values, strict=True):
+        assert process != os.getpid()
+        assert threads == "1"
+        assert values == ((process, a), (process, 2 * a))
