@@ -26,6 +26,10 @@ class KeptCases:
     """
 
     def __init__(self, folder: str | os.PathLike[str], fingerprint: Mapping[str, str]):
+        if not isinstance(folder, (str, os.PathLike)):
+            raise ModelError(
+                f"study: found folder={folder!r}, expected the path of a folder", argument="folder"
+            )
         self.folder = Path(folder)
         self.fingerprint = dict(fingerprint)
         if self.folder.exists() and not self.folder.is_dir():

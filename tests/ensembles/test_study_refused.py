@@ -59,13 +59,3 @@ def test_functions_are_checked_against_their_arguments():
         study(area, over={"width": [1], "height": [1]}, stop=1.0)
     with pytest.raises(ModelError, match=r"found <class .*Pendulum.*>, expected a model, as Pendulum\(\)"):
         study(Pendulum, over={"m": [1]}, stop=1.0)
-
-
-def test_a_cluster_that_is_not_there_is_told(monkeypatch):
-    from gantrytau.ensembles.workers import cluster
-
-    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
-    with pytest.raises(
-        ModelError, match=r"nobody answers at tcp://127\.0\.0\.1:9, expected a scheduler of Dask; start"
-    ):
-        study(lambda x: x, over={"x": [1, 2]}, where="tcp://127.0.0.1:9")

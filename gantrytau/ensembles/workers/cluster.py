@@ -67,7 +67,7 @@ def _client(where: str) -> Iterator[Any]:
         ) from error
     if where == "dask":
         local = LocalCluster(
-            n_workers=processors(), threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=processors(), threads_per_worker=1, processes=True, dashboard_address=":0"
         )
         with local, Client(local) as client:
             yield client

@@ -4,6 +4,10 @@ A process that dies takes all that ran with it. What was running is then run aga
 a case whose process dies again is told, and the others are finished.
 """
 
+import os
+import signal
+import threading
+import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -20,6 +24,7 @@ from gantrytau.ensembles.workers.worker import (
     receive,
 )
 
+GLANCE = 0.5  # s between looks at whether the program is there
 AHEAD = 2  # cases for each process that are sent before one is done, so that none waits
 
 
@@ -67,13 +72,25 @@ def _alone(parcel: Parcel, case: Case) -> Iterator[Outcome]:
         yield Outcome(case.number, error=words, kind=LOST)
 
 
+def _begin(parcel: Parcel) -> None:
+    """What a process does first: it takes the task, and ends when the program that started it is killed."""
+    receive(parcel)
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(GLANCE)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
 class _Pool:
     """Processes that have the task, and end with the block, at once if it is left by an error."""
 
     def __init__(self, parcel: Parcel, count: int):
         from loky import ProcessPoolExecutor
 
-        self.pool: Any = ProcessPoolExecutor(count, initializer=receive, initargs=(parcel,), env=ONE_THREAD)
+        self.pool: Any = ProcessPoolExecutor(count, initializer=_begin, initargs=(parcel,), env=ONE_THREAD)
 
     def __enter__(self) -> Any:
         return self.pool
