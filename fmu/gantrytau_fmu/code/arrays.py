@@ -15,9 +15,6 @@ def column(parts: Sequence[ca.SX]) -> ca.SX:
 
 
 def numbers_of(dae: Dae, arrays: Mapping[str, ca.SX]) -> dict[str, np.ndarray]:
-    """Values of all arrays where the model starts, modes locked."""
+    """Values of all arrays where the model starts, frictions locked."""
     values = {**dae.start, **dae.table.values, dae.flat.time.name(): dae.start.get(dae.flat.time.name(), 0.0)}
-    return {
-        n: np.zeros(a.numel()) if n == "m" else np.array([values.get(s.name(), 0.0) for s in a.elements()])
-        for n, a in arrays.items()
-    }
+    return {n: np.array([values.get(s.name(), 0.0) for s in a.elements()]) for n, a in arrays.items()}

@@ -141,7 +141,7 @@ def contents_of(model: ModelGraph, outputs: Sequence[str], others: Sequence[str]
     _inputs(listed)
     _states(listed)
     _outputs(listed, [*outputs, *others])
-    indicators = _frictions(listed)
+    indicators = (*_frictions(listed), *_switches(listed))
     return Contents(
         variables=tuple(listed.variables),
         entries=tuple(listed.entries),
@@ -277,6 +277,20 @@ def _frictions(listed: _Listed) -> tuple[str, ...]:
         words = f"{owner or name}: an event where it falls through zero"
         more = dict(causality="local", variability="continuous", initial="calculated")
         reference = listed.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        indicators.append(listed.variables[reference].name)
+    return tuple(indicators)
+
+
+def _switches(listed: _Listed) -> tuple[str, ...]:
+    """Event indicators of what switches: how far each condition is from its next turn; two of what counts."""
+    turns, conditions = listed.formulas.switching.turns, listed.formulas.switching.conditions
+    gaps = [*conditions, *(c for turn, c in zip(turns, conditions, strict=True) if turn.counts)]
+    indicators = []
+    for place, condition in enumerate(gaps):
+        words = f"how far {condition} is from its next turn: an event where it falls through zero"
+        more: dict[str, Any] = dict(causality="local", variability="continuous", initial="calculated")
+        index = len(listed.formulas.frictions) + place
+        reference = listed.add(f"margins[{place}]", "INDICATOR", index, unit="", description=words, **more)
         indicators.append(listed.variables[reference].name)
     return tuple(indicators)
 

@@ -4,14 +4,13 @@ A start that is declared for a state, or for a multiple of one, is a formula in 
 another variable determines states only through the equations, and so becomes an initial equation.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from gantrytau import Dae
-from gantrytau.compiler.system import System
 from gantrytau.errors import ModelError
 from gantrytau_fmu.code.arrays import column, numbers_of
 
@@ -64,14 +63,19 @@ class _Point:
 
 
 def starts_of(
-    dae: Dae, system: System, equations: ca.SX, residuals: ca.SX, arrays: Mapping[str, ca.SX]
+    dae: Dae,
+    to_system: Callable[[Sequence[ca.SX]], list[ca.SX]],
+    equations: ca.SX,
+    residuals: ca.SX,
+    arrays: Mapping[str, ca.SX],
 ) -> Starts:
-    """The start of a model; equations: those that it states itself; residuals: of the implicit blocks.
+    """The start of a model; to_system: leads to the symbols of the arrays; equations: those that it states itself;
+    residuals: of the implicit blocks.
 
     Raises ModelError if initial equations do not determine states.
     """
     point = _Point(arrays, numbers_of(dae, arrays), residuals)
-    declared = [d for d in _declared(dae, system) if _is_kept(point, d)]
+    declared = [d for d in _declared(dae, to_system) if _is_kept(point, d)]
     formulas = _formulas(arrays["x"].elements(), declared)
     rows = [d for d in declared if d not in [own for own, _ in formulas.values()]]
     rows = [d for d in rows if _needs_solving(d, arrays)]
@@ -86,7 +90,7 @@ def starts_of(
     return Starts(column(values), stated, solved, frozenset(early))
 
 
-def _declared(dae: Dae, system: System) -> list[_Declared]:
+def _declared(dae: Dae, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]]) -> list[_Declared]:
     """Starts in parameters, and those that are fixed; the fixed first."""
     known = {*dae.known, *(s.name for s in dae.flat.sampled)}
     found = [
@@ -98,7 +102,7 @@ def _declared(dae: Dae, system: System) -> list[_Declared]:
     ]
     if not found:
         return []
-    expressions = system.to_system([dae.expression(name) for name, _, _ in found])
+    expressions = to_system([dae.expression(name) for name, _, _ in found])
     made = [_Declared(n, e, s, fixed) for (n, s, fixed), e in zip(found, expressions, strict=True)]
     return sorted(made, key=lambda d: not d.fixed)
 

@@ -1,8 +1,8 @@
 """The formulas of an FMU, taken from a Dae: what the runtime evaluates, in the arrays that it holds.
 
 t time, x states, u what is known from outside (inputs, then sampled variables), z unknowns of the blocks that
-have no closed form, p parameters, m modes of frictions with exact stick-slip (1 forward, -1 backward, 0 locked).
-The force of such a friction is one of the z; its equation depends on the mode.
+have no closed form, p parameters, m modes of frictions with exact stick-slip (1 forward, -1 backward, 0 locked), then
+of what switches. The force of such a friction is one of the z; its equation depends on the mode.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +18,7 @@ from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.fmu_starts import Starts, starts_of
+from gantrytau_fmu.code.switching import Switching, WithModes, switching, written
 
 HOLD = 0.01  # s, time in which the speed left at the instant of locking dies away
 
@@ -39,7 +40,8 @@ class Formulas:
 
     careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
     expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
-    breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends.
+    breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends; switching: what
+    turns at events.
     """
 
     dae: Dae
@@ -59,6 +61,7 @@ class Formulas:
     starts: Starts
     parameters: tuple[str, ...]
     margins: ca.SX
+    switching: Switching
     careful: "Formulas | None" = None
 
     @property
@@ -79,56 +82,63 @@ class Formulas:
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     """The formulas of a translated model; outputs: scalar names of what can be read of it, states and all."""
+    found = written(dae)
+    dae = found.dae
     careful = carefully(dae, SolvedBlocks(dae.blocks)).blocks
     pairs = list(zip(dae.blocks, careful, strict=True))
     # what is left implicit is solved with pivots chosen by value anyway
     quick = tuple(block if other.solution is not None else other for block, other in pairs)
-    found = _formulas(replace(dae, blocks=quick), outputs)
-    if found.margins.is_constant():
-        return found
-    return replace(found, careful=_formulas(replace(dae, blocks=careful), outputs))
+    ways = [replace(found, dae=replace(dae, blocks=blocks)) for blocks in (quick, careful)]
+    kept = frozenset(t.mode.name() for way in ways for t in switching(way, way.dae.system()).turns)
+    first = _formulas(ways[0], outputs, kept)
+    if first.margins.is_constant():
+        return first
+    return replace(first, careful=_formulas(ways[1], outputs, kept))
 
 
-def _formulas(dae: Dae, outputs: Sequence[str]) -> Formulas:
+def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) -> Formulas:
+    """kept: names of the modes that are known."""
+    dae = found.dae
     system = dae.system()
     outputs = _evaluated(dae, outputs)
     flat = dae.flat
     sampled, frictions = flat.sampled, flat.frictions
-    wanted = system.to_system([dae.expression(n) for n in outputs]) if outputs else []
-    updates = system.to_system([dae.to_reduced(s.expression) for s in sampled])
-    laws = [[f.coulomb, f.smooth, f.breakaway] for f in frictions]
-    laws = [system.to_system([dae.to_reduced(e) for e in law]) for law in laws]
+    turning = switching(found, system, kept)
+
+    def at_once(expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """In symbols of the system, modes that are not kept by their margins."""
+        return turning.outside.inserted(system.to_system(expressions)) if expressions else []
+
+    wanted = at_once([dae.expression(n) for n in outputs])
+    updates = at_once([dae.to_reduced(s.expression) for s in sampled])
+    laws = [system.to_system(law) for law in found.laws]
     speeds = system.to_system([dae.expression(f.speed) for f in frictions])
     accelerations = system.to_system([dae.expression(f"der({f.speed})") for f in frictions])
-    initial = system.to_system([dae.to_reduced(e.residual) for e in flat.initial_equations])
+    initial = at_once([dae.to_reduced(e.residual) for e in flat.initial_equations])
     everything = [system.ode, system.residuals, *wanted, *updates, *speeds, *accelerations, *initial]
     differentiated = _input_derivatives(dae, column(everything))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
     forces = [_symbol(system, f.force) for f in frictions]
-    m = ca.SX.sym("m", len(frictions))
-    friction_rows = [
-        ca.if_else(m[k] == 0, a + v / HOLD, force - m[k] * law[0] - law[1])
-        for k, (a, v, force, law) in enumerate(zip(accelerations, speeds, forces, laws, strict=True))
-    ]
-    blocks = _blocks(system, frictions, forces, friction_rows)
+    slides = [ca.SX.sym(f"(mode of {f.force})") for f in frictions]
+    terms = zip(slides, accelerations, speeds, forces, laws, strict=True)
+    rows = [ca.if_else(mode == 0, a + v / HOLD, f - mode * law[0] - law[1]) for mode, a, v, f, law in terms]
+    blocks = _blocks(system, frictions, forces, rows)
     arrays = {
         "t": system.time,
         "x": system.x,
         "u": column([*free, *differentiated.values(), *(_symbol(system, s.name) for s in sampled)]),
         "z": column([b.unknowns for b in blocks]),
         "p": system.p,
-        "m": m,
+        "m": column([*slides, turning.modes]),
     }
     periods, clocks = _clocks(system, sampled)
-    inputs = (*dae.inputs, *differentiated)
-    starts = starts_of(dae, system, column(initial), column([b.residual for b in blocks]), arrays)
-    roots = _roots(system)
+    starts = starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays)
     return Formulas(
         dae=dae,
         arrays=arrays,
         states=dae.states,
         rates=system.ode,
-        inputs=inputs,
+        inputs=(*dae.inputs, *differentiated),
         held=tuple(s.name for s in sampled),
         samples=column(updates),
         clocks=clocks,
@@ -137,12 +147,11 @@ def _formulas(dae: Dae, outputs: Sequence[str]) -> Formulas:
         outputs=dict(zip(outputs, wanted, strict=True)),
         frictions=tuple(f.force for f in frictions),
         friction=column([e for v, law in zip(speeds, laws, strict=True) for e in (v, law[2])]),
-        roots=roots,
+        roots=_roots(system, turning),
         starts=starts,
         parameters=system.parameters,
-        margins=column(
-            system.to_system([m for b in dae.blocks if b.solution is not None for m in b.margins])
-        ),
+        margins=column(at_once([m for b in dae.blocks if b.solution is not None for m in b.margins])),
+        switching=turning,
     )
 
 
@@ -205,7 +214,7 @@ def _block(names: Sequence[str], unknowns: ca.SX, residual: ca.SX, frictions: bo
     return ImplicitBlock(tuple(names), unknowns, residual, linear, frictions)
 
 
-def _roots(system: System) -> dict[str, ca.SX]:
+def _roots(system: System, turning: Switching) -> dict[str, ca.SX]:
     """Of blocks in closed form: square roots, and determinants of those with several unknowns, relative to nothing."""
     found = {}
     for block in system.dae.blocks:
@@ -215,7 +224,8 @@ def _roots(system: System) -> dict[str, ca.SX]:
             found[block.tears[0].name()] = ca.det(
                 ca.jacobian(ca.vertcat(*block.residuals), ca.vertcat(*block.tears))
             )
-    return dict(zip(found, system.to_system(list(found.values())), strict=True)) if found else {}
+    values = turning.outside.inserted(system.to_system(list(found.values()))) if found else []
+    return dict(zip(found, values, strict=True))
 
 
 def _clocks(system: System, sampled: Sequence) -> tuple[ca.SX, tuple[int, ...]]:

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import casadi as ca
+
 from gantrytau_fmu.code.arrays import numbers_of
 from gantrytau_fmu.code.c_functions import CFunction, c_function
 from gantrytau_fmu.code.contents import Contents
@@ -100,7 +102,7 @@ def _moving(model: ModelGraph) -> list[str]:
 
 def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> dict[str, int]:
     formulas = model.formulas
-    counts = [len(b.names) for b in formulas.blocks]
+    counts, turns = [len(b.names) for b in formulas.blocks], formulas.switching.turns
     return dict(
         GT_VARIABLES=variables,
         GT_STATES=len(formulas.states),
@@ -113,8 +115,10 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_MATRICES=sum(n * n for n in counts),
         GT_PARAMETERS=len(formulas.parameters),
         GT_OUTPUTS=len(model.outputs),
-        GT_MODES=len(formulas.frictions),
-        GT_INDICATORS=len(formulas.frictions),
+        GT_FRICTIONS=len(formulas.frictions),
+        GT_TURNS=len(turns),
+        GT_GAPS=len(turns) + sum(turn.counts for turn in turns),
+        GT_TURNS_OF_BLOCKS=int(ca.depends_on(formulas.switching.margins, formulas.arrays["z"])),
         GT_CLOCKS=formulas.periods.numel(),
         GT_INITIAL=formulas.starts.equations.numel(),
         GT_ROOTS=len(formulas.roots),
@@ -127,7 +131,7 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
 
 
 def _tables(formulas: Formulas, contents: Contents) -> list[str]:
-    variables = contents.entries
+    variables, switching = contents.entries, formulas.switching
     at = numbers_of(formulas.dae, formulas.arrays)
     held = [formulas.clocks.index(k) for k in range(formulas.periods.numel())]
     lines = [
@@ -143,11 +147,16 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _numbers("gt_start_u", at["u"]),
         _numbers("gt_start_z", at["z"]),
         _numbers("gt_start_p", at["p"]),
+        _numbers("gt_start_m", at["m"]),
         _numbers("gt_x_nominals", contents.nominals),
         _numbers("gt_z_nominals", contents.z_nominals),
         _integers("gt_initial_states", formulas.starts.solved),
         _integers("gt_friction_unknowns", [formulas.z_names.index(n) for n in formulas.frictions]),
         _integers("gt_held_clocks", formulas.clocks),
+        _integers("gt_turn_closed", [turn.closed for turn in switching.turns]),
+        _integers("gt_turn_counts", [turn.counts for turn in switching.turns]),
+        _integers("gt_turn_timed", switching.timed),
+        _texts("gt_conditions", switching.conditions),
         _texts("gt_x_names", formulas.states),
         _texts("gt_z_names", formulas.z_names),
         _texts("gt_root_names", formulas.roots),
@@ -180,7 +189,7 @@ def _numbers(name: str, values: Iterable[float]) -> str:
 
 
 def _integers(name: str, values: Iterable[int]) -> str:
-    return f"static const int {name}[] = {{{', '.join(map(str, values)) or '0'}}};"
+    return f"static const int {name}[] = {{{', '.join(str(int(v)) for v in values) or '0'}}};"
 
 
 def _texts(name: str, values: Iterable[str]) -> str:

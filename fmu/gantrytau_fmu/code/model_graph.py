@@ -77,6 +77,8 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         "gt_roots": column(list(formulas.roots.values())),
         "gt_periods": formulas.periods,
         "gt_samples": formulas.samples,
+        "gt_turning": column([formulas.switching.margins, formulas.switching.noise]),
+        "gt_turning_rates": _along(formulas.switching.margins, point, way),
         "gt_forward": _along(everything, point, way),
         "gt_by_parameters": _along(everything, s["p"], s["dp"]),
         "gt_initial_slopes": _along(

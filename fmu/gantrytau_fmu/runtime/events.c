@@ -1,4 +1,5 @@
-/* Events: sampled variables at multiples of their period, and friction that locks, slides forward or backward.
+/* Events: sampled variables at multiples of their period, friction that locks, slides forward or backward, switches that
+ * turn (turns.c).
  *
  * While a friction is locked its force is an unknown that keeps the speed at zero; it breaks away when that
  * force passes its limit. A sliding one locks when its speed comes to zero.
@@ -8,10 +9,10 @@
 #define GT_MARGIN 1e-9       /* of the breakaway force */
 #define GT_ON_TIME 1e-6      /* of a period: instants that close are the same, also where masters add up their steps */
 
-/* Speed and breakaway force of each friction, (2, GT_MODES), rows first. */
+/* Speed and breakaway force of each friction, (2, GT_FRICTIONS), rows first. */
 static gt_status gt_laws(gt_instance *it, double *laws) {
     const gt_status status = gt_refresh(it);
-    if (status == GT_OK && GT_MODES) gt_friction(it->a, laws, it->w);
+    if (status == GT_OK && GT_FRICTIONS) gt_friction(it->a, laws, it->w);
     return status;
 }
 
@@ -21,17 +22,28 @@ static double gt_indicator(const gt_instance *it, const double *laws, int i) {
     return breakaway - fabs(force) + GT_MARGIN * (1 + breakaway);
 }
 
-static gt_status gt_get_indicators(gt_instance *it, double *indicators) {
-    double laws[GT_ROOM(2 * GT_MODES)];
-    gt_status status = gt_present(it);
+/* Of the frictions. */
+static gt_status gt_friction_indicators(gt_instance *it, double *indicators) {
+    double laws[GT_ROOM(2 * GT_FRICTIONS)];
+    gt_status status = gt_laws(it, laws);
     int i;
-    if (status == GT_OK) status = gt_laws(it, laws);
-    for (i = 0; i < GT_MODES && status == GT_OK; i++) {
+    for (i = 0; i < GT_FRICTIONS && status == GT_OK; i++) {
         indicators[i] = gt_indicator(it, laws, i);
         if (!isfinite(indicators[i]))
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: speed or limit of %s is not a finite number at time = %.9g s", GT_NAME,
                           gt_z_names[gt_friction_unknowns[i]], it->now.time);
     }
+    return status;
+}
+
+/* Frictions, then gaps of what switches: rounding is their hysteresis, so that one is not passed where it turns. */
+static gt_status gt_get_indicators(gt_instance *it, double *indicators) {
+    gt_gaps gaps;
+    gt_status status = gt_present(it);
+    int i;
+    if (status == GT_OK) status = gt_friction_indicators(it, indicators);
+    if (status == GT_OK) status = gt_look_at_gaps(it, &gaps);
+    for (i = 0; i < GT_GAPS && status == GT_OK; i++) indicators[GT_FRICTIONS + i] = gaps.left[i] + gaps.noise[i];
     return status;
 }
 
@@ -47,14 +59,14 @@ static void gt_set_mode(gt_instance *it, int i, double mode, double speed) {
 
 /* Release the locked frictions that cannot hold, the worst first, until all hold. */
 static gt_status gt_settle(gt_instance *it) {
-    double laws[GT_ROOM(2 * GT_MODES)];
+    double laws[GT_ROOM(2 * GT_FRICTIONS)];
     int round, i;
-    for (round = 0; round <= 2 * GT_MODES; round++) {
+    for (round = 0; round <= 2 * GT_FRICTIONS; round++) {
         int worst = -1;
         double least = 0;
         const gt_status status = gt_laws(it, laws);
         if (status != GT_OK) return status;
-        for (i = 0; i < GT_MODES; i++) {
+        for (i = 0; i < GT_FRICTIONS; i++) {
             const double spare = gt_indicator(it, laws, i);
             if (it->now.m[i] == 0 && spare < least) {
                 least = spare;
@@ -69,13 +81,13 @@ static gt_status gt_settle(gt_instance *it) {
 }
 
 static gt_status gt_begin_modes(gt_instance *it) {
-    double laws[GT_ROOM(2 * GT_MODES)];
+    double laws[GT_ROOM(2 * GT_FRICTIONS)];
     gt_status status;
     int i;
-    if (!GT_MODES) return GT_OK;
+    if (!GT_FRICTIONS) return GT_OK;
     status = gt_laws(it, laws);
     if (status != GT_OK) return status;
-    for (i = 0; i < GT_MODES; i++)
+    for (i = 0; i < GT_FRICTIONS; i++)
         gt_set_mode(it, i, laws[2 * i] > GT_REST ? 1 : laws[2 * i] < -GT_REST ? -1 : 0, laws[2 * i]);
     it->now.stale = 1;
     return gt_settle(it);
@@ -83,28 +95,28 @@ static gt_status gt_begin_modes(gt_instance *it) {
 
 /* Lock what has come to rest and release what breaks away; *changed tells whether a mode has changed. */
 static gt_status gt_friction_events(gt_instance *it, int *changed) {
-    double laws[GT_ROOM(2 * GT_MODES)], before[GT_ROOM(GT_MODES)];
+    double laws[GT_ROOM(2 * GT_FRICTIONS)], before[GT_ROOM(GT_FRICTIONS)];
     gt_status status;
     int i;
     *changed = 0;
-    if (!GT_MODES) return GT_OK;
+    if (!GT_FRICTIONS) return GT_OK;
     memcpy(before, it->now.m, sizeof before);
     status = gt_laws(it, laws);
     if (status != GT_OK) return status;
-    for (i = 0; i < GT_MODES; i++)
+    for (i = 0; i < GT_FRICTIONS; i++)
         if (it->now.m[i] != 0 && gt_indicator(it, laws, i) <= 0.5 * GT_REST) gt_set_mode(it, i, 0, 0);
     status = gt_settle(it);
-    for (i = 0; i < GT_MODES; i++) *changed |= it->now.m[i] != before[i];
+    for (i = 0; i < GT_FRICTIONS; i++) *changed |= it->now.m[i] != before[i];
     return status;
 }
 
 /* How far locked frictions are from breaking away, and its rates. */
-typedef struct { double forces[GT_ROOM(GT_MODES)], rates[GT_ROOM(GT_MODES)]; } gt_spare;
+typedef struct { double forces[GT_ROOM(GT_FRICTIONS)], rates[GT_ROOM(GT_FRICTIONS)]; } gt_spare;
 
 /* At the present point; the rates are a difference within `span`. */
 static gt_status gt_find_spare(gt_instance *it, double span, gt_spare *found) {
-    double slopes[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_MODES)];
-    gt_status status = gt_get_indicators(it, found->forces);
+    double slopes[GT_ROOM(GT_STATES)], moved[GT_ROOM(GT_FRICTIONS)];
+    gt_status status = gt_friction_indicators(it, found->forces);
     const gt_state kept = it->now;
     const double delta = gt_small_time(kept.time, span);
     int i;
@@ -113,8 +125,8 @@ static gt_status gt_find_spare(gt_instance *it, double span, gt_spare *found) {
     for (i = 0; i < GT_STATES; i++) it->now.x[i] += delta * slopes[i];
     it->now.time += delta;
     it->now.stale = 1;
-    status = gt_get_indicators(it, moved);
-    for (i = 0; i < GT_MODES && status == GT_OK; i++) found->rates[i] = (moved[i] - found->forces[i]) / delta;
+    status = gt_friction_indicators(it, moved);
+    for (i = 0; i < GT_FRICTIONS && status == GT_OK; i++) found->rates[i] = (moved[i] - found->forces[i]) / delta;
     it->now = kept;
     it->outputs_stale = it->factors_stale = 1;
     gt_point_at(it, &it->now.time, it->now.x);
@@ -136,7 +148,7 @@ static double gt_least_between(double step, double first, double rate, double la
  * them, or goes from one to the other but not at the rates that it has there. The step is too long to know. */
 static int gt_may_have_slipped(const gt_instance *it, double step, const gt_spare *first, const gt_spare *last) {
     int i;
-    for (i = 0; i < GT_MODES; i++) {
+    for (i = 0; i < GT_FRICTIONS; i++) {
         const double before = first->forces[i], after = last->forces[i], smaller = fmin(before, after);
         const double led = 0.5 * step * (first->rates[i] + last->rates[i]);
         if (it->now.m[i] != 0) continue;
@@ -148,7 +160,7 @@ static int gt_may_have_slipped(const gt_instance *it, double step, const gt_spar
 
 static int gt_sticks(const gt_instance *it) {
     int i;
-    for (i = 0; i < GT_MODES; i++)
+    for (i = 0; i < GT_FRICTIONS; i++)
         if (it->now.m[i] == 0) return 1;
     return 0;
 }
@@ -218,14 +230,17 @@ static gt_status gt_sample(gt_instance *it, int *sampled) {
 }
 
 static gt_status gt_update(gt_instance *it, gt_event_info *info) {
-    int sampled = 0, changed = 0;
+    int sampled = 0, changed = 0, turned = 0;
+    double turn = INFINITY;
     gt_status status = gt_sample(it, &sampled);
     memset(info, 0, sizeof *info);
+    if (status == GT_OK) status = gt_agree(it, &turned);
     if (status == GT_OK) status = gt_friction_events(it, &changed);
+    if (status == GT_OK) status = gt_next_turn(it, &turn);
     if (status != GT_OK) return status;
-    info->again = sampled || changed;
-    info->next = gt_next_sample(it, INFINITY);
-    info->next_defined = GT_CLOCKS > 0;
+    info->again = sampled || changed || turned;
+    info->next = fmin(gt_next_sample(it, INFINITY), turn);
+    info->next_defined = info->next < INFINITY;
     return GT_OK;
 }
 

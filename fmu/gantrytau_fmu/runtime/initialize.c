@@ -104,7 +104,7 @@ static gt_status gt_check_pivots(gt_instance *it) {
 static gt_status gt_initialize(gt_instance *it) {
     gt_event_info info;
     double rates[GT_ROOM(GT_STATES)];
-    gt_status status = gt_initial_equations(it);
+    gt_status status = gt_present(it);
     if (status == GT_OK) status = gt_refresh(it);
     if (status == GT_OK) status = gt_check_pivots(it);
     if (status != GT_OK) return status;

@@ -7,6 +7,8 @@
 
 #define GT_ROOM(n) ((n) + 1) /* ISO C knows no arrays of length zero */
 #define GT_SIDES (GT_BLOCKS + GT_ROOTS) /* what shows singular poses: determinants, and roots in closed forms */
+#define GT_MODES (GT_FRICTIONS + GT_TURNS)
+#define GT_INDICATORS (GT_FRICTIONS + GT_GAPS) /* GT_GAPS: of each switch, two of one that counts */
 #define GT_SLOPES (GT_STATES + GT_ALGEBRAICS + GT_OUTPUTS)
 #define GT_LARGEST_BLOCK_ROOM GT_ROOM(GT_LARGEST_BLOCK)
 
@@ -17,13 +19,13 @@ typedef struct {
     double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables */
     double z[GT_ROOM(GT_ALGEBRAICS)]; /* unknowns of the implicit blocks */
     double p[GT_ROOM(GT_PARAMETERS)];
-    double m[GT_ROOM(GT_MODES)];      /* 1 forward, -1 backward, 0 locked */
+    double m[GT_ROOM(GT_MODES)];      /* of frictions: 1 forward, -1 backward, 0 locked; then of what switches */
     double ticks[GT_ROOM(GT_CLOCKS)]; /* the next sampling instant of a clock is start + ticks * period */
     double size;                      /* of the last step of the integrator, 0 before the first */
     double start, stop, tolerance;
     /* the last point where the equations were solved, from which others are reached */
     double solved_time, solved_x[GT_ROOM(GT_STATES)], solved_u[GT_ROOM(GT_KNOWN)], solved_z[GT_ROOM(GT_ALGEBRAICS)];
-    double rest[GT_ROOM(GT_MODES)];   /* a sliding friction has stopped when it moves that fast the other way */
+    double rest[GT_ROOM(GT_FRICTIONS)];   /* a sliding friction has stopped when it moves that fast the other way */
     /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
     double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)], kept_rates[GT_ROOM(GT_STATES)]; /* there, in Model Exchange */
@@ -44,6 +46,7 @@ struct gt_instance {
     gt_sink sink;
     int logging[GT_LOG_CATEGORIES];
     int parameters_stale, outputs_stale, factors_stale;
+    int stepping; /* in a step: modes hold up to events */
     const double *a[GT_ARRAYS + 1];
     double c[GT_ROOM(GT_HOISTED)], w[GT_ROOM(GT_WORK)], y[GT_ROOM(GT_OUTPUTS)];
     double matrices[GT_ROOM(GT_MATRICES)]; /* factored Jacobians of the blocks, one after another */
@@ -78,6 +81,7 @@ static gt_status gt_say(gt_instance *it, gt_status status, gt_category category,
 static gt_status gt_initial_equations(gt_instance *it);
 static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
+static gt_status gt_agree(gt_instance *it, int *changed);
 static int gt_other_side(const gt_instance *it);
 
 /* A time for differences: short within `span`, but one that numbers of the size of `time` can tell. */
@@ -100,9 +104,11 @@ static void gt_reset(gt_instance *it) {
     memcpy(it->now.solved_x, gt_start_x, GT_STATES * sizeof(double));
     memcpy(it->now.solved_u, gt_start_u, GT_KNOWN * sizeof(double));
     memcpy(it->now.solved_z, gt_start_z, GT_ALGEBRAICS * sizeof(double));
+    memcpy(it->now.m, gt_start_m, GT_MODES * sizeof(double));
     it->now.tolerance = GT_TOLERANCE;
     it->now.stale = 1;
     it->mode = GT_INSTANTIATED;
+    it->stepping = 0;
     it->time = 0;
     it->parameters_stale = it->outputs_stale = it->factors_stale = 1;
     it->dt = 0;

@@ -212,9 +212,21 @@ static gt_status gt_all_finite(gt_instance *it, int n, const double *values, con
     return GT_OK;
 }
 
-/* Before initialisation ends, the states are those that start values and initial equations give. */
+/* Before initialisation ends, the states are those that start values and initial equations give. There, and between two
+ * steps, modes follow what is set. */
 static gt_status gt_present(gt_instance *it) {
-    return it->mode == GT_INITIALIZATION ? gt_initial_equations(it) : GT_OK;
+    const int starting = it->mode == GT_INITIALIZATION;
+    gt_status status = GT_OK;
+    int changed = 1, round;
+    if (!starting && !(GT_TURNS && it->mode == GT_STEP && !it->stepping && it->now.stale)) return GT_OK;
+    for (round = 0; round < GT_ITERATIONS && changed && status == GT_OK; round++) {
+        const int stale = it->now.stale || it->now.starts_stale;
+        changed = 0;
+        if (starting) status = gt_initial_equations(it);
+        if (GT_TURNS && stale && status == GT_OK) status = gt_agree(it, &changed);
+        if (changed && starting) it->now.stale = it->outputs_stale = 1;
+    }
+    return status;
 }
 
 /* Rates of the states at the present point. */

@@ -28,28 +28,59 @@ static gt_status gt_move(gt_instance *it, double time, const double *x) {
     return gt_completed(it);
 }
 
-static int gt_crossed(gt_instance *it) {
-    double indicators[GT_ROOM(GT_MODES)];
+/* How far everything is from its next event: the least of all, below zero behind one, and the gaps of what switches. */
+typedef struct { gt_gaps gaps; double least; } gt_ahead;
+
+/* At the present point. */
+static gt_status gt_look_ahead(gt_instance *it, gt_ahead *found) {
+    double frictions[GT_ROOM(GT_FRICTIONS)];
+    gt_status status = gt_friction_indicators(it, frictions);
     int i;
-    if (!GT_MODES || gt_get_indicators(it, indicators) != GT_OK) return 0;
-    for (i = 0; i < GT_MODES; i++)
-        if (indicators[i] <= 0) return 1;
-    return 0;
+    found->least = INFINITY;
+    for (i = 0; i < GT_FRICTIONS && status == GT_OK; i++)
+        found->least = fmin(found->least, frictions[i] <= 0 ? fmin(frictions[i], -1e-300) : frictions[i]);
+    if (status == GT_OK) status = gt_look_at_gaps(it, &found->gaps);
+    for (i = 0; i < GT_GAPS && status == GT_OK; i++)
+        found->least = fmin(found->least, found->gaps.left[i] + found->gaps.noise[i]);
+    return status;
 }
 
-/* The step of size h from (t, x) crosses: find the shortest that does, by halving. */
-static gt_status gt_locate(gt_instance *it, double t, double h, const double *x) {
-    double before = 0, behind = h, error[GT_ROOM(GT_STATES)];
+/* The point that a step of size h from (t, x) leads to. */
+static gt_status gt_try_to(gt_instance *it, double t, double h, const double *x, gt_ahead *there) {
+    double error[GT_ROOM(GT_STATES)];
+    const gt_status status = gt_try_step(it, t, h, x, it->next, error) == GT_OK ? gt_move(it, t + h, it->next) : GT_DISCARD;
+    return status == GT_OK ? gt_look_ahead(it, there) : status;
+}
+
+/* The step of size h from (t, x) goes from before an event to behind it: find the shortest that does, by the secant whose
+ * older end counts half (Illinois), and by halving where that is slow. */
+static gt_status gt_locate(gt_instance *it, double t, double h, const double *x, double above, double below) {
+    double before = 0, behind = h, width = h;
     gt_status status = GT_OK;
-    while (status == GT_OK && behind - before > GT_LOCATED + 4e-16 * (fabs(t) + behind)) {
-        const double middle = before + 0.5 * (behind - before);
-        if (gt_try_step(it, t, middle, x, it->next, error) != GT_OK) return GT_DISCARD;
-        status = gt_move(it, t + middle, it->next);
-        if (gt_crossed(it)) behind = middle;
-        else before = middle;
+    gt_ahead there;
+    int count, side = 0;
+    for (count = 0; status == GT_OK && behind - before > GT_LOCATED + 4e-16 * (fabs(t) + behind); count++) {
+        double share = above > 0 && below < 0 ? above / (above - below) : 0.5, middle;
+        if (count % 4 == 3) {
+            if (behind - before > width / 8) share = 0.5;
+            width = behind - before;
+        }
+        middle = before + fmin(fmax(share, 1e-3), 1 - 1e-3) * (behind - before);
+        status = gt_try_to(it, t, middle, x, &there);
+        if (status != GT_OK) break;
+        if (there.least < 0) {
+            behind = middle;
+            below = there.least;
+            if (side < 0) above /= 2;
+            side = -1;
+        } else {
+            before = middle;
+            above = there.least;
+            if (side > 0) below /= 2;
+            side = 1;
+        }
     }
-    if (status != GT_OK || gt_try_step(it, t, behind, x, it->next, error) != GT_OK) return GT_DISCARD;
-    return gt_move(it, t + behind, it->next);
+    return status == GT_OK ? gt_try_to(it, t, behind, x, &there) : GT_DISCARD;
 }
 
 /* The state that changes most for its size. */
@@ -106,7 +137,7 @@ static int gt_turned_at(gt_instance *it, double time) {
  * the point where the step began, and then to where it has led. */
 static int gt_slipped(gt_instance *it, double t, const double *x, double size, double span, gt_spare *spare, gt_status *status) {
     gt_spare later;
-    if (!GT_MODES || *status != GT_OK || !gt_sticks(it)) return 0;
+    if (!GT_FRICTIONS || *status != GT_OK || !gt_sticks(it)) return 0;
     *status = gt_find_spare(it, size, &later);
     if (*status == GT_OK && size > GT_LEAST_LOOK * span && gt_may_have_slipped(it, size, spare, &later)) {
         *status = gt_move(it, t, x);
@@ -114,6 +145,18 @@ static int gt_slipped(gt_instance *it, double t, const double *x, double size, d
     }
     *spare = later;
     return 0;
+}
+
+/* The share of the step of that size from (t, x) to the present point after which something may have switched that its
+ * ends do not show; 1 if there is none. Then back there. */
+static double gt_overlooked(gt_instance *it, double t, const double *x, double size, double span, const gt_gaps *first,
+                            const gt_gaps *last, gt_status *status) {
+    double share = 1;
+    if (!GT_TURNS || *status != GT_OK || size <= GT_LEAST_LOOK * span) return 1;
+    share = gt_dip(size, first, last);
+    if (share == 1 && gt_strays(it, t, size, x, it->k[GT_FIRST_RATES], first, last)) share = 0.5;
+    if (share < 1) *status = gt_move(it, t, x);
+    return share;
 }
 
 /* The size of the next step, after one whose error was `norm`. */
@@ -128,36 +171,43 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
     const double span = end - it->now.time, shortest = fmax(GT_SHORTEST * span, 4.5e-16 * fabs(end));
     double h = it->now.size > 0 ? it->now.size : span;
     gt_spare spare;
+    gt_ahead here, there;
     gt_status status = gt_prepare(it);
     int rejected = 0;
     *event = 0;
-    if (GT_MODES && status == GT_OK) status = gt_find_spare(it, span, &spare);
+    if (GT_FRICTIONS && status == GT_OK) status = gt_find_spare(it, span, &spare);
+    if (GT_INDICATORS && status == GT_OK) status = gt_look_ahead(it, &here);
     while (status == GT_OK && end - it->now.time > shortest) {
         const double t = it->now.time, rest = end - t;
         const int last = h >= rest * (1 - 1e-9);
         const double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, next = last ? end : t + size;
-        double norm;
+        double norm, share;
         int turned;
         if (++*count > GT_MOST_STEPS) return gt_too_many(it, t);
         memcpy(x, it->now.x, GT_STATES * sizeof(double));
         norm = gt_try_step(it, t, size, x, it->next, error) == GT_OK ? gt_error_norm(it, x, it->next, error) : INFINITY;
         turned = norm <= 1 && GT_SIDES ? gt_turned_at(it, next) : -1;
         if (!(norm <= 1) || turned >= 0) {
-            const double share = turned >= 0 || !(norm < INFINITY) ? 0.25 : fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER));
+            if (!(norm < INFINITY) && (*event = gt_put_behind(it, size))) return GT_OK;
+            share = turned >= 0 || !(norm < INFINITY) ? 0.25 : fmax(0.1, 0.9 * pow(norm, -1. / GT_ORDER));
             rejected = 1;
             status = gt_shorten(it, &h, share * size, shortest, turned);
             continue;
         }
         status = gt_move(it, next, it->next);
-        if (status == GT_OK && gt_crossed(it)) {
+        if (GT_INDICATORS && status == GT_OK) status = gt_look_ahead(it, &there);
+        if (GT_INDICATORS && status == GT_OK && there.least < 0) {
             *event = 1;
-            return gt_locate(it, t, size, x);
+            return gt_locate(it, t, size, x, here.least, there.least);
         }
-        if (gt_slipped(it, t, x, size, span, &spare, &status)) {
+        share = gt_overlooked(it, t, x, size, span, &here.gaps, &there.gaps, &status);
+        if (share == 1 && gt_slipped(it, t, x, size, span, &spare, &status)) share = 0.5;
+        if (share < 1) {
             rejected = 1;
-            h = 0.5 * size;
+            h = share * size;
             continue;
         }
+        here = there;
         it->now.size = h = gt_next_size(h, size, norm, last, rejected);
         rejected = 0;
         if (status == GT_OK && !last) status = gt_accepted(it);
@@ -166,7 +216,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
     return status;
 }
 
-/* The friction events and samples at the present time. */
+/* All that happens at the present time. */
 static gt_status gt_handle_events(gt_instance *it, int *events) {
     int again = 1;
     while (again) {
@@ -185,12 +235,14 @@ static gt_status gt_handle_events(gt_instance *it, int *events) {
 
 static gt_status gt_step(gt_instance *it, double time, double size, double *reached) {
     const double end = time + size;
+    double turn = INFINITY;
     int count = 0, events = 0, event = 0;
     gt_status status = GT_OK;
     if (!(size > 4.5e-16 * fabs(end)))
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found a step of %g s at time = %.9g s, expected one that a number of that size can "
                       "tell", GT_NAME, size, time);
     it->now.time = time;
+    it->stepping = 1;
     if (GT_CLOCKS && it->now.first) {
         memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_HELD_COUNT * sizeof(double));
         memset(it->now.ticks, 0, sizeof it->now.ticks);
@@ -200,10 +252,12 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
     while (status == GT_OK) {
         double next;
         if (GT_CLOCKS || GT_MODES) status = gt_handle_events(it, &events);
-        next = GT_CLOCKS ? gt_next_sample(it, end) : INFINITY;
+        if (status == GT_OK) status = gt_next_turn(it, &turn);
+        next = fmin(GT_CLOCKS ? gt_next_sample(it, end) : INFINITY, turn);
         if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);
         if (!event && it->now.time >= end) break;
     }
+    it->stepping = 0;
     if (status != GT_OK && !it->now.stale) gt_step_back(it);
     it->time = it->now.time;
     *reached = it->now.time;

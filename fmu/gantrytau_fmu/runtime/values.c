@@ -62,7 +62,7 @@ static gt_status gt_get(gt_instance *it, unsigned reference, double *value) {
         }
         break;
     case GT_INDICATOR: {
-        double indicators[GT_ROOM(GT_MODES)] = {0};
+        double indicators[GT_ROOM(GT_INDICATORS)] = {0};
         status = gt_get_indicators(it, indicators);
         if (status == GT_OK) *value = indicators[variable->index];
         break;

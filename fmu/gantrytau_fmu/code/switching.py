@@ -1,0 +1,122 @@
+"""What switches in the equations of an FMU: modes, which are known between two events, and margins, whose zeros turn them.
+
+Only what motions depend on gets a mode that is kept; what outputs alone look at follows from its margin wherever it is
+asked for. Both ways of solving the blocks share the modes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from gantrytau import Dae
+from gantrytau.compiler.alphabets import Substitution
+from gantrytau.compiler.blocks.pattern import Pattern
+from gantrytau.compiler.system import System
+from gantrytau.compiler.translated import solved
+from gantrytau.language.piecewise import Turn
+from gantrytau.simulation.events.margins import ROUNDING
+from gantrytau.simulation.events.modes import InModes, in_modes, sorted_out
+from gantrytau.simulation.state_sizes import nominal_sizes
+from gantrytau_fmu.code.arrays import column
+
+
+@dataclass(frozen=True, eq=False)
+class WithModes:
+    """A model whose equations hold modes; laws: those of its frictions, (coulomb, smooth, breakaway) each."""
+
+    dae: Dae
+    pieces: InModes
+    laws: tuple[tuple[ca.SX, ca.SX, ca.SX], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Switching:
+    """Turns of which each margin holds modes before it only, in the symbols of a system.
+
+    noise: what rounding makes of a margin that is zero, without that of the time; timed: whether a margin is linear in
+    time and holds nothing else that moves; conditions: what they ask for, in the model's words; outside: the other modes,
+    as what they are.
+    """
+
+    turns: tuple[Turn, ...]
+    noise: ca.SX
+    timed: tuple[bool, ...]
+    conditions: tuple[str, ...]
+    outside: Substitution
+
+    @property
+    def modes(self) -> ca.SX:
+        """Symbols of the modes."""
+        return column([turn.mode for turn in self.turns])
+
+    @property
+    def margins(self) -> ca.SX:
+        """They pass zero, or a whole number where a mode counts."""
+        return column([ca.densify(turn.margin) for turn in self.turns])
+
+
+def written(dae: Dae) -> WithModes:
+    """The equations of a model with modes, its blocks solved anew; as they are where nothing switches."""
+    frictions = dae.flat.frictions
+    known = {
+        f"{f.force} {k}": dae.to_reduced(e)
+        for f in frictions
+        for k, e in enumerate((f.coulomb, f.smooth, f.breakaway))
+    }
+    pieces = in_modes(dae, known)
+    found = list(pieces.known.values())
+    laws = tuple((found[k], found[k + 1], found[k + 2]) for k in range(0, len(found), 3))
+    if not pieces.switched.switches:
+        return WithModes(dae, pieces, laws)
+    start = {dae.flat.time.name(): 0.0, **dae.table.values, **dae.start}
+    start = {**dae.start, **pieces.numbers(start)}
+    indexed = replace(dae.indexed, residuals=pieces.residuals)
+    dae = replace(dae, indexed=indexed, start=start)
+    pattern = Pattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
+    return WithModes(replace(dae, blocks=solved(dae, pattern).blocks), pieces, laws)
+
+
+def moving(system: System, laws: Sequence[tuple[ca.SX, ...]]) -> ca.SX:
+    """What motions depend on."""
+    frictions = system.dae.flat.frictions
+    speeds = [system.dae.expression(name) for f in frictions for name in (f.speed, f"der({f.speed})")]
+    of_frictions = system.to_system([*speeds, *(e for law in laws for e in law)]) if frictions else []
+    return column([system.ode, system.residuals, *of_frictions])
+
+
+def switching(found: WithModes, system: System, also: frozenset[str] = frozenset()) -> Switching:
+    """The turns that the motions of a system depend on; also: names of modes that are kept beside."""
+    way = Substitution(system.definitions)
+    needed = [
+        moving(system, found.laws),
+        *(t.mode for t in found.pieces.switched.switches if t.mode.name() in also),
+    ]
+    turns, outside = sorted_out(found.pieces.switched.switches, needed, way)
+    return Switching(
+        turns=tuple(turns),
+        noise=_noise(system, column([ca.densify(turn.margin) for turn in turns])),
+        timed=tuple(_is_timed(system, turn.margin) for turn in turns),
+        conditions=tuple(found.pieces.asked(turn.mode.name(), found.dae) for turn in turns),
+        outside=outside,
+    )
+
+
+def _noise(system: System, margins: ca.SX) -> ca.SX:
+    if not margins.numel():
+        return margins
+    nominal: Mapping[str, float] = nominal_sizes(system.dae)
+    sizes = ca.SX(ca.DM([nominal.get(name, 1.0) for name in system.dae.choice.states]))
+    terms = ca.fabs(ca.jacobian(margins, system.time) * system.time)
+    if system.x.numel():
+        terms += ca.fabs(ca.jacobian(margins, system.x)) @ ca.fmax(ca.fabs(system.x), sizes)
+    if system.z.numel():
+        terms += ca.fabs(ca.jacobian(margins, system.z)) @ ca.fabs(system.z)
+    return ROUNDING * ca.densify(terms)
+
+
+def _is_timed(system: System, margin: ca.SX) -> bool:
+    rate = ca.jacobian(margin, system.time)
+    return not (
+        ca.depends_on(margin, ca.vertcat(system.x, system.z, system.u)) or ca.depends_on(rate, system.time)
+    )
