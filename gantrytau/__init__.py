@@ -20,6 +20,10 @@ from gantrytau.errors import (
 )
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
+from gantrytau.inputs.deterministic_signals import chirp, multisine, steps
+from gantrytau.inputs.input_signal import InputSignal
+from gantrytau.inputs.random_signals import prbs, white_noise
+from gantrytau.inputs.samples import Samples
 from gantrytau.interruption import heeding_interrupts
 from gantrytau.language.declarations import (
     Array,
@@ -90,6 +94,7 @@ __all__ = [
     "GantryTauError",
     "InitializationError",
     "Input",
+    "InputSignal",
     "LinearSystem",
     "Linearization",
     "Mechanism",
@@ -100,6 +105,7 @@ __all__ = [
     "Propagated",
     "Real",
     "Result",
+    "Samples",
     "SolveError",
     "Start",
     "StateSelect",
@@ -116,6 +122,7 @@ __all__ = [
     "ceil",
     "check",
     "check_member",
+    "chirp",
     "connect",
     "constraint",
     "cos",
@@ -140,10 +147,12 @@ __all__ = [
     "logic_not",
     "logic_or",
     "mod",
+    "multisine",
     "norm_2",
     "outer",
     "parameter_text",
     "parameters_of",
+    "prbs",
     "pre",
     "read_parameters",
     "read_toml",
@@ -157,6 +166,7 @@ __all__ = [
     "sin",
     "split_derivative",
     "sqrt",
+    "steps",
     "stick_slip",
     "study",
     "tan",
@@ -165,5 +175,6 @@ __all__ = [
     "time",
     "translate",
     "when",
+    "white_noise",
     "with_setting",
 ]

@@ -19,7 +19,7 @@ PACKAGES = {
     "gantrytau_fmu": ROOT / "fmu" / "gantrytau_fmu",
 }
 ORDER = {  # a room imports the rooms before it
-    "gantrytau": "errors interruption whole_files progress language flattening compiler results simulation writing "
+    "gantrytau": "errors interruption whole_files progress language flattening compiler results inputs simulation writing "
     "answers dae ensembles __init__ kinematics mechanics commands cli",
     "gantrytau_models": "prototypes mechanisms control __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "

@@ -60,10 +60,10 @@ class Run:
         self.sizes = self.integrators.sizes
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Times, states, algebraics, and what is held, at the output points that were reached."""
+        """Times, states, algebraics, and what is sampled and held, at the output points that were reached."""
         trail = self.trail
         kept = trail.kept[trail.kept <= self.done]
-        return trail.t[kept], trail.x[kept], trail.z[kept], trail.held[kept]
+        return trail.t[kept], trail.x[kept], trail.z[kept], trail.rows(kept)
 
     def largest(self) -> np.ndarray:
         """The largest absolute value of each state so far."""
@@ -92,7 +92,10 @@ class Run:
                 forward = (
                     self.done > before
                 )  # else places were only laid closer, and nothing is sampled twice
-                if turned or (forward and trail.stops[self.done]):
+                stopped = forward and bool(trail.stops[self.done])
+                if stopped and trail.twice(self.done):
+                    self._jump()
+                if turned or stopped:
                     if forward:
                         self._renew(self.done)
                     self._turn(by_states=turned)
@@ -122,6 +125,13 @@ class Run:
                 raise run_ends.sampled_badly(self.coordinates.dae, t, name)
         trail.held[k, : due.size][due] = new[due]
         trail.z[k] = self._settled(k)
+
+    def _jump(self) -> None:
+        """From the place before a jump of inputs to that behind it."""
+        trail, k = self.trail, self.done
+        trail.x[k + 1], trail.z[k + 1], trail.held[k + 1] = trail.x[k], trail.z[k], trail.held[k]
+        self.done = k + 1
+        trail.z[k + 1] = self._settled(k + 1)
 
     def _settled(self, k: int) -> np.ndarray:
         """The algebraics of a place."""
@@ -267,7 +277,7 @@ class Run:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
         trail = self.trail
         h = np.diff(trail.t[here : here + count + 1])
-        if not trail.samples and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
+        if not trail.courses and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
             length = (trail.t[here + count] - trail.t[here]) / count
             return np.repeat(np.array([[trail.t[here], length, 0, *trail.held[here]]]).T, count, axis=1)
         inputs = trail.rows(np.arange(here, here + count)).T

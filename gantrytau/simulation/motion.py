@@ -16,7 +16,7 @@ from gantrytau.simulation.dependents import definitions_of, dependents
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.signals import PiecewiseLinear, Signal
+from gantrytau.simulation.signals import SampledCourse, Signal
 from gantrytau.simulation.singular_poses import Conditioning
 
 
@@ -26,7 +26,7 @@ def all_coordinates(
     """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
     without value, or a sampled one that has to be differentiated.
     """
-    sampled = tuple(n for n in dae.known if isinstance(signals.get(n), PiecewiseLinear))
+    sampled = tuple(n for n in dae.known if isinstance(signals.get(n), SampledCourse))
     held = tuple(s.name for s in dae.flat.sampled)
     w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held)), ca.SX.sym("t0")
     chains, given = dae.reduced.chains, dependents(dae)
@@ -180,7 +180,7 @@ def _known_symbols(
     for name in dae.inputs:
         signal = signals.get(name)
         top = max((k for b, k in map(split_derivative, occurring) if b == name), default=0)
-        if isinstance(signal, PiecewiseLinear):
+        if isinstance(signal, SampledCourse):
             if top > 0:
                 raise ModelError(
                     f"input {name} is differentiated {top} times by the model, which samples do not allow; give "

@@ -5,7 +5,7 @@ residuals of Bennett's linkage no three hold it all the way round. Where a run s
 that were kept are still sound, others are chosen there, and it starts anew.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,14 +16,13 @@ from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.results.result import Result
 from gantrytau.simulation.integration import Run
-from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.to_result import result_of
 
 SOUND = 0.1  # of the independence of all constraints, that those kept must have where others take their place
 LOOKED_AT = 64  # places of a run at most
 
 
-def other_constraints(run: Run, signals: Mapping[str, Signal]) -> tuple[np.ndarray, Translated] | None:
+def other_constraints(run: Run) -> tuple[np.ndarray, Translated] | None:
     """Times that are left of a run that stopped, and the model from the first of them on with other constraints; None where
     there are no others. The times are places of the run, as even as these.
     """
@@ -31,7 +30,7 @@ def other_constraints(run: Run, signals: Mapping[str, Signal]) -> tuple[np.ndarr
     if not dae.redundant or dae.flat.sampled or not run.done:
         return None
     places = np.unique(np.linspace(0, run.done, min(run.done, LOOKED_AT) + 1).astype(int))
-    course = _numbers(run, signals, places)
+    course = _numbers(run, places)
     sound = soundness(dae.flat, dae.table, frozenset(dae.known), dae.redundant, course)
     there = int(np.flatnonzero(sound > SOUND)[-1]) if np.any(sound > SOUND) else 0
     if places[there] in (
@@ -49,11 +48,11 @@ def other_constraints(run: Run, signals: Mapping[str, Signal]) -> tuple[np.ndarr
     return np.unique(run.trail.t[places[there] :]), found
 
 
-def _numbers(run: Run, signals: Mapping[str, Signal], places: np.ndarray) -> list[dict[str, float]]:
+def _numbers(run: Run, places: np.ndarray) -> list[dict[str, float]]:
     """All variables and their derivatives by name at some places."""
     trail = run.trail
-    rows = trail.t[places], trail.x[places], trail.z[places], trail.held[places]
-    found = result_of(run.coordinates, signals, *rows, None)
+    rows = trail.t[places], trail.x[places], trail.z[places], trail.rows(places)
+    found = result_of(run.coordinates, *rows, None)
     return [{name: float(found[name][k]) for name in found.names} for k in range(len(places))]
 
 

@@ -1,6 +1,6 @@
 """From states over time to a Result with every variable of the model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -10,7 +10,6 @@ from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.language.units import dimension, unit_text
 from gantrytau.results.result import Result
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.signals import PiecewiseLinear, Signal
 
 HUGE = 1e100  # no quantity is that large
 SHOWN = 4  # names in a warning
@@ -18,18 +17,14 @@ SHOWN = 4  # names in a warning
 
 def result_of(
     coordinates: Coordinates,
-    signals: Mapping[str, Signal],
     times: np.ndarray,
     x: np.ndarray,
     z: np.ndarray,
-    held: np.ndarray,
+    w: np.ndarray,
     outputs: Sequence[str] | None,
 ) -> Result:
-    """Every variable and derivative (or only `outputs`) at the given times."""
+    """Every variable and derivative (or only `outputs`) at the given times; w: what is sampled, held and switched there."""
     dae = coordinates.dae
-    samples = [signals[n] for n in coordinates.sampled]
-    values = [np.interp(times, s.times, s.values) for s in samples if isinstance(s, PiecewiseLinear)]
-    w = np.vstack([*values, np.zeros((len(values), times.size)), held.T])
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
     (found,) = coordinates.inserted([expressions])
@@ -37,7 +32,7 @@ def result_of(
     function = ca.Function(
         "variables", [time, coordinates.x, coordinates.z, coordinates.w], [ca.densify(found)]
     )
-    rows = np.array(function(times[None, :], x.T, z.T, w))
+    rows = np.array(function(times[None, :], x.T, z.T, w.T))
     rows = (
         rows.reshape(len(names), -1) if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)
     )

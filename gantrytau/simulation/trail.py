@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gantrytau.simulation.events.instants_on_mesh import instants
+from gantrytau.simulation.events.instants_on_mesh import instants, on_mesh
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.signals import PiecewiseLinear, Signal
+from gantrytau.simulation.signals import SampledCourse, Signal
 
 LEAST_STEPS = (
     500  # between places at which singular poses and switches are looked for, whatever points are asked for
@@ -16,16 +16,18 @@ LEAST_STEPS = (
 class Trail:
     """Places in order of time: t (n,) in s, which repeats where something jumps, before and behind; x, z: states and
     algebraics, a row each; held: what is held from there on, sampled variables, then modes; due: which of the former
-    are sampled there; stops: whether an integration ends there; kept: places of the output points.
+    are sampled there; driven: inputs that are given by samples, behind their jumps; stops: whether an integration ends
+    there; kept: places that results show.
     """
 
     def __init__(
         self, coordinates: Coordinates, signals: Mapping[str, Signal], grid: np.ndarray, spans: np.ndarray
     ):
         """spans: of time, (n, 2) in s, at whose ends an integration ends."""
-        samples = {n: s for n, s in signals.items() if isinstance(s, PiecewiseLinear)}
-        self.samples = [samples[n] for n in coordinates.sampled]
-        knots = np.concatenate([s.times for s in self.samples]) if self.samples else np.array([])
+        self.courses = [s for n in coordinates.sampled if isinstance(s := signals[n], SampledCourse)]
+        self._constant = np.array([s.held for s in self.courses], dtype=bool)
+        self._knots = [on_mesh(grid, s.times) for s in self.courses]
+        knots = np.concatenate([grid[:1], *self._knots])
         knots = knots[(knots > grid[0]) & (knots < grid[-1])]
         parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
         fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
@@ -36,11 +38,16 @@ class Trail:
         periods = np.array([table.number(s.period) for s in events])
         found = instants(mesh, coordinates.held, periods)
         self.t, self.due = found.mesh, found.due
+        self.driven = self._values(self.t)
+        before = self._doubled(max(grid.size, LEAST_STEPS), len(coordinates.switches) > 0)
         self.stops = np.asarray(self.due.any(axis=1))
         self.stops[-1] = True
+        self.stops[before] = True
         self.stops[np.searchsorted(self.t, spans[:, 0], side="right") - 1] = True
         self.stops[np.minimum(np.searchsorted(self.t, spans[:, 1]), self.last)] = True
-        self.kept: np.ndarray = np.searchsorted(self.t, grid)
+        self.kept: np.ndarray = np.searchsorted(self.t, grid, side="right") - 1
+        if before.size <= max(grid.size, LEAST_STEPS):
+            self.kept = np.unique(np.concatenate([self.kept, before, before + 1]))
         size = self.t.size
         self.x = np.full((size, len(coordinates.states)), np.nan)
         self.z = np.full((size, len(coordinates.algebraics)), np.nan)
@@ -59,18 +66,45 @@ class Trail:
         """Number of intervals from a place to the next stop."""
         return 1 + int(np.argmax(self.stops[k + 1 :]))
 
+    def twice(self, k: int) -> bool:
+        """Whether there is a second place at this time, behind a jump of the inputs."""
+        return k < self.last and bool(self.t[k + 1] == self.t[k])
+
     def inputs(self, k: int) -> np.ndarray:
         """Values and slopes of the sampled inputs on the interval behind a place, and what is held there."""
-        t = self.t[k]
-        h = self.t[min(k + 1, self.last)] - t
-        values = np.array([np.interp(t, s.times, s.values) for s in self.samples])
-        after = np.array([np.interp(t + h, s.times, s.values) for s in self.samples])
-        slopes = (after - values) / h if h > 0 else 0.0 * values
-        return np.concatenate([values, slopes, self.held[k]])
+        return self.rows(np.array([k]))[0]
 
     def rows(self, places: np.ndarray) -> np.ndarray:
         """The inputs at places, a row each."""
-        return np.array([self.inputs(k) for k in places]) if self.samples else self.held[places]
+        if not self.courses:
+            return self.held[places]
+        after = np.minimum(places + 1, self.last)
+        h = (self.t[after] - self.t[places])[:, None]
+        rise = np.where(self._constant, 0.0, self.driven[after] - self.driven[places])
+        slopes = np.divide(rise, h, out=np.zeros_like(rise), where=h > 0)
+        return np.hstack([self.driven[places], slopes, self.held[places]])
+
+    def _values(self, times: np.ndarray) -> np.ndarray:
+        """The sampled inputs at times, (n, inputs), behind their jumps."""
+        found = np.empty((times.size, len(self.courses)))
+        for column, (course, knots) in enumerate(zip(self.courses, self._knots, strict=True)):
+            row = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, None)
+            found[:, column] = course.values[row] if course.held else np.interp(times, knots, course.values)
+        return found
+
+    def _doubled(self, most: int, always: bool) -> np.ndarray:
+        """Lay a place before each one in which an input jumps, unless there are too many to be shown; where they are.
+
+        always: lay them anyway, for what switches by inputs.
+        """
+        jumps = 1 + np.flatnonzero(np.any(np.diff(self.driven[:, self._constant], axis=0) != 0, axis=1))
+        if jumps.size > most and not always:
+            return np.zeros(0, dtype=int)
+        before = np.where(self._constant, self.driven[jumps - 1], self.driven[jumps])
+        self.t = np.insert(self.t, jumps, self.t[jumps])
+        self.due = np.insert(self.due, jumps, False, axis=0)
+        self.driven = np.insert(self.driven, jumps, before, axis=0)
+        return jumps + np.arange(jumps.size)
 
     def insert(self, k: int, times: np.ndarray, *, stop: bool = False) -> None:
         """Add places behind place k; nothing is known of them yet but what is held from k on."""
@@ -78,6 +112,8 @@ class Trail:
         self.t = np.insert(self.t, at, times)
         self.stops = np.insert(self.stops, at, stop)
         self.due = np.insert(self.due, at, False, axis=0)
+        driven = np.where(self._constant, self.driven[k], self._values(times))
+        self.driven = np.insert(self.driven, at, driven, axis=0)
         self.x = np.insert(self.x, at, np.nan, axis=0)
         self.z = np.insert(self.z, at, np.nan, axis=0)
         self.held = np.insert(self.held, at, self.held[k], axis=0)

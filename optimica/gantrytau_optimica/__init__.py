@@ -1,5 +1,6 @@
 """Optimisation of models written with gantrytau, in the style of Optimica, and calibration of robots."""
 
+from gantrytau import Samples
 from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_optimum
 from gantrytau_optimica.answers.archive.run_record import compare_records, run_record, write_record
 from gantrytau_optimica.answers.archive.saved_optimum import MissingGuess, SavedOptimum
@@ -46,7 +47,6 @@ from gantrytau_optimica.problem.optimization import (
     link,
     sum_of_squares,
 )
-from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, load_plan
 from gantrytau_optimica.procedure.cells.cell_example import cell_example
 from gantrytau_optimica.procedure.cells.cell_file import Cell, read_cell

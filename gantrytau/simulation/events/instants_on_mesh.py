@@ -26,7 +26,7 @@ def instants(mesh: np.ndarray, names: Sequence[str], periods: np.ndarray) -> Ins
     period so short that the simulation would not end.
     """
     begin, end = mesh[0], mesh[-1]
-    same = max(SAME * np.min(periods, initial=np.inf), 8 * np.spacing(max(abs(begin), abs(end))))
+    same = max(SAME * np.min(periods, initial=np.inf), _rounding(mesh))
     times: dict[float, np.ndarray] = {}
     for name, period in zip(names, periods.tolist(), strict=True):
         if (end - begin) / period > MOST or period < 4 * same:
@@ -43,6 +43,17 @@ def instants(mesh: np.ndarray, names: Sequence[str], periods: np.ndarray) -> Ins
     for column, period in enumerate(periods.tolist()):
         due[_nearest(mesh, times[period]), column] = True
     return Instants(mesh, due)
+
+
+def on_mesh(mesh: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Times, those that differ from one of the mesh by rounding only put there."""
+    near = mesh[_nearest(mesh, times)]
+    return np.where(np.abs(near - times) <= _rounding(mesh), near, times)
+
+
+def _rounding(mesh: np.ndarray) -> float:
+    """What times of a mesh may differ by and be the same, s."""
+    return 8 * float(np.spacing(max(abs(mesh[0]), abs(mesh[-1]))))
 
 
 def _nearest(mesh: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -6,12 +6,11 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from gantrytau import Dae, ModelError
+from gantrytau import Dae, ModelError, Samples
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import Course, Phase, SampleSum
 from gantrytau_optimica.control.input_rates import Rates
 from gantrytau_optimica.problem.optimization import Point, Target
-from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, LinkedPaths, SymbolicProblem
 
 Conditions = tuple[list[Point], list[ConstraintRow]]

@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, ModelError, der
+from gantrytau import Model, ModelError, Samples, der
 from gantrytau.errors import did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.flattening.shapes import check_shape, numpy_shape
@@ -22,7 +22,6 @@ from gantrytau_optimica.estimation.experiments import Experiment, is_free
 from gantrytau_optimica.problem.optimization import Free, Optimization, sum_of_squares
 from gantrytau_optimica.problem.problem_checks import static
 from gantrytau_optimica.problem.read_problem import read_problem
-from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 PART = re.compile(r"([A-Za-z_]\w*)((?:\[\d+(?:, ?\d+)*\])?)")

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Samples
 from gantrytau_optimica.problem.optimization import Free, Optimization
-from gantrytau_optimica.problem.samples import Samples
 
 EXPECTED = 0.01  # of the spread of the data: their noise, until the fit tells it
 FEW_ALIKE = 4  # values, from which on equal ones are no accident
@@ -20,7 +19,7 @@ class Experiment:
     """One experiment; names are those of the model.
 
     measured: name -> Samples or (times, values); a static model takes values (n,) without times as well, one row each.
-    inputs: name -> number, function of time, Samples, (times, values), or values for a static model.
+    inputs: name -> number, function of time, Samples, a signal as `prbs`, or values for a static model.
     start: initial values, name -> number or array; `Free(guess, min=..., max=...)` where it is estimated too.
     parameters: those that are known to be other than declared here, or `Free(...)` where this experiment has its own.
     guess: name -> number, array or function of time, beside the measured courses.

@@ -14,9 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, ModelError, Parameter
+from gantrytau import Model, ModelError, Parameter, Samples
 from gantrytau.flattening.shapes import numpy_shape
-from gantrytau_optimica.problem.samples import Samples
 
 
 class Free(Parameter):
@@ -56,7 +55,8 @@ class Optimization(Model):
                 yield final(self.cart.s) == 1
 
     given: the complete list of what stays known, as in `translate`; empty: the optimiser chooses all inputs.
-    inputs: courses of those that it does not choose, by name: numbers, functions of time, (times, values) or Samples.
+    inputs: courses of those that it does not choose, by name: numbers, functions of time, Samples, or signals
+    as `prbs`.
     A component that is an Optimization itself is a phase: it has a clock, objective and limits of its own, and this
     problem may add an objective and conditions on values at times, `yield link(self.first, self.second)` among them.
     A problem without derivatives and time is a static one: its signals have one value.

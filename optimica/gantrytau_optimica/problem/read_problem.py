@@ -8,13 +8,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Dae, InitializationError, ModelError, Parameter, StructureError, translate
+from gantrytau import Dae, InitializationError, ModelError, Parameter, Samples, StructureError, translate
 from gantrytau.compiler.request import names
 from gantrytau.errors import told
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
+from gantrytau.inputs.input_signal import with_course
 from gantrytau.language.functions import Between
 from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.symbols import writing
@@ -34,7 +35,6 @@ from gantrytau_optimica.problem.problem_checks import (
     check_times,
 )
 from gantrytau_optimica.problem.problem_units import check_problem_units
-from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import (
     ConstraintRow,
     LinkedPaths,
@@ -201,16 +201,27 @@ def _courses(name: str, stages: list[tuple[str, Any]], dae: Dae) -> dict[str, ca
                         f"{name}: {element} is no input here, expected one of {', '.join(dae.inputs)}; take it out of "
                         "`inputs`, or name it in `given`"
                     )
-            if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
-                value = told(f"{name}, input {full}", partial(Samples, *value))
-            if isinstance(value, Samples):
-                value.check_shape(f"input {full}", dae.flat.shape(full))
-                found.update((e, (value, k)) for k, e in enumerate(elements))
+            place, shape = f"input {full}", dae.flat.shape(full)
+            course = told(
+                name, lambda f=full, v=value, s=shape, o=one: with_course(f, v, s, lambda: _horizon(f, o))
+            )
+            if isinstance(course, Samples):
+                course.check_shape(place, shape)
+                found.update((e, (course, k)) for k, e in enumerate(elements))
             else:
-                found.update(
-                    {n: s for n, s in read_signals({full: value}, dae.flat).items() if isinstance(s, ca.SX)}
-                )
+                signals = read_signals({full: course}, dae.flat, (0.0, 1.0))
+                found.update({n: s for n, s in signals.items() if isinstance(s, ca.SX)})
     return found
+
+
+def _horizon(name: str, one: Any) -> tuple[float, float]:
+    """Start and final time of a problem or a phase, in s; ModelError unless they are numbers."""
+    times = one.start_time, one.final_time
+    if not all(isinstance(t, (int, float, np.number)) for t in times):
+        raise ModelError(
+            f"{name} is held from time to time, which needs fixed times; give start_time and final_time as numbers"
+        )
+    return float(times[0]), float(times[1])
 
 
 def _scalar(place: str, evaluate: Callable[[], Any]) -> ca.SX:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau import Dae, ModelError
+from gantrytau import Dae, ModelError, Samples
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.problem.optimization import Point, Target
-from gantrytau_optimica.problem.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -170,11 +170,11 @@ def test_the_same_course_in_other_phases_has_its_own_time():
         ),
         (
             {"inputs": {"model.u": Samples([0.0, 1.5], [1.0, 2.0])}},
-            "input model.u: samples from 0 to 1.5 s do not cover the horizon from 0 to 2 s",
+            "input model.u: samples cover 0 to 1.5 s, expected 0 to 2 s",
         ),
         (
             {"inputs": {"model.u": Samples([0.5, 1.5], [1.0, 2.0], kind="constant")}},
-            "do not cover the horizon from 0 to 2 s",
+            "samples cover 0.5 to 1.5 s, expected 0 to 2 s",
         ),
         (
             {"inputs": {"model.u": Samples([0, 0.1, 0.2, 2], [1, 2, 3, 4])}},

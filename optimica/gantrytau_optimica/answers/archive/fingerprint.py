@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau import Samples
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
-from gantrytau_optimica.problem.samples import Samples
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 PACKAGES = ("gantrytau", "casadi", "numpy", "scipy")

@@ -1,57 +1,67 @@
-"""Measured signals: values at times, checked when they are told."""
+"""Values of signals at times, measured or chosen, checked when they are told."""
 
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau.errors import ModelError
 from gantrytau.flattening.shapes import fits
 
 LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, across which nothing is known
+SMALL = 1e-9  # of a run, by which samples may fail to cover it: ends of times are sums
+SAME = 8  # roundings of a time, within which two times are one: 3 * 0.1 is not 0.3
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Samples:
-    """Measured values of k signals at n times.
+    """Values of k signals at n times, as an input over time or as what was measured.
 
-    times: (n,) in s, rising; values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of what they are
-    compared with; deviation: standard deviation of one value, a number or of the shape of one or of all samples; 1 where
-    it is not known, which `weighted` tells; kind: "linear" or "constant" (each value holds until the next) between
-    samples; largest_gap: s, distance of two samples beyond which the course between them is unknown (default: ten
-    times the median distance). Raises ModelError for NaN, for repeated or unsorted times, and for shapes that do not fit.
+    times: (n,) in s, rising; values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of what they are given
+    for; they are kept as columns, (n, k). kind: between samples "linear", or "constant": each value holds from its time
+    until the next, and the last from then on. deviation: standard deviation of one measured value, a number or of the
+    shape of one or of all samples; 1 where it is not known, which `weighted` tells. largest_gap: s, distance of two
+    samples beyond which an estimation takes the course between them for unknown (default: ten times the median distance).
+    Raises ModelError for NaN, for repeated or unsorted times, and for shapes that do not fit.
     """
 
-    def __init__(
-        self,
-        times: Any,
-        values: Any,
-        *,
-        deviation: Any = None,
-        kind: Literal["linear", "constant"] = "linear",
-        largest_gap: float | None = None,
-    ):
-        self.times = _numbers("times", times)
-        self.values = _numbers("values", values)
-        if self.values.ndim == 1:
-            self.values = self.values[:, None]
-        if (
-            self.times.ndim != 1
-            or self.values.ndim not in (2, 3)
-            or self.values.shape[0] != self.times.size
-            or not self.times.size
-        ):
+    times: Any
+    values: Any
+    _: KW_ONLY
+    kind: Literal["linear", "constant"] = "linear"
+    deviation: Any = None
+    largest_gap: float | None = None
+    shape: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self):
+        times, values = _numbers("times", self.times), _numbers("values", self.values)
+        if values.ndim == 1:
+            values = values[:, None]
+        if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[0] != times.size or not times.size:
             raise ModelError(
-                f"Samples: found times of shape {np.shape(times)} and values of shape {np.shape(values)}, expected (n,) and "
-                "(n,), (n, k) or (n, rows, columns)"
+                f"Samples: found times of shape {np.shape(self.times)} and values of shape {np.shape(self.values)}, "
+                "expected (n,) and (n,), (n, k) or (n, rows, columns)"
             )
-        self.shape = self.values.shape[1:]
-        self.values = self._as_columns(self.values)
-        if kind not in ("linear", "constant"):
-            raise ModelError(f"Samples: found kind={kind!r}, expected 'linear' or 'constant'")
-        self.kind = kind
+        if self.kind not in ("linear", "constant"):
+            raise ModelError(f"Samples: found kind={self.kind!r}, expected 'linear' or 'constant'")
+        object.__setattr__(self, "shape", values.shape[1:])
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", self._as_columns(values))
+        for array in (self.times, self.values):
+            array.flags.writeable = False
         self._check()
-        self.weighted = deviation is not None
-        self.deviations = self._deviations(1.0 if deviation is None else deviation)
-        self.largest_gap = largest_gap
+        _ = self.deviations  # so that a wrong one is told at once
+
+    @property
+    def weighted(self) -> bool:
+        """Whether deviations were told."""
+        return self.deviation is not None
+
+    @cached_property
+    def deviations(self) -> np.ndarray:
+        """Standard deviations of all values, (n, k)."""
+        return self._deviations(1.0 if self.deviation is None else self.deviation)
 
     def __repr__(self) -> str:
         return f"<Samples: {self.times.size} of {self.values.shape[1]}, {self.times[0]:g} to {self.times[-1]:g} s>"
@@ -63,9 +73,9 @@ class Samples:
     def _check(self) -> None:
         bad = np.flatnonzero(~(np.isfinite(self.times) & np.all(np.isfinite(self.values), axis=1)))
         if bad.size:
+            more = f" (and {bad.size - 1} more)" if bad.size > 1 else ""
             raise ModelError(
-                f"Samples: row {bad[0]} is not finite (and {bad.size - 1} more), expected numbers; leave such rows out, "
-                "times and values"
+                f"Samples: row {bad[0]} is not finite{more}, expected numbers; leave such rows out, times and values"
             )
         step = np.diff(self.times)
         if np.any(step == 0):
@@ -102,9 +112,21 @@ class Samples:
                 words += f": samples of shape {self.shape} for a matrix {shape}; give values of shape (n, rows, columns)"
             raise ModelError(f"{place}: {words}")
 
+    def check_cover(self, what: str, start: float, final: float) -> None:
+        """ModelError unless the course is known from start to final, s."""
+        small, (first, last) = SMALL * abs(final - start), self.times[[0, -1]]
+        if first <= start + small and (last >= final - small or self.kind == "constant"):
+            return
+        remedy = "add samples or take a shorter time"
+        if first <= start + small and self.times.size == 1:
+            remedy = "add samples, or say kind='constant'"
+        raise ModelError(
+            f"{what}: samples cover {first:g} to {last:g} s, expected {start:g} to {final:g} s; {remedy}"
+        )
+
     def require(self, what: str, start: float, final: float, between: bool) -> None:
         """ModelError if samples lie outside of the horizon; with `between`, if they do not cover it or have a gap."""
-        small = 1e-9 * max(1.0, abs(final - start))
+        small = SMALL * abs(final - start)
         if not between:
             outside = np.flatnonzero((self.times < start - small) | (self.times > final + small))
             if outside.size:
@@ -113,11 +135,7 @@ class Samples:
                     f"{self.times[outside[0]]:g} s; leave them out or change the horizon"
                 )
             return
-        if self.times[0] > start + small or (self.times[-1] < final - small and self.kind == "linear"):
-            raise ModelError(
-                f"{what}: samples from {self.times[0]:g} to {self.times[-1]:g} s do not cover the horizon from {start:g} to "
-                f"{final:g} s; shorten the horizon or add samples"
-            )
+        self.check_cover(what, start, final)
         step = np.diff(self.times)
         if step.size < 2:
             return
@@ -133,7 +151,8 @@ class Samples:
         """The course of one column between the samples, (m,)."""
         if self.kind == "linear":
             return np.interp(times, self.times, self.values[:, column])
-        row = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, self.times.size - 1)
+        within = SAME * np.spacing(np.abs(times))
+        row = np.clip(np.searchsorted(self.times, times + within, side="right") - 1, 0, self.times.size - 1)
         return self.values[row, column]
 
     def jumps(self, column: int) -> np.ndarray:
@@ -149,6 +168,6 @@ class Samples:
 
 def _numbers(what: str, values: Any) -> np.ndarray:
     try:
-        return np.asarray(values, dtype=float)
+        return np.array(values, dtype=float)
     except (TypeError, ValueError):
         raise ModelError(f"Samples: found {what} {values!r}, expected numbers") from None

@@ -1,0 +1,1 @@
+"""What comes from outside over time: samples, random signals, test signals."""
