@@ -36,8 +36,8 @@ class Coordinates:
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
     inputs, their slopes, values of the held variables, modes of the switches); substitutions: all symbols in terms of
-    (t, x, z, w), one after the other; pieces: the equations with modes; renewed: what the held variables become at an
-    instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
+    (t, x, z, w), one after the other; pieces: the equations with modes; renewal, renewed: what the held variables become
+    at an instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
     """
 
     dae: Translated
@@ -59,6 +59,7 @@ class Coordinates:
     pieces: InModes
     switches: Switches
     dropped: ca.Function
+    renewal: ca.SX
     renewed: ca.Function
     conditioning: Conditioning
     sizes: tuple[float, ...] = ()

@@ -15,6 +15,7 @@ from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
+from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
 from gantrytau.simulation.trail import LEAST_STEPS, Trail
@@ -58,6 +59,8 @@ class Run:
         self.events: list[float] = []  # times at which states made something switch
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, end)
         self.sizes = self.integrators.sizes
+        sampler = Sampler(coordinates, tolerance, self.sizes, longest)
+        self.sampler = sampler if sampler.suits else None
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics, and what is sampled and held, at the output points that were reached."""
@@ -78,6 +81,11 @@ class Run:
         with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
             while self.done < trail.last:
+                progress.at(trail.t[self.done])
+                if self.integrators.pressed:
+                    raise KeyboardInterrupt
+                if self._sampled():
+                    continue
                 before, count = self.done, min(size, trail.stretch(self.done))
                 try:
                     turned = self._advance(count)
@@ -99,9 +107,36 @@ class Run:
                     if forward:
                         self._renew(self.done)
                     self._turn(by_states=turned)
-                progress.at(trail.t[self.done])
-                if self.integrators.pressed:
-                    raise KeyboardInterrupt
+            if self.integrators.pressed:
+                raise KeyboardInterrupt
+
+    def _sampled(self) -> bool:
+        """Go on from sample to sample in explicit steps; whether that led on."""
+        here = self.done
+        found = self.sampler.over(self.trail, here, self._shorter()) if self.sampler else 0
+        if not found:
+            return False
+        self.done = here + found
+        self._watch(here, self.done)
+        self._hold_together(self.trail.shown(here, self.done))
+        if self.trail.twice(self.done):
+            self._jump()
+            self._renew(self.done)
+        self._turn()
+        return True
+
+    def _shorter(self) -> float | None:
+        """The longest step of what lies ahead, s, where a function of time changes after it was at rest."""
+        t = self.trail.t[self.done : self.done + 2]
+        return self.pulses.step if self.pulses.within(float(t.sum()) / 2) else None
+
+    def _hold_together(self, places: np.ndarray) -> None:
+        """SolveError if constraints that were left out as redundant no longer hold at places."""
+        trail = self.trail
+        opened = self.coordinates.opened(trail.x[places], trail.t[places], trail.rows(places))
+        if opened is not None and places[opened[0]] - 1 < self.done:
+            self.done = int(places[opened[0]]) - 1
+            raise run_ends.opened(self.coordinates.dae, float(trail.t[self.done]), opened[1])
 
     def _longest(self) -> int:
         """The most intervals that are integrated at once."""
@@ -238,8 +273,7 @@ class Run:
         trail.held[here + 1 : here + count + 1] = trail.held[here]
         ahead = np.arange(here, here + count + 1)
         courses = self._courses(here, count) if self.coordinates.stepwise else None
-        within = self.pulses.within(float(trail.t[here] + trail.t[here + 1]) / 2)
-        self.integrators.shorter = self.pulses.step if within else None
+        self.integrators.shorter = self._shorter()
         x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
         if self._too_wide(count):
             return False
@@ -253,10 +287,7 @@ class Run:
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place
         self._watch(here, self.done)
-        opened = self.coordinates.opened(trail.x[reached], trail.t[reached], inputs)
-        if opened is not None and here + opened[0] < self.done:
-            self.done = here + opened[0]
-            raise run_ends.opened(self.coordinates.dae, float(trail.t[self.done]), opened[1])
+        self._hold_together(reached)
         return found is not None and self._cross(found)
 
     def _too_wide(self, count: int) -> bool:

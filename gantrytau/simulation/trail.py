@@ -70,6 +70,11 @@ class Trail:
         """Whether there is a second place at this time, behind a jump of the inputs."""
         return k < self.last and bool(self.t[k + 1] == self.t[k])
 
+    def shown(self, first: int, last: int) -> np.ndarray:
+        """The places behind the first that results show, and the last."""
+        own = self.kept[np.searchsorted(self.kept, first, side="right") : np.searchsorted(self.kept, last)]
+        return np.append(np.unique(own), last)
+
     def inputs(self, k: int) -> np.ndarray:
         """Values and slopes of the sampled inputs on the interval behind a place, and what is held there."""
         return self.rows(np.array([k]))[0]

@@ -99,7 +99,7 @@ class Switches:
         sign = np.where(self._counts, 1.0, 2 * modes - 1)
         first = sign * margins.values - np.where(self._counts, modes, 0.0)
         counts = self._counts
-        second = modes[counts] + 1 - margins.values[:, counts]
+        second = modes[..., counts] + 1 - margins.values[:, counts]
         return Margins(
             np.hstack([first, second]),
             np.hstack([sign * margins.rates, -margins.rates[:, counts]]),

@@ -1,0 +1,199 @@
+"""The way of a model that samples along the places of its trail, hundreds in one call, as far as nothing else happens.
+
+Where the explicit method needs too many steps, or something switches between two instants, the integrator takes over.
+"""
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.errors import SolveError
+from gantrytau.simulation.events.crossings import first_crossing
+from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.sampling.passage import Passage, passage
+from gantrytau.simulation.sampling.runge_kutta import ORDER
+from gantrytau.simulation.trail import Trail
+
+CALLS = (1, 8, 64, 512)  # passages in one call
+MOST = 256  # steps from place to place: with more, an implicit method is quicker, though it starts anew
+SAFETY = 0.9  # of the step that the last error suggests
+SHRINK, GROW = 0.2, 5.0  # of a step, at once
+TRIALS = 12  # of one step
+LONGEST_WAIT = 1000  # stretches of the integrator
+
+
+class Sampler:
+    """Goes along a trail in explicit steps.
+
+    tolerance: of one step, relative, and absolute in units of sizes (n,) of the states; longest: step, s.
+    """
+
+    def __init__(self, coordinates: Coordinates, tolerance: float, sizes: np.ndarray, longest: float | None):
+        self.coordinates, self.tolerance, self.sizes = coordinates, tolerance, sizes
+        self.longest = np.inf if longest is None else longest
+        self.step = np.inf  # s, that the last errors allow
+        self.most = CALLS[1]  # passages in the next call
+        self.wait = self.waited = 0  # asked in vain, times, before and since the last trial
+        self._passage: Passage | None = None
+        self._calls: dict[int, ca.Function] = {}
+
+    @property
+    def suits(self) -> bool:
+        """Whether the model is of a kind that can go this way: what it samples, without algebraic unknowns."""
+        c = self.coordinates
+        if not c.held or c.algebraics or not c.states:
+            return False
+        switches, half = c.switches, 2 * len(c.sampled)
+        timed = ca.vertcat(
+            *(turn.margin for turn, by_time in zip(switches.turns, switches.timed, strict=True) if by_time)
+        )
+        changing = c.w[: half + len(c.held), :]
+        return not (timed.numel() and ca.depends_on(ca.SX(timed), changing))
+
+    def over(self, trail: Trail, here: int, shorter: float | None) -> int:
+        """Fill the places behind `here` with states and what is held from there on; how many were reached.
+
+        shorter: step, s, while a function of time changes after it was at rest. 0 where this way does not lead on.
+        """
+        if self.waited < self.wait:
+            self.waited += 1
+            return 0
+        longest = min(self.longest, np.inf if shorter is None else shorter)
+        last = self._last(trail, here)
+        for _ in range(TRIALS):
+            reached, turned = self._call(trail, here, last, min(self.step, longest))
+            if reached and not self._held_to_constraints(trail, here, here + reached):
+                break
+            if reached:
+                self.wait = self.waited = 0
+            if reached or turned:
+                return reached
+            if trail.t[here + 1] - trail.t[here] > MOST * min(self.step, longest):
+                break
+        self.step, self.most = np.inf, CALLS[1]
+        self.wait, self.waited = min(max(1, 2 * self.wait), LONGEST_WAIT), 0
+        return 0
+
+    def _held_to_constraints(self, trail: Trail, first: int, last: int) -> bool:
+        """Project the places that results show, and the last; False where that fails: the integrator may come nearer."""
+        places = trail.shown(first, last)
+        try:
+            projected = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(places))
+        except SolveError:
+            return False
+        trail.x[places] = projected
+        return True
+
+    def _last(self, trail: Trail, here: int) -> int:
+        """The next place at which an integration ends, but for what is due or inputs that jump, or the last."""
+        jumps = np.diff(trail.t[here + 1 :], append=np.inf) == 0
+        ends = trail.stops[here + 1 :] & ~jumps & ~trail.due[here + 1 :].any(axis=1)
+        return here + 1 + int(np.argmax(ends)) if ends.any() else trail.last
+
+    def _call(self, trail: Trail, here: int, last: int, step: float) -> tuple[int, bool]:
+        """Places reached by one call, and whether it ended early because something switches."""
+        t = trail.t[here : min(last, here + self.most) + 1]
+        parts = np.maximum(np.ceil(np.diff(t) / step * (1 - 1e-12)), 1).astype(int)
+        ends = np.cumsum(parts)
+        wanted = max(min(int(ends[-1]), self.most), int(parts[0]))
+        sizes = [k for k in CALLS if parts[0] <= k <= wanted] or [k for k in CALLS if k >= wanted][:1]
+        if not sizes:
+            return 0, False
+        size = sizes[-1]
+        count = int(np.searchsorted(ends, size, side="right"))
+        parts, ends = parts[:count], ends[:count]
+        places = np.arange(here, here + count + 1)
+        y, e3, e5, u = self._passages(trail, places, parts, size)
+        h, rows = u[1], ends - 1
+        before = np.hstack([self._state(trail, here)[:, None], y[:, :-1]])
+        error = self._error(before, y, h, e3, e5)
+        good = int(np.argmax(error > 1)) if np.any(error > 1) else error.size
+        self._adapt(error[: good + 1], h)
+        accepted = int(np.searchsorted(ends, good, side="right"))
+        turn = self._first_turn(before, y, u, int(ends[accepted - 1]) if accepted else 0)
+        reached = accepted if turn is None else int(np.searchsorted(ends, turn, side="right"))
+        n = self.sizes.size
+        there = y[:, rows[:reached]].T
+        trail.x[places[1 : reached + 1]], trail.held[places[1 : reached + 1]] = there[:, :n], there[:, n:]
+        self.most = min(size * 8, CALLS[-1]) if reached == count else max(CALLS[0], size // 8)
+        return reached, turn is not None
+
+    def _state(self, trail: Trail, k: int) -> np.ndarray:
+        return np.concatenate([trail.x[k], trail.held[k]])
+
+    def _passages(
+        self, trail: Trail, places: np.ndarray, parts: np.ndarray, size: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """States and error estimates behind each of the steps, and what they were told, a column each."""
+        t, half = trail.t[places], 2 * len(self.coordinates.sampled)
+        interval = np.repeat(np.arange(parts.size), parts)
+        inner = np.arange(interval.size) - np.repeat(np.cumsum(parts) - parts, parts)
+        h = (np.diff(t) / parts)[interval]
+        due = trail.due[places[1:]][interval] & (inner == parts[interval] - 1)[:, None]
+        w = trail.rows(places)[:, :half]
+        u = np.vstack([t[interval] + inner * h, h, t[interval], due.T, w[interval].T, w[interval + 1].T])
+        u = np.hstack([u, np.repeat(u[:, -1:], size - interval.size, axis=1)])
+        u[1, interval.size :] = 0.0  # what is left of the call stands still
+        u[3 : 3 + due.shape[1], interval.size :] = 0.0
+        y, e3, e5 = (
+            np.array(f)[:, : interval.size]
+            for f in self._function(size)(self._state(trail, int(places[0])), u)
+        )
+        return y, e3, e5, u[:, : interval.size]
+
+    def _function(self, size: int) -> ca.Function:
+        if size not in self._calls:
+            self._passage = self._passage or passage(self.coordinates)
+            function = self._passage.function
+            self._calls[size] = function if size == 1 else function.mapaccum(f"passages_{size}", size)
+        return self._calls[size]
+
+    def _error(
+        self, before: np.ndarray, y: np.ndarray, h: np.ndarray, e3: np.ndarray, e5: np.ndarray
+    ) -> np.ndarray:
+        """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""
+        n = self.sizes.size
+        with np.errstate(invalid="ignore", over="ignore"):
+            scale = self.tolerance * (self.sizes[:, None] + np.maximum(np.abs(before[:n]), np.abs(y[:n])))
+            third, fifth = (np.abs(e / scale).max(axis=0) for e in (e3, e5))
+            whole = np.sqrt(fifth**2 + 0.01 * third**2)
+            error = h * fifth**2 / np.where(whole > 0, whole, 1.0)
+        return np.where(np.isfinite(error) & np.isfinite(y).all(axis=0), error, np.inf)
+
+    def _adapt(self, error: np.ndarray, h: np.ndarray) -> None:
+        """Choose the next step from errors, of which the last may be above the tolerance."""
+        k = int(np.argmax(error))
+        if error[k] > 1:
+            self.step = h[error.size - 1] * max(SHRINK, SAFETY * error[-1] ** (-1 / ORDER))
+        elif error[k] > 0:
+            self.step = h.max() * min(GROW, max(1.0, SAFETY * error[k] ** (-1 / ORDER)))
+        else:
+            self.step = GROW * h.max()
+
+    def _first_turn(self, before: np.ndarray, y: np.ndarray, u: np.ndarray, count: int) -> int | None:
+        """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
+        c = self.coordinates
+        switches, n, m = c.switches, len(c.states), len(c.held)
+        assert self._passage is not None
+        live = np.array([k not in self._passage.by_held for k in range(len(switches))], dtype=bool)
+        if not live.any() or not count:
+            return None
+        start = 3 + m
+        inputs = u[start : start + (u.shape[0] - start) // 2, :count]
+        half = inputs.shape[0] // 2
+        values, slopes = inputs[:half], inputs[half:]
+        own, no_z = before[n:, :count], np.zeros((count, 0))
+
+        def gaps(x: np.ndarray, t: np.ndarray) -> Margins:
+            w = np.vstack([values + slopes * (t - u[2, :count]), slopes, own]).T
+            return switches.gaps(switches.look(x.T, no_z, t, w, self.sizes), own[m:].T)
+
+        t = u[0, :count]
+        near, far = gaps(before[:n, :count], t), gaps(y[:n, :count], t + u[1, :count])
+        chosen = np.concatenate([live, live[[turn.counts for turn in switches.turns]]])
+        both = [
+            np.stack([a, b], axis=1).reshape(2 * count, -1)[:, chosen]
+            for a, b in ((near.values, far.values), (near.rates, far.rates), (near.noise, far.noise))
+        ]
+        found = first_crossing(np.stack([t, t + u[1, :count]], axis=1).ravel(), Margins(*both))
+        return None if found is None else (found.place + 1) // 2

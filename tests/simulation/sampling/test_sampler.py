@@ -1,0 +1,125 @@
+"""Models that sample go from place to place in explicit steps: exact solutions, and the integrator as a second route."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from gantrytau import Model, Parameter, Real, Samples, der, fabs, if_else, sampled, simulate, sin, translate
+from gantrytau.simulation.sampling.runge_kutta import one_step
+from gantrytau.simulation.sampling.sampler import Sampler
+from tests.simulation.sampled_models import Held
+
+TOLERANCE = 1e-9
+NEAR = 1e-8  # ten times the tolerance of the result
+
+
+def both_ways(monkeypatch, model, names, **arguments):
+    """Values of variables, (2, names, times): in explicit steps, and with the integrator started anew at each instant."""
+    dae = translate(model, events=True)
+    quick = simulate(dae, tolerance=TOLERANCE, **arguments)
+    calls = []
+    monkeypatch.setattr(Sampler, "suits", property(lambda self: calls.append(1) or False))
+    slow = simulate(dae, tolerance=TOLERANCE, **arguments)
+    assert calls
+    return np.array([[found[n] for n in names] for found in (quick, slow)])
+
+
+def test_a_step_has_order_eight_and_estimates_of_its_error():
+    t, x, h = (ca.SX.sym(n) for n in "txh")
+    step = ca.Function("step", [t, x, h], one_step(lambda t, x: x * ca.cos(t), t, x, h))
+    errors, fifth = [], []
+    for n in (4, 8):
+        at = ca.DM(1.0)
+        for k in range(n):
+            at, _, e5 = step(2.0 * k / n, at, 2.0 / n)
+            fifth.append(abs(float(e5)))
+        errors.append(abs(float(at) - np.exp(np.sin(2.0))))
+    assert 7.5 < np.log2(errors[0] / errors[1]) < 9.5
+    assert (
+        np.log2(max(fifth[:4]) / max(fifth[4:])) > 4.5
+    )  # a rate: one less than the order of the step's own error
+
+
+class Oscillator(Model):
+    """A mass on a spring, held by a discrete controller with an integral part; gains are plain numbers, so no units."""
+
+    m = Parameter(2.0, description="mass")
+    c = Parameter(300.0, description="stiffness")
+    x = Real(description="position", start=0.3, fixed=True)
+    v = Real(description="speed", start=0.0, fixed=True)
+    f = Real(description="sampled force")
+    integral = Real(description="sampled integral part")
+
+    def equations(self):
+        yield self.v == der(self.x)
+        yield self.m * der(self.v) == self.f - self.c * self.x
+        yield sampled(self.integral, self.integral - 20.0 * self.x, period=0.02)
+        yield sampled(self.f, -5.0 * self.v + self.integral, period=0.02)
+
+
+def test_a_linear_plant_moves_as_the_matrix_exponential_says():
+    found = simulate(Oscillator(), stop=2.0, points=101, tolerance=1e-11)
+    flow = np.array([[0.0, 1.0, 0.0], [-150.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
+    x, v, integral = 0.3, 0.0, 0.0
+    for k in range(101):
+        f, integral = -5.0 * v + integral, integral - 20.0 * x
+        row = [found[n][k] for n in ("x", "v", "f", "integral")]
+        assert np.abs(np.array(row) - [x, v, f, integral]).max() < 1e-10, k  # ten times the tolerance
+        x, v, _ = expm(0.02 * flow) @ [x, v, f]
+
+
+class Bounded(Oscillator):
+    """The same with a limit of the force, a stop that is hit, and friction."""
+
+    held = Real(description="limited force")
+    low = Real(description="force of the stop and of friction")
+
+    def equations(self):
+        yield self.v == der(self.x)
+        yield self.held == ca.fmax(-1.0, ca.fmin(self.f, 6.0))
+        yield self.low == if_else(self.x > 0.1, 400.0 * (0.1 - self.x), 0.0) - 0.3 * fabs(self.v) * self.v
+        yield self.m * der(self.v) == self.held - self.c * self.x + self.low + sin(self.v)
+        yield sampled(self.integral, self.integral - 20.0 * self.x, period=0.03)
+        yield sampled(self.f, -5.0 * self.v + self.integral, period=0.02)
+
+
+@pytest.mark.parametrize("points", [2, 77, 1001])
+def test_switches_of_states_and_of_what_is_held_are_those_of_the_integrator(monkeypatch, points):
+    names = ["x", "v", "f", "integral", "held"]
+    quick, slow = both_ways(monkeypatch, Bounded(), names, stop=2.0, points=points)
+    assert np.abs(quick - slow).max() < 10 * NEAR  # gains of 5 and 20
+    assert points < 3 or np.ptp(slow[4]) == 7.0  # both limits are met
+
+
+def test_a_stiff_plant_is_left_to_the_integrator_and_right(monkeypatch):
+    class Stiff(Oscillator):
+        lag = Real(description="fast lag of the force", start=0.0, fixed=True)
+
+        def equations(self):
+            yield self.v == der(self.x)
+            yield der(self.lag) == 1e7 * (self.f - self.lag)
+            yield self.m * der(self.v) == self.lag - self.c * self.x
+            yield sampled(self.f, -5.0 * self.v, period=0.02)
+            yield sampled(self.integral, self.integral + 1, period=0.02)
+
+    quick, slow = both_ways(monkeypatch, Stiff(c=200.0), ["x", "v", "integral"], stop=0.2, points=11)
+    assert np.abs(quick - slow).max() < NEAR
+    lagged = simulate(Oscillator(c=200.0), stop=0.02, points=3)
+    assert abs(quick[0][0] - lagged["x"][0]) < NEAR
+
+
+@pytest.mark.parametrize("kind", ["linear", "constant"])
+def test_samples_as_inputs_have_corners_between_instants(monkeypatch, kind):
+    t = np.linspace(0.0, 1.0, 334)
+    wanted = np.random.default_rng(3).uniform(-0.1, 0.1, t.size)
+    names = ["slide.x", "slide.v", "control.force"]
+    found = both_ways(
+        monkeypatch,
+        Held(),
+        names,
+        stop=1.0,
+        points=51,
+        inputs={"control.wanted": Samples(t, wanted, kind=kind)},
+    )
+    assert np.abs(found[0] - found[1]).max() < 50 * NEAR  # the gain
