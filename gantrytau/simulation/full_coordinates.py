@@ -36,8 +36,8 @@ class Coordinates:
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
     that the model samples; known: expression of each known symbol in time and w (values of the sampled
     inputs, their slopes, values of the held variables, modes of the switches); substitutions: all symbols in terms of
-    (t, x, z, w), one after the other; pieces: the equations with modes; renewal, renewed: what the held variables become
-    at an instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
+    (t, x, z, w), one after the other; pieces: the equations with modes; renewal: what the held variables become at an
+    instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
     """
 
     dae: Translated
@@ -60,7 +60,6 @@ class Coordinates:
     switches: Switches
     dropped: ca.Function
     renewal: ca.SX
-    renewed: ca.Function
     conditioning: Conditioning
     sizes: tuple[float, ...] = ()
 
@@ -133,6 +132,12 @@ class Coordinates:
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
+
+    @cached_property
+    def renewed(self) -> ca.Function:
+        """The renewal as a function of x, z, t, t0, w."""
+        arguments = [self.x, self.z, time, self.t0, self.w]
+        return ca.Function("renewed", arguments, [ca.densify(self.renewal)], {"cse": True})
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""

@@ -78,7 +78,6 @@ def all_coordinates(
         switches=Switches(turns, arguments, ode, algebraic),
         dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        renewed=ca.Function("renewed", arguments, [ca.densify(renewed)], {"cse": True}),
         conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
     )
 
