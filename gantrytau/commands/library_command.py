@@ -32,21 +32,22 @@ def library(json: Json = False) -> None:
 
 
 def components() -> dict[str, dict[str, str]]:
-    """Module of gantrytau.mechanics -> class -> first line of its docstring."""
-    from gantrytau import mechanics
+    """Module of gantrytau.mechanics, and the packages of one list -> class -> first line of its docstring."""
+    from gantrytau import blocks, mechanics
 
     found: dict[str, dict[str, str]] = {}
-    for info in pkgutil.iter_modules(mechanics.__path__, f"{mechanics.__name__}."):
-        if info.name.rpartition(".")[2].startswith("_"):
+    below = [info.name for info in pkgutil.iter_modules(mechanics.__path__, f"{mechanics.__name__}.")]
+    for path in (*below, blocks.__name__):
+        if path.rpartition(".")[2].startswith("_"):
             continue
-        module = importlib.import_module(info.name)
+        module = importlib.import_module(path)
         classes = {
             name: value
             for name, value in vars(module).items()
             if isinstance(value, type) and issubclass(value, Declared) and _belongs(name, value, module)
         }
         if classes:
-            found[info.name] = _explained(classes)
+            found[path] = _explained(classes)
     return found
 
 

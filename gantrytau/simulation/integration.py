@@ -292,17 +292,16 @@ class Run:
 
     def _too_wide(self, count: int) -> bool:
         """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
-        if not len(self.coordinates.switches):
-            return False
         parts = (self.integrators.steps - STARTING) // (STEPS_BETWEEN * count)
-        if parts < 2:
+        if parts < 2 or not len(self.coordinates.switches):
             return False
-        trail, here = self.trail, self.done
-        for k in reversed(range(here, min(here + max(count, REFINED), trail.last))):
+        trail, here, last = self.trail, self.done, self.trail.last
+        least = max(SHORT**2 * self.span, self.integrators.shorter or 0.0)  # steps kept short say nothing
+        for k in reversed(range(here, min(here + max(count, REFINED), last))):
             times = np.linspace(trail.t[k], trail.t[k + 1], int(parts) + 1)[1:-1]
-            if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > SHORT**2 * self.span):
+            if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > least):
                 trail.insert(k, times)
-        return True
+        return trail.last > last
 
     def _courses(self, here: int, count: int) -> np.ndarray:
         """What the integrator is told of each interval: start, length, number, and the inputs."""

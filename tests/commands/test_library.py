@@ -13,6 +13,9 @@ def test_the_library_lists_models_components_and_prototypes(answer):
     assert set(found["models"]) == set(gantrytau_models.__all__) - {"prototypes", "SerialWrist", "WithWrist"}
     assert Prismatic.__doc__ is not None
     assert found["components"]["gantrytau.mechanics.multibody"]["Prismatic"] in Prismatic.__doc__
+    assert (
+        found["components"]["gantrytau.blocks"]["Limiter"] == "y = u, at least `lower` and at most `upper`."
+    )
     assert found["prototypes"]["L1"] == prototypes.L1.source
     assert {"D1", "GT_A", "F1_printed"} <= found["prototypes"].keys()
 

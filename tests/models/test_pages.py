@@ -9,7 +9,14 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
-    "page", ["gantrytau/README.md", "gantrytau/mechanics/README.md", "models/README.md"], ids=str
+    "page",
+    [
+        "gantrytau/README.md",
+        "gantrytau/mechanics/README.md",
+        "gantrytau/blocks/README.md",
+        "models/README.md",
+    ],
+    ids=str,
 )
 def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
