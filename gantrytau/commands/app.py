@@ -15,6 +15,7 @@ from gantrytau.commands.library_command import library
 from gantrytau.commands.optimize_command import optimize
 from gantrytau.commands.printing.reporting import Commands
 from gantrytau.commands.simulate_command import simulate
+from gantrytau.commands.study_command import study
 
 app = typer.Typer(
     cls=Commands,
@@ -46,6 +47,9 @@ app.command(epilog="Example: gantrytau check 'GantryTau(D1)'")(check)
 app.command(
     epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"
 )(simulate)
+app.command(
+    epilog="Example: gantrytau study --example > swings.toml && gantrytau study swings.toml --plot x"
+)(study)
 app.command(
     epilog="Example: gantrytau calibrate measurements.csv --robot 'GantryTau(L1)' --set arms[0].length=1.52"
 )(calibrate)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.ensembles.cases import Case
+from gantrytau.ensembles.cases import Case, spoken
 from gantrytau.ensembles.labelled_array import common_times, on_times
 from gantrytau.errors import ModelError
 from gantrytau.results.figures import check_suffix, finished
@@ -60,13 +60,17 @@ def draw_fan(
 
 
 def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
-    """One line for each case, from dark to light in their order; labelled where they are few."""
+    """One line for each case; where they are many, one colour for each value of the name that was given first."""
     import matplotlib.pyplot as plt
 
-    colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(cases)))
-    for colour, (case, result) in zip(colours, cases, strict=True):
-        label = str(case) if len(cases) <= LABELS else None
-        axis.plot(result.time, result[name], color=colour, linewidth=1.0, label=label)
+    words = [str(case) for case, _ in cases]
+    if len(cases) > LABELS:
+        words = [f"{key}={spoken(value)}" for key, value in (next(iter(c.names.items())) for c, _ in cases)]
+    groups = list(dict.fromkeys(words))
+    colours = dict(zip(groups, plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(groups))), strict=True))
+    for text, (_, result) in zip(words, cases, strict=True):
+        label = text if len(groups) <= LABELS or text in (groups[0], groups[-1]) else None
+        axis.plot(result.time, result[name], color=colours[text], linewidth=1.0, label=label)
 
 
 def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from gantrytau.ensembles.cases import SEED, Axes, Case
@@ -22,7 +23,8 @@ class FunctionTask:
     @property
     def name(self) -> str:
         """Of the function."""
-        return getattr(self.function, "__name__", type(self.function).__name__)
+        inner = self.function.func if isinstance(self.function, partial) else self.function
+        return getattr(inner, "__name__", type(inner).__name__)
 
 
 def function_task(function: Any, axes: Axes, unused: Mapping[str, Any]) -> FunctionTask:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau.ensembles.cases import SEED, Axes, Case, FailedCase, equal, spoken
@@ -11,6 +12,7 @@ from gantrytau.ensembles.labelled_array import labelled
 from gantrytau.ensembles.workers.worker import Outcome
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.results.result import Result
+from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
     import xarray
@@ -77,6 +79,18 @@ class Study:
         returns mappings. With combine="zip" there is one axis, "case", along which names have coordinates.
         """
         return labelled(self.axes, self.cases, self.values, self.title)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write `to_xarray()` as netCDF, .nc; an existing file is replaced only when the new one is complete."""
+        path = Path(path)
+        if path.suffix != ".nc":
+            raise ModelError(
+                f"{path}: found the suffix '{path.suffix}', expected .nc; name it {path.stem}.nc"
+            )
+        table = self.to_xarray()
+        with replacing(path) as partial:
+            table.to_netcdf(partial, engine="h5netcdf")
+        return path
 
     def plot(self, *names: str, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Draw variables of all cases over time: a line for each, or the middle and bands that hold 50 and 90 % of many.

@@ -1,15 +1,18 @@
 """Random pose pairs in the workspace of the L1 robot: does every motion converge from its straight line?"""
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache, partial
+from time import process_time
 from typing import Any
 
 import numpy as np
 
-from gantrytau import Parameter, SolveError
+from gantrytau import Parameter, SolveError, Study, study
 from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_models import prototypes
-from gantrytau_optimica import final, initial, prepare
+from gantrytau_optimica import Prepared, final, initial, prepare
 
 LOW, HIGH = (0.0, 2.4, -1.1), (1.8, 3.5, 0.0)  # m, the workspace that the thesis draws in its Figure 2.4
 LEAST_REACH = (
@@ -20,7 +23,7 @@ LEAST_DISTANCE = 0.2  # m
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one pair; time in s, or nan."""
+    """What became of one pair; time in s, or nan; seconds: of the processor."""
 
     start: tuple[float, ...]
     end: tuple[float, ...]
@@ -31,37 +34,49 @@ class Verdict:
     seconds: float
 
 
-def sweep(count: int, seed: int, **policy: Any) -> Iterator[Verdict]:
-    """Minimum-time motions on free paths between `count` random pairs of poses; the program is built once."""
-    free = FreePath
+class BetweenPoses(FreePath):
+    """The free motion between poses that are parameters."""
 
-    class BetweenPoses(free):
-        """The free motion between poses that are parameters."""
+    start_pose = Parameter([0.0, 2.51, -1.03], shape=3, unit="m", description="where the tool starts")
+    end_pose = Parameter([1.711, 3.46, -0.24], shape=3, unit="m", description="where the tool ends")
 
-        start_pose = Parameter([0.0, 2.51, -1.03], shape=3, unit="m", description="where the tool starts")
-        end_pose = Parameter([1.711, 3.46, -0.24], shape=3, unit="m", description="where the tool ends")
+    def constraints(self):
+        yield initial(self.robot.tool.r) == self.start_pose
+        yield final(self.robot.tool.r) == self.end_pose
+        yield initial(self.robot.tool.v) == 0
+        yield final(self.robot.tool.v) == 0
 
-        def constraints(self):
-            yield initial(self.robot.tool.r) == self.start_pose
-            yield final(self.robot.tool.r) == self.end_pose
-            yield initial(self.robot.tool.v) == 0
-            yield final(self.robot.tool.v) == 0
 
-    prepared = prepare(BetweenPoses, parameters=["start_pose", "end_pose"], **policy)
-    for start, end in pairs(count, seed):
-        try:
-            optimum = prepared.solve({"start_pose": start, "end_pose": end})
-        except SolveError as error:
-            optimum = error.optimum
-        yield Verdict(
-            tuple(start),
-            tuple(end),
-            optimum.success,
-            optimum.status,
-            optimum.final_time if optimum.success else float("nan"),
-            optimum.iterations,
-            optimum.solve_time,
-        )
+@cache
+def prepared(elements: int) -> Prepared:
+    """The problem, built once in each process."""
+    return prepare(BetweenPoses, parameters=["start_pose", "end_pose"], elements=elements)
+
+
+def fastest(start: np.ndarray, end: np.ndarray, elements: int = 50) -> Verdict:
+    """The minimum-time motion between two poses."""
+    problem, begun = prepared(elements), process_time()
+    try:
+        optimum = problem.solve({"start_pose": start, "end_pose": end})
+    except SolveError as error:
+        optimum = error.optimum
+    return Verdict(
+        tuple(start),
+        tuple(end),
+        optimum.success,
+        optimum.status,
+        optimum.final_time if optimum.success else float("nan"),
+        optimum.iterations,
+        process_time() - begun,
+    )
+
+
+def sweep(count: int, seed: int, elements: int = 50, **policy: Any) -> Study:
+    """Minimum-time motions on free paths between `count` random pairs of poses; policy: keywords of `study`."""
+    starts, ends = zip(*pairs(count, seed), strict=True)
+    return study(
+        partial(fastest, elements=elements), over={"start": starts, "end": ends}, combine="zip", **policy
+    )
 
 
 def pairs(count: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -86,8 +101,8 @@ def reach(tool: np.ndarray) -> float:
 
 
 if __name__ == "__main__":
-    verdicts = list(sweep(200, 1))
-    print(f"{sum(v.success for v in verdicts)} of {len(verdicts)} converged")
-    for verdict in verdicts:
+    found = sweep(200, 1, folder=sys.argv[1] if len(sys.argv) > 1 else None)
+    print(f"{sum(v.success for v in found.values)} of {len(found)} converged")
+    for verdict in found.values:
         if not verdict.success:
             print(verdict)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from gantrytau.commands.printing.reporting import CommandError, refusing, writable
 
 if TYPE_CHECKING:
-    from gantrytau import Result
+    from gantrytau import Result, Study
     from gantrytau_optimica import Optimum
 
 WINDOW = "window"
@@ -53,7 +53,7 @@ def _rehearse(to: str) -> None:
         raise CommandError(f"--to {to}: the folder '{file.parent}' does not exist; create it first")
 
 
-def draw(result: "Result | Optimum", names: tuple[str, ...], to: str) -> list[str]:
+def draw(result: "Result | Optimum | Study", names: tuple[str, ...], to: str) -> list[str]:
     """Draw the variables; the files written."""
     if to != WINDOW:
         with writable(Path(to)), refusing("--plot "):

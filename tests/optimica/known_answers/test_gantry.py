@@ -124,7 +124,7 @@ def test_an_unfinished_motion_can_be_looked_at(tmp_path):
 
 
 def test_random_pairs_of_poses_converge_from_their_straight_line():
-    verdicts = list(sweep(4, seed=7, elements=30))
+    verdicts = sweep(4, seed=7, elements=30).values
     assert [v.status for v in verdicts] == ["solved"] * 4
     for verdict, (start, end) in zip(verdicts, pairs(4, seed=7), strict=True):
         assert verdict.start == tuple(start)

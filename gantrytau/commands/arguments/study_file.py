@@ -1,0 +1,117 @@
+"""The file of a study: a model or a function, what varies, and what is the same in all cases."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gantrytau import did_you_mean, read_toml
+from gantrytau.commands.arguments.choice import Choice
+from gantrytau.commands.arguments.loading import load, similar
+from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.values import signal
+from gantrytau.commands.printing.reporting import CommandError, refusing
+
+RANGE = ("from", "to", "number")
+POLICY = (
+    "stop",
+    "start",
+    "tolerance",
+    "points",
+    "max_step",
+    "outputs",
+    "seeds",
+    "combine",
+    "where",
+    "folder",
+)
+TABLES = ("over", "set", "starts", "inputs")
+EXAMPLE = """\
+# gantrytau study swings.toml --plot x --to swings.png
+model = "Pendulum"    # as for the other commands: 'GantryTau(L1)', robot.py:Robot; or function = "moves.py:fastest"
+stop = 10.0           # s
+outputs = ["x", "y"]  # variables that are kept; without this line all
+combine = "grid"      # every combination; "zip" takes the first values of all names, then the second ones
+# seeds = 20          # every combination with seeds 0 to 19, of models with random inputs
+# folder = "swings"   # keeps finished cases; the same command goes on with the rest
+
+[over]                # parameters, start values, inputs
+L = [0.5, 1.0, 2.0]                       # m
+x = { from = 0.05, to = 0.45, number = 9 }  # m
+
+[set]                 # parameters that are the same in all cases
+damping = 0.02
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class StudyFile:
+    """What a file asks for: a model or a function with its name, and keywords of `study`."""
+
+    subject: Any
+    name: str
+    keywords: Mapping[str, Any]
+
+
+def read_study(file: Path) -> StudyFile:
+    """The study that a file describes; CommandError for what is missing, unknown or of the wrong kind."""
+    with refusing():
+        table = read_toml(file)
+    for key in table:
+        known = ("model", "function", *POLICY, *TABLES)
+        if key not in known:
+            raise CommandError(f"{file}: there is no key '{key}'{did_you_mean(key, known)}")
+    for key in TABLES:
+        if not isinstance(table.get(key, {}), dict):
+            raise CommandError(
+                f"{file}: found {key} = {table[key]!r}, expected a table: a line [{key}], then name = value"
+            )
+    if ("model" in table) == ("function" in table):
+        found = "both" if "model" in table else "neither"
+        raise CommandError(
+            f'{file}: found {found} of model and function, expected one, as model = "Pendulum"'
+        )
+    key = "model" if "model" in table else "function"
+    if not isinstance(table[key], str):
+        raise CommandError(f"{file}: found {key} = {table[key]!r}, expected a name in quotes")
+    keywords = {k: table[k] for k in POLICY if k in table}
+    keywords["over"] = {name: _values(file, name, v) for name, v in table.get("over", {}).items()}
+    if key == "function":
+        return StudyFile(_function(file, table["function"]), table["function"], keywords)
+    for place, keyword in (("set", "parameters"), ("starts", "starts")):
+        if table.get(place):
+            keywords[keyword] = table[place]
+    if table.get("inputs"):
+        keywords["inputs"] = dict(signal(f"{name}={value}") for name, value in table["inputs"].items())
+    chosen = build(table["model"])
+    return StudyFile(chosen.model, chosen.name, keywords)
+
+
+def _values(file: Path, name: str, values: Any) -> Any:
+    """A list as it stands, or numbers from one to another."""
+    if not isinstance(values, dict):
+        return values
+    numbers = [values.get(key) for key in RANGE]
+    good = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in numbers)
+    if set(values) != set(RANGE) or not good or not isinstance(numbers[2], int) or numbers[2] < 2:
+        raise CommandError(
+            f"{file}: over.{name}: found {values!r}, expected a list, or {{ from = 0.1, to = 0.9, number = 9 }}"
+        )
+    first, last, count = numbers
+    return [first + (last - first) * k / (count - 1) for k in range(count)]
+
+
+def _function(file: Path, text: str) -> Any:
+    """The function of a Python file."""
+    choice = Choice.read(text)
+    if choice.file is None or not choice.name:
+        raise CommandError(
+            f"{file}: found function = '{text}', expected its file and name, as moves.py:fastest"
+        )
+    module = load(choice.file)
+    functions = {n: v for n, v in vars(module).items() if callable(v) and not n.startswith("_")}
+    if choice.name not in functions:
+        raise CommandError(
+            f"{file}: {choice.file.name} has no function '{choice.name}'{similar(choice.name, functions)}"
+        )
+    return functions[choice.name]
