@@ -1,9 +1,10 @@
 """The translated model: the frozen record that simulation, writing and the answers read."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -61,10 +62,18 @@ class Translated:
         counts = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.blocks)} blocks"
         return f"<{type(self).__name__} {self.name}: {counts}>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("made", "_numbers")}
+
     @property
     def name(self) -> str:
         """Class of the model."""
         return self.flat.name
+
+    @cached_property
+    def made(self) -> dict[Hashable, Any]:
+        """What was made of it at some cost, by what it was made for; released with it, and not sent along."""
+        return {}
 
     @cached_property
     def states(self) -> tuple[str, ...]:

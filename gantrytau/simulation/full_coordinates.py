@@ -1,7 +1,7 @@
 """The model with all its coordinates as states, for the integrator, and the constraints they must keep."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -133,11 +133,12 @@ class Coordinates:
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
-    @cached_property
+    @property
     def renewed(self) -> ca.Function:
         """The renewal as a function of x, z, t, t0, w."""
         arguments = [self.x, self.z, time, self.t0, self.w]
-        return ca.Function("renewed", arguments, [ca.densify(self.renewal)], {"cse": True})
+        found = ca.densify(self.renewal)
+        return self.kept("renewed", lambda: ca.Function("renewed", arguments, [found], {"cse": True}))
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""
@@ -147,8 +148,28 @@ class Coordinates:
         return found
 
     @cached_property
+    def made(self) -> dict[Hashable, Any]:
+        """Functions that were made of it, by what they are for; the same for all sizes."""
+        return {}
+
+    def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What was made for a key, made now if it is the first time."""
+        if key not in self.made:
+            self.made[key] = make()
+        return self.made[key]
+
+    def sized(self, sizes: tuple[float, ...]) -> "Coordinates":
+        """The same with other sizes of the states, for a new run."""
+        found = replace(self, sizes=sizes, conditioning=self.conditioning.anew())
+        found.__dict__["made"] = self.made
+        return found
+
+    @property
     def of_time(self) -> ca.SX:
         """Functions of time alone: known symbols, and equations that name the time, at the start and beside it."""
+        return self.kept("of time", self._of_time)
+
+    def _of_time(self) -> ca.SX:
         dae, rows = self.dae, []
         for key, leaves in dae.indexed.incidence.items():
             if any(leaf.root == time.name() for leaf in leaves):
@@ -170,7 +191,8 @@ class Coordinates:
     def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Consistent states, algebraics and modes at the start, with the inputs as they are then."""
         dae = self.dae
-        at = ca.Function("known", [time, self.t0, self.w], [ca.vertcat(*self.known.values())])
+        known = ca.vertcat(*self.known.values())
+        at = self.kept("known", lambda: ca.Function("known", [time, self.t0, self.w], [known]))
         values = {**dae.start, time.name(): t}
         if self.known:
             values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
@@ -196,8 +218,11 @@ class Coordinates:
                 return [self.dae.spoken(names[k]) for k in bad]
         return []
 
-    @cached_property
+    @property
     def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
+        return self.kept("levels", self._made_levels)
+
+    def _made_levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
         """Each level: its columns, the function to its residual and Jacobian, the names of its rows."""
         found = []
         positions = {n: k for k, n in enumerate(self.states)}
@@ -273,8 +298,11 @@ class Coordinates:
             before = size
         return z
 
-    @cached_property
+    @property
     def _algebra(self) -> ca.Function:
+        return self.kept("algebra", self._made_algebra)
+
+    def _made_algebra(self) -> ca.Function:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
         arguments = [self.x, self.z, time, self.t0, self.w]
         return ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})

@@ -6,7 +6,6 @@ import signal
 from collections.abc import Iterator
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -30,7 +29,6 @@ class Integrators:
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
-        self._made: dict[tuple[int, int, tuple[float, ...], float | None], ca.Function] = {}
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -80,7 +78,6 @@ class Integrators:
         integrator cannot make it better, gives up at once, and is asked for less.
         """
         before, self.size = self.size, float(np.abs(z).max(initial=1.0))
-        self._made.clear()
         return self.size > before
 
     def _integrate(
@@ -91,14 +88,16 @@ class Integrators:
         modes = tuple(np.reshape(u, (-1, count), order="F")[-own:, 0].tolist()) if own else ()
         limits = [step for step in (self.longest, self.shorter) if step is not None]
         longest = min(limits) / self.interval if limits else None
-        key = count, most, modes, longest
-        if key not in self._made:
-            self._made[key] = self.coordinates.integrator(
-                count, self.tolerance, size=self.size, steps=most, modes=modes, longest=longest
-            )
+        size, tolerance = self.size, self.tolerance
+        integrator = self.coordinates.kept(
+            ("integrator", count, most, modes, longest, size, tolerance, self.coordinates.sizes),
+            lambda: self.coordinates.integrator(
+                count, tolerance, size=size, steps=most, modes=modes, longest=longest
+            ),
+        )
         with contextlib.redirect_stderr(io.StringIO()), self._at_work():
-            found = self._made[key](x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)
-        self.steps = int(self._made[key].stats()["nsteps"])
+            found = integrator(x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)
+        self.steps = int(integrator.stats()["nsteps"])
         reached = np.array(found["xf"]).T * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")

@@ -28,6 +28,13 @@ class SampledCourse:
 Signal = ca.SX | SampledCourse  # an expression of time, or samples
 
 
+def signal_key(signal: Signal) -> tuple[str, object]:
+    """What makes two signals lead to the same equations."""
+    if isinstance(signal, SampledCourse):
+        return "samples", None
+    return "function", ca.Function("signal", [time], [signal]).serialize()
+
+
 def read_signals(
     given: Mapping[str, Any],
     flat: FlatModel,

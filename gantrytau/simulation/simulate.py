@@ -25,7 +25,7 @@ from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.other_constraints import joined, other_constraints
-from gantrytau.simulation.signals import Signal, read_signals
+from gantrytau.simulation.signals import Signal, read_signals, signal_key
 from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
 
@@ -106,7 +106,7 @@ def _all_runs(
     parts: list[Result] = []
     left = grid
     while True:
-        run, error = _sized_run(all_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
+        run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
         parts.append(result_of(run.coordinates, *run.so_far(), outputs))
         found = other_constraints(run) if isinstance(error, SolveError) else None
         if found is None:
@@ -125,6 +125,14 @@ def _all_runs(
     return result
 
 
+def _coordinates(dae: Translated, signals: Mapping[str, Signal], wanted: Sequence[str]) -> Coordinates:
+    """All coordinates of a model, made once for signals of one kind."""
+    key = "all coordinates", tuple(wanted), tuple((n, signal_key(s)) for n, s in sorted(signals.items()))
+    if key not in dae.made:
+        dae.made[key] = all_coordinates(dae, signals, wanted)
+    return dae.made[key]
+
+
 def _sized_run(
     coordinates: Coordinates,
     signals: Mapping[str, Signal],
@@ -135,7 +143,7 @@ def _sized_run(
     """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
     margin = MARGIN * (OFTEN if coordinates.dae.flat.sampled else 1.0)
     exact = max(margin * tolerance, min(LEAST, MARGIN * tolerance))
-    coordinates = replace(coordinates, sizes=first_sizes(coordinates))
+    coordinates = coordinates.sized(first_sizes(coordinates))
     left = ROUNDS
     while True:
         run = Run(coordinates, signals, grid, exact, max_step)
@@ -146,7 +154,7 @@ def _sized_run(
         sizes = seen_sizes(coordinates, run.largest()) if left else None
         if sizes is None:
             return run, None
-        coordinates, left = replace(coordinates, sizes=sizes), left - 1
+        coordinates, left = coordinates.sized(sizes), left - 1
 
 
 def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:

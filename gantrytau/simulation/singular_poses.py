@@ -13,6 +13,7 @@ walks up to the pose in steps that end before it.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import casadi as ca
@@ -81,6 +82,12 @@ class Conditioning:
         everything = ca.vertcat(*heads, *(ca.vec(m) for m in parts))
         self._function = ca.Function("conditioning", list(arguments), [everything], {"cse": True})
         self._scales: list[tuple[np.ndarray, np.ndarray, float]] = []
+
+    def anew(self) -> "Conditioning":
+        """The same for another run, which measures by its own start."""
+        found = copy(self)
+        found._scales = []
+        return found
 
     @property
     def needed(self) -> bool:

@@ -25,12 +25,8 @@ def result_of(
 ) -> Result:
     """Every variable and derivative (or only `outputs`) at the given times; w: what is sampled, held and switched there."""
     dae = coordinates.dae
-    names = _names(dae, outputs)
-    expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
-    (found,) = coordinates.inserted([expressions])
-    found = ca.substitute(found, coordinates.t0, time)
-    function = ca.Function(
-        "variables", [time, coordinates.x, coordinates.z, coordinates.w], [ca.densify(found)]
+    names, function = coordinates.kept(
+        ("variables", None if outputs is None else tuple(outputs)), lambda: _variables(coordinates, outputs)
     )
     rows = np.array(function(times[None, :], x.T, z.T, w.T))
     rows = (
@@ -41,6 +37,16 @@ def result_of(
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
     units, words = labels(dae)
     return Result(times, table, units=units, descriptions=words, title=dae.name)
+
+
+def _variables(coordinates: Coordinates, outputs: Sequence[str] | None) -> tuple[list[str], ca.Function]:
+    """Names of all variables and derivatives (or only `outputs`), and (t, x, z, w) -> their values."""
+    dae = coordinates.dae
+    names = _names(dae, outputs)
+    expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
+    (found,) = coordinates.inserted([expressions])
+    found = ca.densify(ca.substitute(found, coordinates.t0, time))
+    return names, ca.Function("variables", [time, coordinates.x, coordinates.z, coordinates.w], [found])
 
 
 def doubts(result: Result) -> str:
@@ -76,6 +82,13 @@ def _names(dae: Translated, outputs: Sequence[str] | None) -> list[str]:
 
 def labels(dae: Translated) -> tuple[dict[str, str], dict[str, str]]:
     """Units and descriptions by name, derivatives included."""
+    if "labels" not in dae.made:
+        dae.made["labels"] = _labels(dae)
+    units, words = dae.made["labels"]
+    return dict(units), dict(words)
+
+
+def _labels(dae: Translated) -> tuple[dict[str, str], dict[str, str]]:
     units: dict[str, str] = {}
     words: dict[str, str] = {}
     for variable in (*dae.flat.variables, *dae.flat.parameters):

@@ -1,5 +1,6 @@
 """One passage of a model that samples, from a place to the next: a step of its motion, then new values of what is due."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -26,31 +27,35 @@ class Passage:
 def passage(coordinates: Coordinates) -> Passage:
     """The passage of a model without algebraic unknowns."""
     sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
-    turns = coordinates.switches.turns
-    x = ca.SX.sym("x", len(coordinates.states))
-    own = ca.SX.sym("held", held + len(turns))
-    t, h, begin = (ca.SX.sym(name) for name in ("t", "h", "begin"))
-    due = ca.SX.sym("due", held)
-    inputs, later = ca.SX.sym("inputs", sampled), ca.SX.sym("later", sampled)
+    x = ca.MX.sym("x", len(coordinates.states))
+    own = ca.MX.sym("held", held + len(coordinates.switches))
+    t, h, begin = (ca.MX.sym(name) for name in ("t", "h", "begin"))
+    due = ca.MX.sym("due", held)
+    inputs, later = ca.MX.sym("inputs", sampled), ca.MX.sym("later", sampled)
     symbols = [coordinates.x, time, coordinates.t0, coordinates.w]
-
     rates = ca.Function("rates", symbols, [ca.densify(coordinates.ode)], {"cse": True})
-
-    def rate(at: ca.SX, state: ca.SX) -> ca.SX:
-        return rates(state, at, begin, ca.vertcat(inputs, own))
-
-    far, e3, e5 = one_step(rate, t, x, h)
-    (renewed,) = ca.substitute([coordinates.renewal], symbols, [far, t + h, t + h, ca.vertcat(later, own)])
-    new = ca.if_else(due, renewed, own[:held, :])
+    w = ca.vertcat(inputs, own)
+    far, e3, e5 = one_step(lambda at, state: rates(state, at, begin, w), t, x, h)
     by_held = _following_held(coordinates)
-    known = ca.vertcat(later, new, own[held:, :])
-    for k in by_held:
-        (mode,) = ca.substitute([turns[k].value], [coordinates.w], [known])
-        known[sampled + held + k] = mode
+    renewal = _renewal(coordinates, by_held)(far, t + h, ca.vertcat(later, own), due)
     y = ca.vertcat(x, own)
     u = ca.vertcat(t, h, begin, due, inputs, later)
-    found = [ca.densify(e) for e in (ca.vertcat(far, known[sampled:, :]), e3, e5)]
-    return Passage(ca.Function("passage", [y, u], found, {"cse": True}), by_held)
+    return Passage(ca.Function("passage", [y, u], [ca.vertcat(far, renewal), e3, e5]), by_held)
+
+
+def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
+    """(x, t, w, due) -> what is held, and the modes, from t on."""
+    sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
+    due = ca.SX.sym("due", held)
+    w = coordinates.w
+    (renewed,) = ca.substitute([ca.densify(coordinates.renewal)], [coordinates.t0], [time])
+    known = ca.vertcat(w[:sampled, :], ca.if_else(due, renewed, w[sampled : sampled + held, :]))
+    known = ca.vertcat(known, w[sampled + held :, :])
+    for k in by_held:
+        (mode,) = ca.substitute([coordinates.switches.turns[k].value], [w], [known])
+        known[sampled + held + k] = mode
+    own = ca.densify(known[sampled:, :])
+    return ca.Function("renewal", [coordinates.x, time, w, due], [own], {"cse": True})
 
 
 def _following_held(coordinates: Coordinates) -> tuple[int, ...]:

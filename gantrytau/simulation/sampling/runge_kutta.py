@@ -111,20 +111,17 @@ FIFTH = {
 
 
 def one_step(
-    rate: Callable[[ca.SX, ca.SX], ca.SX], t: ca.SX, x: ca.SX, h: ca.SX
-) -> tuple[ca.SX, ca.SX, ca.SX]:
+    rate: Callable[[ca.MX, ca.MX], ca.MX], t: ca.MX, x: ca.MX, h: ca.MX
+) -> tuple[ca.MX, ca.MX, ca.MX]:
     """The state a step h later, and the estimates e3 and e5 of its error, divided by the step.
 
     rate: of (t, x), x' (n,); t in s; x: (n,); h: s.
     """
-    rates: list[ca.SX] = []
+    rates: list[ca.MX] = []
     for c, row in zip(TIMES, STAGES, strict=True):
         rates.append(rate(t + c * h, x + h * _sum(row, rates) if row else x))
     return x + h * _sum(WEIGHTS, rates), _sum(THIRD, rates), _sum(FIFTH, rates)
 
 
-def _sum(weights: dict[int, float], rates: list[ca.SX]) -> ca.SX:
-    found = ca.SX(0)
-    for stage, weight in weights.items():
-        found += weight * rates[stage]
-    return found
+def _sum(weights: dict[int, float], rates: list[ca.MX]) -> ca.MX:
+    return ca.horzcat(*(rates[stage] for stage in weights)) @ ca.DM(list(weights.values()))

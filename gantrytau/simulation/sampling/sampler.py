@@ -34,8 +34,6 @@ class Sampler:
         self.step = np.inf  # s, that the last errors allow
         self.most = CALLS[1]  # passages in the next call
         self.wait = self.waited = 0  # asked in vain, times, before and since the last trial
-        self._passage: Passage | None = None
-        self._calls: dict[int, ca.Function] = {}
 
     @property
     def suits(self) -> bool:
@@ -142,11 +140,14 @@ class Sampler:
         return y, e3, e5, u[:, : interval.size]
 
     def _function(self, size: int) -> ca.Function:
-        if size not in self._calls:
-            self._passage = self._passage or passage(self.coordinates)
-            function = self._passage.function
-            self._calls[size] = function if size == 1 else function.mapaccum(f"passages_{size}", size)
-        return self._calls[size]
+        function = self._passage.function
+        return self.coordinates.kept(
+            ("passages", size), lambda: function if size == 1 else function.mapaccum("passages", size)
+        )
+
+    @property
+    def _passage(self) -> Passage:
+        return self.coordinates.kept("passage", lambda: passage(self.coordinates))
 
     def _error(
         self, before: np.ndarray, y: np.ndarray, h: np.ndarray, e3: np.ndarray, e5: np.ndarray
@@ -174,7 +175,6 @@ class Sampler:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
         c = self.coordinates
         switches, n, m = c.switches, len(c.states), len(c.held)
-        assert self._passage is not None
         live = np.array([k not in self._passage.by_held for k in range(len(switches))], dtype=bool)
         if not live.any() or not count:
             return None
