@@ -10,7 +10,8 @@ from gantrytau.ensembles.workers.worker import Outcome, Task, here, processors, 
 from gantrytau.errors import ModelError, did_you_mean
 
 Place = str
-NAMES = ("processes", "dask")
+PROCESSES = "processes"
+NAMES = (PROCESSES, "dask")
 
 
 def read_place(where: Any) -> Place:
@@ -26,9 +27,9 @@ def read_place(where: Any) -> Place:
 
 def outcomes(task: Task, cases: Sequence[Case], place: Place) -> Iterator[Outcome]:
     """Outcomes of cases as they are finished; one case, one processor and a study within a case need no processes."""
-    here_is_enough = place == "processes" and (processors() == 1 or len(cases) == 1)
+    here_is_enough = place == PROCESSES and (processors() == 1 or len(cases) == 1)
     if within_a_case() or here_is_enough:
         return here(task, cases)
-    if place == "processes":
+    if place == PROCESSES:
         return in_processes(task, cases)
     return on_cluster(task, cases, place)

@@ -1,12 +1,14 @@
 """`plan_calibration`: the automated procedure of Dressler (2012), section 5.6, from a tape measure to a verdict."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.ensembles.each import each
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
 from gantrytau_optimica.calibration.devices.devices import Device
@@ -181,36 +183,25 @@ class _Procedure:
 
     def _trials(self, candidates: Candidates, order: Order, key: str) -> tuple[Trials, str]:
         q, seed = order.q[order.measured], self.asked.seed
-        count, found = self.asked.robots, []
-        key = digest(key, q)
+        count, key = self.asked.robots, digest(key, q)
 
-        def trial(number: int, readings: int) -> Trial:
-            return simulated(
-                self.fleet,
-                candidates,
-                self.device,
-                q,
-                number,
-                seed=seed,
-                tape=self.asked.tape,
-                readings=readings,
-            )
-
-        self.stages.progress("trials", 0, count)
-        for number in range(count):
-            found.append(
-                self.stages.of(
-                    f"trial_{number:03d}",
-                    Trial,
-                    digest(key, number),
-                    lambda k=number: trial(k, 1),
-                    tell=False,
-                )
-            )
-            self.stages.progress("trials", number + 1, count)
-        worst = int(np.argmax([each.after if np.isfinite(each.after) else -1.0 for each in found]))
+        tape = self.asked.tape
+        trial = partial(simulated, self.fleet, candidates, self.device, q, seed=seed, tape=tape)
+        done = {k: self.stages.found(f"trial_{k:03d}", Trial, digest(key, k)) for k in range(count)}
+        left = [k for k, known in done.items() if known is None]
+        self.stages.progress("trials", count - len(left), count)
+        for place, new in each(trial, left):
+            self.stages.keep(f"trial_{left[place]:03d}", new, digest(key, left[place]))
+            done[left[place]] = new
+            self.stages.progress("trials", sum(known is not None for known in done.values()), count)
+        found = [known for known in done.values() if known is not None]
+        worst = int(np.argmax([one.after if np.isfinite(one.after) else -1.0 for one in found]))
         averaged = self.stages.of(
-            "averaged", Trial, digest(key, worst, "averaged"), lambda: trial(worst, AVERAGED), tell=False
+            "averaged",
+            Trial,
+            digest(key, worst, "averaged"),
+            lambda: trial(worst, readings=AVERAGED),
+            tell=False,
         )
         return collected(found, averaged), key
 

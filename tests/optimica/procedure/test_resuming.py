@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from gantrytau.ensembles import each as parts
 from gantrytau.kinematics import Capsule
 from gantrytau_optimica import plan_calibration
 from gantrytau_optimica.procedure import plan_calibration as planning
@@ -115,3 +116,8 @@ def test_ways_that_were_checked_are_not_checked_again(plan, tmp_path, monkeypatc
     every = [way for call in calls for way in call]
     assert len(calls) > 2
     assert len(set(every)) == len(every)
+
+
+def test_trials_in_processes_are_those_of_this_one(plan, monkeypatch):
+    monkeypatch.setattr(parts, "WORTH", 0.0)
+    cells.same(plan_calibration(*cells.l1(), **FEW), plan)
