@@ -20,7 +20,7 @@ PACKAGES = {
 }
 ORDER = {  # a room imports the rooms before it
     "gantrytau": "errors interruption whole_files progress language flattening compiler results inputs simulation writing "
-    "answers dae ensembles __init__ kinematics mechanics blocks commands cli",
+    "answers dae ensembles __init__ kinematics mechanics blocks electrical commands cli",
     "gantrytau_models": "prototypes mechanisms control __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "
     "studies estimation paths calibration procedure __init__",
@@ -35,6 +35,7 @@ READMES = {  # the page with the map of a folder
     "gantrytau.kinematics": ROOT / "gantrytau" / "kinematics" / "README.md",
     "gantrytau.mechanics": ROOT / "gantrytau" / "mechanics" / "README.md",
     "gantrytau.blocks": ROOT / "gantrytau" / "blocks" / "README.md",
+    "gantrytau.electrical": ROOT / "gantrytau" / "electrical" / "README.md",
     "gantrytau_models": ROOT / "models" / "README.md",
     "gantrytau_optimica": ROOT / "optimica" / "README.md",
     "gantrytau_fmu": ROOT / "fmu" / "README.md",
@@ -45,6 +46,7 @@ SHARED_CLASSES = {"Experiment"}  # of an FMU, and of an estimation: each is the 
 COMPONENTS = (
     "gantrytau.mechanics.",
     "gantrytau.blocks.",
+    "gantrytau.electrical.",
     "gantrytau_models.",
 )  # their classes have the field's words, twice if need be
 INSIDES = {"reduced", "indexed", "table", "choice", "blocks", "request", "settings"}  # of a translated model

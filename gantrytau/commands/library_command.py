@@ -33,11 +33,11 @@ def library(json: Json = False) -> None:
 
 def components() -> dict[str, dict[str, str]]:
     """Module of gantrytau.mechanics, and the packages of one list -> class -> first line of its docstring."""
-    from gantrytau import blocks, mechanics
+    from gantrytau import blocks, electrical, mechanics
 
     found: dict[str, dict[str, str]] = {}
     below = [info.name for info in pkgutil.iter_modules(mechanics.__path__, f"{mechanics.__name__}.")]
-    for path in (*below, blocks.__name__):
+    for path in (*below, blocks.__name__, electrical.__name__):
         if path.rpartition(".")[2].startswith("_"):
             continue
         module = importlib.import_module(path)

@@ -16,6 +16,7 @@ def test_the_library_lists_models_components_and_prototypes(answer):
     assert (
         found["components"]["gantrytau.blocks"]["Limiter"] == "y = u, at least `lower` and at most `upper`."
     )
+    assert "DcMotor" in found["components"]["gantrytau.electrical"]
     assert found["prototypes"]["L1"] == prototypes.L1.source
     assert {"D1", "GT_A", "F1_printed"} <= found["prototypes"].keys()
 

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
         "gantrytau/README.md",
         "gantrytau/mechanics/README.md",
         "gantrytau/blocks/README.md",
+        "gantrytau/electrical/README.md",
         "models/README.md",
     ],
     ids=str,
