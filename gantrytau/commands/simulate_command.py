@@ -15,6 +15,7 @@ from gantrytau.commands.arguments.options import (
     Plotted,
     PrototypeName,
     Saved,
+    Seed,
     Settings,
     To,
     listed,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 SPELLING = Spelling(
     ("simulate",),
-    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs")}
+    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs", "seed")}
     | {"inputs": "--input", "parameters": "--set", "max_step": "--max-step"},
 )
 
@@ -46,6 +47,7 @@ def simulate(
         float | None, typer.Option(help="Longest step, in s, for pulses shorter than a 10,000th of the run.")
     ] = None,
     input_: Inputs = None,
+    seed: Seed = None,
     outputs: Kept = None,
     output: Saved = None,
     plot: Plotted = None,
@@ -65,7 +67,9 @@ def simulate(
         place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
         dae = _translated(chosen, (*drawn, *kept))
-        policy = dict(stop=stop, start=start, tolerance=tolerance, points=points)
+        policy = dict(
+            stop=stop, start=start, tolerance=tolerance, points=points, max_step=max_step, seed=seed
+        )
         told: list[str] = []
         try:
             with noted(DoubtfulResult, told, json):

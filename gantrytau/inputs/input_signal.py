@@ -124,7 +124,7 @@ def check_seed(what: str, seed: Any) -> None:
     """ModelError unless a seed is None or a whole number that is not negative."""
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
         raise ModelError(
-            f"{what}: found seed={seed!r}, expected a whole number from 0 on, or None for that of the run",
+            f"{what}: found seed={seed!r}, expected a whole number from 0 on",
             argument="seed",
         )
 
@@ -167,7 +167,15 @@ def with_course(name: str, value: Any, shape: tuple[int, ...], span: Callable[[]
     )
 
 
-def with_seeds(inputs: Mapping[str, Any], seed: int | None) -> dict[str, Any]:
-    """Inputs of a run, signals without a seed with one of their own; ModelError for a seed that is none, or missing."""
+def with_seeds(inputs: Any, seed: int | None) -> dict[str, Any]:
+    """Inputs of a run by name, signals without a seed with one of their own.
+
+    Raises ModelError for what is no mapping, and for a seed that is none, or missing.
+    """
+    if not isinstance(inputs, Mapping):
+        raise ModelError(
+            f"inputs: found {inputs!r}, expected {{name: number, function of time, samples or signal}}",
+            argument="inputs",
+        )
     check_seed("inputs", seed)
     return {n: v.seeded(seed, n) if isinstance(v, InputSignal) else v for n, v in inputs.items()}

@@ -49,11 +49,6 @@ def read_signals(
     Raises ModelError for what is none of these, has the wrong shape, does not cover the run, NaN or unsorted times.
     """
     found: dict[str, Signal] = {}
-    if not isinstance(given, Mapping):
-        raise ModelError(
-            f"inputs: found {given!r}, expected {{name: number, function of time or samples}}",
-            argument="inputs",
-        )
     for name, value in with_seeds(given, seed).items():
         elements, shape = flat.expand(name), flat.shape(name)
         course = with_course(name, value, shape, lambda: span)

@@ -162,6 +162,16 @@ def test_without_a_display_the_window_has_a_remedy(fails, monkeypatch):
         (("--output", "no_such_folder/a.csv"), "the folder 'no_such_folder' does not exist; create it"),
         (("--input", "f"), "--input f: expected NAME=VALUE, as --input m=2.5"),
         (("--input", "f=fast"), "--input f=fast: expected a number as 2.5"),
+        (("--input", "f=noise(1)"), "--input f=noise(1): there is no signal noise"),
+        (("--input", "f=prbs(x)"), "--input f=prbs(x): expected a signal with numbers in it"),
+        (
+            ("--input", "f=prbs(7)"),
+            "missing 1 required positional argument: 'hold'; see help(gantrytau.prbs)",
+        ),
+        (
+            ("--input", "f=prbs(1, 0.1)"),
+            "--input f=prbs(1, 0.1): prbs: found bits=1, expected a whole number from 2",
+        ),
         (("--input", "f=no_such_file.csv:f"), "no_such_file.csv: there is no such file; check the path"),
     ],
 )
@@ -214,6 +224,19 @@ def test_a_file_of_samples_that_is_no_text(fails, robots, tmp_path):
 )
 def test_what_cannot_be_simulated_is_told_by_its_option(fails, options, message):
     assert message in fails(MISUSE, "simulate", "Pendulum", *options)
+
+
+def test_signals_take_the_seed_of_the_run(answer, fails, robots):
+    arguments = ("simulate", f"{robots}:Cart(m=1)", "--stop", "1", "--input", "f=prbs(7, hold=0.1)")
+    first, again, other = (answer(*arguments, "--seed", seed)["final"] for seed in ("1", "1", "2"))
+    assert first == again != other
+    assert first["v"] == pytest.approx(
+        round(first["v"] * 10) / 10, abs=1e-7
+    )  # ten pushes of 0.1 N.s, forth or back
+    assert "input f: prbs has no seed; give it one, as --seed 1, or give the run one" in fails(
+        MISUSE, *arguments
+    )
+    assert "found --seed -3, expected a whole number from 0 on" in fails(MISUSE, *arguments, "--seed", "-3")
 
 
 def test_what_the_model_does_not_have(fails):

@@ -1,21 +1,19 @@
 """A system of components: which output drives which input, what drives the rest, and whether all that fits."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.units import BASE, dimension
 from gantrytau_fmu.systems.component import Component, Scalar, numeric
+from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of
 
 SHOWN, FEW = 6, 5  # names that a message lists, and with their values
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI
 
 Place = tuple[str, str]  # component and scalar
-Drive = Callable[[float], float]
 
 
 class UnconnectedInputs(UserWarning):
@@ -226,7 +224,7 @@ def _starts(
                 raise ModelError(f"start {name}: found {value!r}, expected a text", argument="start")
             values: Sequence[float | str] = [value]
         else:
-            values = _numbers("start", name, value, len(places))
+            values = numbers_of("start", name, value, len(places))
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
             if not known.has_start:
                 raise ModelError(_calculated(components[owner], known), argument="start")
@@ -287,21 +285,6 @@ def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
         )
 
 
-def _numbers(argument: str, name: str, value: Any, count: int) -> list[float]:
-    try:
-        numbers = np.asarray(value, dtype=float).ravel()
-    except (TypeError, ValueError):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected a number or an array", argument=argument
-        ) from None
-    if numbers.size != count or not np.all(np.isfinite(numbers)):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected {count} finite number{'s' * (count > 1)}",
-            argument=argument,
-        )
-    return [float(number) for number in numbers]
-
-
 def _drives(
     components: Mapping[str, Component], inputs: Mapping[str, Any], span: tuple[float, float]
 ) -> dict[Place, Drive]:
@@ -319,66 +302,10 @@ def _drives(
                     "parameters are set with start=",
                     argument="inputs",
                 )
-        if callable(value):
-            drives = _functions(name, value, len(places), span[0])
-        elif isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
-            drives = _samples(name, value[0], value[1], len(places), span)
-        else:
-            drives = [_constant(number) for number in _numbers("inputs", name, value, len(places))]
+        drives = drives_of(name, value, len(places), span)
         found.update(zip(places, drives, strict=True))
     return found
 
 
 def _article(word: str) -> str:
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
-
-
-def _constant(number: float) -> Drive:
-    return lambda t: number
-
-
-def _functions(name: str, function: Callable[[float], Any], count: int, begin: float) -> list[Drive]:
-    """A function for each element, tried at the beginning."""
-    _value(name, function, begin, count)
-    return [lambda t, k=k: _value(name, function, t, count)[k] for k in range(count)]
-
-
-def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
-    try:
-        value = function(t)
-    except Exception as error:  # whatever a function of the user raises
-        raise ModelError(
-            f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
-            "at every time of the simulation",
-            argument="inputs",
-        ) from error
-    return _numbers("inputs", f"{name} at t = {t:.6g} s", value, count)
-
-
-def _samples(name: str, times: Any, values: Any, count: int, span: tuple[float, float]) -> list[Drive]:
-    try:
-        times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(
-            f"inputs {name}: samples that are not numbers, expected (times, values)", argument="inputs"
-        ) from None
-    values = values[:, None] if values.ndim == 1 else values
-    if values.shape != (times.size, count):
-        raise ModelError(
-            f"inputs {name}: samples have shapes {times.shape} and {values.shape}, "
-            f"expected ({times.size},) and ({times.size}, {count})",
-            argument="inputs",
-        )
-    if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))) or np.any(np.diff(times) <= 0):
-        raise ModelError(
-            f"inputs {name}: expected finite samples at times that rise strictly; repair and sort them",
-            argument="inputs",
-        )
-    if not times.size or times[0] > span[0] or times[-1] < span[1]:
-        cover = f"{times[0]:g} to {times[-1]:g} s" if times.size else "nothing"
-        raise ModelError(
-            f"inputs {name}: samples cover {cover}, expected {span[0]:g} to {span[1]:g} s; "
-            "add samples or simulate a shorter time",
-            argument="inputs",
-        )
-    return [lambda t, k=k: float(np.interp(t, times, values[:, k])) for k in range(count)]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError, did_you_mean
+from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
@@ -45,6 +46,7 @@ def cosimulate(
     order: Order = "gauss-seidel",
     begin: float | None = None,
     inputs: Mapping[str, Any] | None = None,
+    seed: int | None = None,
     tolerance: float | None = None,
     outputs: Sequence[str] | None = None,
     steps: Mapping[str, float] | None = None,
@@ -66,8 +68,9 @@ def cosimulate(
     order: "gauss-seidel": one after the other, by step_order.py or in a `sequence`; "jacobi": all with what was known at
         the last point; "iterate": steps are repeated from saved states until every input is the mean of the output that
         drives it at both ends of the step, within `agreement` (relative), in at most `iterations`.
-    inputs: name of an unconnected input -> number, function of time, or samples (times (n,), values (n,) or (n, k)), joined
-        by straight lines. A warning (`UnconnectedInputs`) lists what nothing drives, of two or more components.
+    inputs: name of an unconnected input -> number, function of time, `Samples` ((times, values) for short), or a signal as
+        `prbs`; seed: of signals that have none. Where samples jump or bend, a component takes a step in parts, or gets
+        their mean if it takes equal steps only. A warning (`UnconnectedInputs`) lists what nothing drives.
     tolerance: handed to the components; outputs: names to keep (all outputs and inputs that are numbers).
     steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
@@ -76,8 +79,7 @@ def cosimulate(
         takes longer than `timeout`, s.
     progress: called with the time reached; by default a bar on the terminal when it takes long.
 
-    An input shows the output that drives it at that point. A sample is taken when a step begins, and seen a step later,
-    where the result of `simulate` has the new one at once.
+    An input shows the output that drives it at that point. A sample is taken when a step begins, and seen a step later.
     Raises ModelError for a system that does not fit, InitializationError if the components cannot begin, SolveError with
     `.time` and the partial `.result` when a component fails, gives values that are not finite, or on Ctrl-C.
     """
@@ -86,7 +88,7 @@ def cosimulate(
         grid = _grid(told, begin, stop, step)
         _check(order, tolerance, agreement, iterations)
         alone = isolate if isinstance(isolate, Sequence) else tuple(told.components) if isolate else ()
-        system = _system(told, start or {}, inputs or {}, grid, alone, Path(folder))
+        system = _system(told, start or {}, with_seeds(inputs or {}, seed), grid, alone, Path(folder))
         plan = _Plan(order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations)
         result = _run(system, plan, grid, progress)
         if error_estimate:

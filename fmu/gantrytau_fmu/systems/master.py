@@ -16,7 +16,8 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 
 from gantrytau.errors import ModelError, SolveError
-from gantrytau_fmu.systems.connected_system import ConnectedSystem, Drive
+from gantrytau_fmu.systems.connected_system import ConnectedSystem
+from gantrytau_fmu.systems.drives import Drive, between, knots_of
 from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
 
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
@@ -121,6 +122,7 @@ class Master:
         self.wanted = {name: tuple(dict.fromkeys([*wanted[name], *sources[name]])) for name in parts}
         self.feeds = {name: self._feeds(name) for name in parts}
         self.known = {name: tuple(feed.name for feed in self.feeds[name]) for name in parts}
+        self.knots = {name: self._knots(name) for name in parts}
         self.sampled = [name for name in self.sequence if is_sampled(system, name)]
         self.values: dict[str, list[float]] = {}
         self.pending: dict[int, list[tuple[str, list[float]]]] = {}
@@ -172,23 +174,38 @@ class Master:
         drives = self.system.drives.items()
         return feeds + [_Feed(scalar, drive=drive) for (owner, scalar), drive in drives if owner == name]
 
-    def _step(self, name: str, first: int, last: int) -> list[float]:
-        """Step a component over the points from first to last; what others give stays, functions of time go on.
+    def _knots(self, name: str) -> np.ndarray:
+        """Times at which a component begins a step of its own, as what drives it jumps or bends there, if it can."""
+        if not self.system.components[name].variable_step:
+            return np.zeros(0)
+        return knots_of({place: drive for place, drive in self.system.drives.items() if place[0] == name})
 
-        A function of time is held over a step, or a part of one, at its value in the middle: the mean to second order.
-        A sampled component gets its value at the beginning, where it samples.
-        """
-        begin, parts, found = self.grid.time(first), self.paces[name].parts, []
-        size = self.grid.size(first, last) / parts
-        for part in range(parts):
-            time = begin + part * size
-            values = self.inputs(name, time + self._share(name) * size)
+    def _step(self, name: str, first: int, last: int) -> list[float]:
+        """Step a component over the points from first to last; what others give stays, functions of time go on."""
+        found = []
+        for time, size in self._parts(name, first, last):
+            values = self._driven(name) + self._over(name, time, size)
             found = self.parts[name].step(time, size, self.known[name], values, self.wanted[name])
         return found
 
-    def _share(self, name: str) -> float:
-        """Where in a step a function of time is evaluated."""
-        return 0.0 if takes_samples(self.system.components[name]) else 0.5
+    def _parts(self, name: str, first: int, last: int) -> list[tuple[float, float]]:
+        """Begin and length, s, of all steps of a component over the points from first to last."""
+        begin, parts = self.grid.time(first), self.paces[name].parts
+        size = self.grid.size(first, last) / parts
+        return [
+            piece for part in range(parts) for piece in between(self.knots[name], begin + part * size, size)
+        ]
+
+    def _over(self, name: str, time: float, size: float) -> list[float]:
+        """The inputs of a component that are driven from outside, over one of its steps.
+
+        A function of time is held over a step at its value in the middle, the mean to second order; samples at their
+        mean, so that no pulse is lost. A sampled component gets the value at the beginning, where it samples.
+        """
+        drives = [feed.drive for feed in self.feeds[name] if feed.drive]
+        if takes_samples(self.system.components[name]):
+            return [drive(time) for drive in drives]
+        return [drive.mean(time, size) for drive in drives]
 
     def _interval(self, name: str, k: int) -> tuple[int, int] | None:
         """First and last point of the step that a component takes at k, None if it takes none."""
@@ -247,14 +264,10 @@ class Master:
 
     def _implicit_step(self, name: str, k: int, before: Sequence[float]) -> None:
         """A step with the mean of the inputs at both its ends, and the outputs for those at its end."""
-        part, begin, size = self.parts[name], self.grid.time(k), self.grid.size(k, k + 1)
-        after = self._driven(name)
+        part, after = self.parts[name], self._driven(name)
         mean = [(a + b) / 2 for a, b in zip(before, after, strict=True)]
-        pieces = self.paces[name].parts
-        for piece in range(pieces):
-            time = begin + piece * size / pieces
-            values = mean + self._external(name, time + self._share(name) * size / pieces)
-            part.step(time, size / pieces, self.known[name], values, self.wanted[name])
+        for time, size in self._parts(name, k, k + 1):
+            part.step(time, size, self.known[name], mean + self._over(name, time, size), self.wanted[name])
         part.set(self.known[name], after + self._external(name, self.grid.time(k + 1)))
         self.values[name] = part.get(self.wanted[name])
         self.check(name, self.grid.time(k + 1))

@@ -12,7 +12,10 @@ from gantrytau.progress import Progress
 from gantrytau.results.result import Result
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem
+from gantrytau_fmu.systems.drives import knots_of
 from gantrytau_fmu.systems.master import Grid
+
+SAME = 1e-9  # of a time, within which two are one to FMPy (math.isclose)
 
 
 def integrate(component: Component, system: ConnectedSystem, grid: Grid, tolerance: float | None) -> Result:
@@ -84,9 +87,18 @@ def _failure(
 
 
 def _inputs(component: Component, system: ConnectedSystem, grid: Grid) -> np.ndarray:
-    """The inputs at the points of the grid, as FMPy takes them: those that nothing drives, too, or it warns of them."""
-    times = np.array([grid.time(k) for k in range(grid.count + 1)])
-    columns = {name: [drive(t) for t in times] for (_, name), drive in system.drives.items()}
+    """The inputs at points and knots, as FMPy takes them: those that nothing drives, too, or it warns of them."""
+    points = np.array([grid.time(k) for k in range(grid.count + 1)])
+    knots = knots_of(system.drives)
+    knots = knots[(knots > grid.begin) & (knots < grid.stop)]
+    _check_knots(component, knots)
+    # FMPy begins anew at a time that stands twice
+    times = np.sort(np.concatenate([np.setdiff1d(points, knots), knots, knots]))
+    first = np.append(np.diff(times) == 0, False)
+    columns = {
+        name: [drive.before(t) if left else drive(t) for t, left in zip(times.tolist(), first, strict=True)]
+        for (_, name), drive in system.drives.items()
+    }
     for name in component.of("input"):
         scalar = component.scalars[name]
         if scalar.kind == "real" and name not in columns:
@@ -97,6 +109,18 @@ def _inputs(component: Component, system: ConnectedSystem, grid: Grid) -> np.nda
     for name, values in columns.items():
         table[name] = values
     return table
+
+
+def _check_knots(component: Component, knots: np.ndarray) -> None:
+    """ModelError for instants of samples that FMPy takes for one."""
+    near = np.flatnonzero(np.diff(knots) <= SAME * np.abs(knots[1:]))
+    if near.size:
+        t = float(knots[near[0]])
+        raise ModelError(
+            f"{component.file}: samples at t = {t:.9g} s and {np.diff(knots)[near[0]]:.3g} s later are one instant to FMPy, "
+            f"which integrates Model Exchange; run Co-Simulation, or leave more than {SAME:g} of the time between them",
+            argument="inputs",
+        )
 
 
 def _result(component: Component, outputs: tuple[str, ...], found: Any) -> Result:

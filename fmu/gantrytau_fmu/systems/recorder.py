@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau.results.result import Result
-from gantrytau_fmu.systems.connected_system import ConnectedSystem, Drive, Place, SignalLink
+from gantrytau_fmu.systems.connected_system import ConnectedSystem, Place, SignalLink
+from gantrytau_fmu.systems.drives import Drive
 from gantrytau_fmu.systems.master import Grid, Master
 
 ROWS = 1024  # made room for at first; then always twice as many

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.errors import GantryTauError, ModelError, SolveError
+from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import read_component
@@ -27,6 +28,7 @@ def run_fmu(
     step: float | None = None,
     start: Mapping[str, Any] | None = None,
     inputs: Mapping[str, Any] | None = None,
+    seed: int | None = None,
     tolerance: float | None = None,
     model_exchange: bool = False,
     isolate: bool = False,
@@ -34,8 +36,8 @@ def run_fmu(
 ) -> Result:
     """Simulate one FMU and return its inputs and outputs by their own names.
 
-    stop, step: s, by default those of the file's experiment, else a five-hundredth; start, inputs: as for
-    `cosimulate`, names without prefix; model_exchange: integrate it with CVode, `step` being the distance of the
+    stop, step: s, by default those of the file's experiment, else a five-hundredth; start, inputs, seed: as
+    for `cosimulate`, names without prefix; model_exchange: integrate it with CVode, `step` being the distance of the
     output times; isolate: run it in a process of its own. Raises what `cosimulate` raises, and warns likewise of
     inputs that nothing drives.
     """
@@ -57,7 +59,7 @@ def run_fmu(
             step = min(component.step or stop / STEPS, stop)
         check_times(0.0, stop, step)
         starts = {f"{name}.{variable}": value for variable, value in (start or {}).items()}
-        signals = {f"{name}.{variable}": value for variable, value in (inputs or {}).items()}
+        signals = {f"{name}.{variable}": value for variable, value in with_seeds(inputs or {}, seed).items()}
         system = build_system({name: component}, (), starts, signals, (0.0, stop))
         free = {free.removeprefix(f"{name}."): value for free, value in unconnected(system).items()}
         warn_of(free, stacklevel=2)

@@ -63,10 +63,15 @@ Inputs = Annotated[
     typer.Option(
         "--input",
         metavar="NAME=VALUE",
-        help="Value of an input: a number, or a column of a CSV file with a column 'time', as f=forces.csv:f. "
-        "Repeatable.",
+        help="Value of an input: a number; a column of a CSV file with a column 'time', as f=forces.csv:f, or held "
+        "between its times, f=forces.csv:f:constant; a signal, as 'f=prbs(bits=7, hold=0.1)' (white_noise, prbs, steps, "
+        "chirp, multisine). Repeatable.",
         show_default=False,
     ),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(help="Of signals that have none: the same numbers for the same seed.", show_default=False),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]
 

@@ -2,11 +2,16 @@
 
 import ast
 import csv
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gantrytau import did_you_mean
+import gantrytau
+from gantrytau import InputSignal, ModelError, Samples, did_you_mean
 from gantrytau.commands.printing.reporting import CommandError
+
+KINDS = ("linear", "constant")  # of samples
+SIGNALS = ("white_noise", "prbs", "steps", "chirp", "multisine")
 
 
 def split(option: str, text: str) -> tuple[str, str]:
@@ -40,15 +45,50 @@ def _numeric(value: Any) -> bool:
 
 
 def signal(text: str) -> tuple[str, Any]:
-    """The name and the value of `--input`: a number, or samples (times, values) from a column of a CSV file.
+    """The name and the value of `--input`: a number, samples from a column of a CSV file, or a signal.
 
-    text: `name=value`, `name=file.csv:column`, or `name=file.csv` where the column has the name of the input.
+    text: `name=value`, `name=file.csv:column`, or `name=file.csv` where the column has the name of the input, behind
+    either `:constant` for values that are held; `name=prbs(7, 0.1)` for a signal, its arguments numbers, texts and lists.
     """
     name, value = split("--input", text)
-    path, dot, column = value.rpartition(".csv")
-    if dot and (not column or column.startswith(":")):
-        return name, samples(Path(path + dot), column.removeprefix(":") or name)
+    path, dot, rest = value.rpartition(".csv")
+    if dot and (not rest or rest.startswith(":")):
+        column, colon, kind = rest.removeprefix(":").rpartition(":")
+        if kind not in KINDS:
+            column, kind = f"{column}{colon}{kind}", "linear"
+        return name, _kept(text, lambda: Samples(*samples(Path(path + dot), column or name), kind=kind))
+    if "(" in value and value.endswith(")") and value[0].isalpha():
+        return name, _kept(text, lambda: _called(text, value))
     return name, number("--input", name, value)
+
+
+def _called(text: str, value: str) -> InputSignal:
+    """The signal that a call such as `prbs(7, hold=0.1)` makes; CommandError for another one."""
+    try:
+        call = ast.parse(value, mode="eval").body
+        assert isinstance(call, ast.Call)
+        assert isinstance(call.func, ast.Name)
+        arguments = [ast.literal_eval(one) for one in call.args]
+        keywords = {str(one.arg): ast.literal_eval(one.value) for one in call.keywords}
+    except (SyntaxError, ValueError, AssertionError):
+        raise CommandError(
+            f"--input {text}: expected a signal with numbers in it, as 'u=white_noise(0.1, 0.001, seed=1)'"
+        ) from None
+    if call.func.id not in SIGNALS:
+        raise CommandError(
+            f"--input {text}: there is no signal {call.func.id}{did_you_mean(call.func.id, SIGNALS)}"
+        )
+    try:
+        return getattr(gantrytau, call.func.id)(*arguments, **keywords)
+    except TypeError as error:
+        raise CommandError(f"--input {text}: {error}; see help(gantrytau.{call.func.id})") from None
+
+
+def _kept(text: str, make: Callable[[], Any]) -> Any:
+    try:
+        return make()
+    except ModelError as error:
+        raise CommandError(f"--input {text}: {error}") from error
 
 
 def samples(file: Path, column: str) -> tuple[list[float], list[float]]:

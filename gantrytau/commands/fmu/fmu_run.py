@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError, did_you_mean
-from gantrytau.commands.arguments.options import Inputs, Json, Plotted, Saved, To, listed
+from gantrytau.commands.arguments.options import Inputs, Json, Plotted, Saved, Seed, To, listed
 from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
 from gantrytau.commands.printing import picture_output, result_output
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SPELLING = Spelling(
     ("cosimulate", "run_fmu"),
-    {name: f"--{name}" for name in ("stop", "step", "order", "tolerance", "isolate")}
+    {name: f"--{name}" for name in ("stop", "step", "order", "tolerance", "isolate", "seed")}
     | {"start": "--set", "inputs": "--input"},
     flags=("isolate",),
 )
@@ -56,6 +56,7 @@ def run(
         ),
     ] = None,
     input_: Inputs = None,
+    seed: Seed = None,
     order: Annotated[
         str | None,
         typer.Option(help="Of a system: gauss-seidel, jacobi or iterate.", show_default="gauss-seidel"),
@@ -85,7 +86,8 @@ def run(
         start = dict(_setting(text) for text in set_ or ())
         result_output.rehearse(output)
         place = picture_output.place(drawn, to)
-        policy: dict[str, Any] = dict(stop=stop, step=step, start=start, inputs=signals, tolerance=tolerance)
+        policy: dict[str, Any] = dict(stop=stop, step=step, start=start, tolerance=tolerance)
+        policy |= dict(inputs=signals, seed=seed)
         told: list[str] = []
         try:
             with noted(UnconnectedInputs, told, json, SPELLING):

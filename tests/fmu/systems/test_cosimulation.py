@@ -309,8 +309,8 @@ def test_wrong_settings_are_refused(halves, policy, words):
     ("samples", "words"),
     [
         (([0.0, 0.5], [0.0, 1.0]), r"samples cover 0 to 0\.5 s, expected 0 to 1 s"),
-        (([0.0, 2.0], [0.0]), r"samples have shapes \(2,\) and \(1, 1\)"),
-        (([1.0, 0.0], [0.0, 1.0]), r"rise strictly"),
+        (([0.0, 2.0], [0.0]), r"input a\.f: Samples: found times of shape \(2,\) and values of shape \(1,\)"),
+        (([1.0, 0.0], [0.0, 1.0]), r"input a\.f: Samples: the time falls from 1 s in row 0 to 0 s"),
         (lambda t: np.nan, r"inputs a\.f at t = 0 s: found nan"),
         ("much", r"inputs a\.f: found 'much', expected a number"),
         (

@@ -1,0 +1,112 @@
+"""What drives an input from outside: a number, a function of time, samples or a signal, and when it jumps or bends."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gantrytau import Samples
+from gantrytau.errors import ModelError
+from gantrytau.inputs.input_signal import with_course
+
+ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The value of an input over time; knots: times in s at which it jumps (it is then `held` in between) or bends."""
+
+    course: Callable[[float], float]
+    knots: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    held: bool = False
+
+    def __call__(self, time: float) -> float:
+        return self.course(time)
+
+    def before(self, time: float) -> float:
+        """The value just before a time."""
+        earlier = self.knots[self.knots < time]
+        return self.course(float(earlier[-1])) if self.held and earlier.size else self.course(time)
+
+    def mean(self, begin: float, size: float) -> float:
+        """The mean over a step: exact for samples, else the value in the middle, which is it to second order."""
+        pieces = between(self.knots, begin, size)
+        return sum(h * self.course(t + h / 2) for t, h in pieces) / sum(h for _, h in pieces)
+
+
+def between(knots: np.ndarray, begin: float, size: float) -> list[tuple[float, float]]:
+    """The parts of a step, begin and length in s, between which there are knots (rising)."""
+    near = ROUNDINGS * np.spacing(abs(begin) + size)
+    first, last = np.searchsorted(knots, [begin + near, begin + size - near]) if knots.size else (0, 0)
+    if first >= last:
+        return [(begin, size)]
+    times = [begin, *knots[first:last].tolist(), begin + size]
+    return [(low, high - low) for low, high in pairwise(times)]
+
+
+def drives_of(name: str, value: Any, count: int, span: tuple[float, float]) -> list[Drive]:
+    """What drives the elements of an input.
+
+    value: number, array, function of time, Samples, (times, values) or a signal; span: begin and stop in s, which samples
+    have to cover. Raises ModelError for what is none of these.
+    """
+    course = with_course(name, value, (count,) if count > 1 else (), lambda: span)
+    if callable(course):
+        return _functions(name, course, count, span[0])
+    if isinstance(course, Samples):
+        return _samples(name, course, count, span)
+    return [Drive(lambda t, x=number: x) for number in numbers_of("inputs", name, course, count)]
+
+
+def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:
+    """So many finite numbers; ModelError if the value of an argument at a name is something else."""
+    try:
+        numbers = np.asarray(value, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{argument} {name}: found {value!r}, expected a number or an array", argument=argument
+        ) from None
+    if numbers.size != count or not np.all(np.isfinite(numbers)):
+        raise ModelError(
+            f"{argument} {name}: found {value!r}, expected {count} finite number{'s' * (count > 1)}",
+            argument=argument,
+        )
+    return [float(number) for number in numbers]
+
+
+def _functions(name: str, function: Callable[[float], Any], count: int, begin: float) -> list[Drive]:
+    """A function for each element, tried at the beginning."""
+    _value(name, function, begin, count)
+    return [Drive(lambda t, k=k: _value(name, function, t, count)[k]) for k in range(count)]
+
+
+def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
+    try:
+        value = function(t)
+    except Exception as error:  # whatever a function of the user raises
+        raise ModelError(
+            f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
+            "at every time of the simulation",
+            argument="inputs",
+        ) from error
+    return numbers_of("inputs", f"{name} at t = {t:.6g} s", value, count)
+
+
+def _samples(name: str, samples: Samples, count: int, span: tuple[float, float]) -> list[Drive]:
+    """Columns of samples; those of a matrix in the order of its elements, row after row."""
+    if len(samples.shape) == 1 or samples.values.shape[1] != count:
+        samples.check_shape(f"input {name}", (count,) if count > 1 else ())
+    samples.check_cover(f"input {name}", *span)
+    order = np.arange(count).reshape(*reversed(samples.shape)).T.ravel()
+    held = samples.kind == "constant"
+    return [
+        Drive(lambda t, k=k: float(samples.at(np.array(t), k)), samples.times, held) for k in order.tolist()
+    ]
+
+
+def knots_of(drives: Mapping[Any, Drive]) -> np.ndarray:
+    """All times in s at which one of some drives jumps or bends, rising; of those that rounding parts the last."""
+    found = np.unique(np.concatenate([np.zeros(0), *(drive.knots for drive in drives.values())]))
+    return found[np.append(np.diff(found) > ROUNDINGS * np.spacing(np.abs(found[1:])), True)[: found.size]]
