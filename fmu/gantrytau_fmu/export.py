@@ -133,15 +133,8 @@ def _translated(
                 "export_fmu: found a translated model with given= or states=, expected these where it is translated; give "
                 "the model itself, or translate(model, given=..., states=...)"
             )
-        found = model
-    else:
-        found = translate(model, given=given, find=find, states=states, events=True)
-    for one in found.flat.whens:
-        raise ModelError(
-            f"{one.label}: found a condition at which variables jump, which export_fmu cannot write yet, expected "
-            "equations, sampled(...) or stick_slip(...); simulate acts upon it"
-        )
-    return found
+        return model
+    return translate(model, given=given, find=find, states=states, events=True)
 
 
 def _first_words(model: Model | Dae) -> str:

@@ -243,7 +243,8 @@ def _states(listed: _Listed) -> None:
 def _outputs(listed: _Listed, names: Sequence[str]) -> None:
     """What is computed, shown as output or not."""
     formulas, dae = listed.formulas, listed.dae
-    for place, name in enumerate(formulas.held):
+    held = (*formulas.held, *formulas.discretes)
+    for place, name in enumerate(held):
         more: dict[str, Any] = dict(
             causality=listed.causality(name), variability="discrete", initial="calculated"
         )
@@ -256,8 +257,8 @@ def _outputs(listed: _Listed, names: Sequence[str]) -> None:
             _constant(listed, name, float(expression), listed.causality(name))
             continue
         leaves = {leaf.name() for leaf in ca.symvar(formulas.outputs[name])}
-        held = leaves <= {*formulas.held, *formulas.parameters} and leaves & set(formulas.held)
-        variability = "discrete" if held else "continuous"
+        steps = leaves <= {*held, *formulas.parameters} and leaves & set(held)
+        variability = "discrete" if steps else "continuous"
         more = dict(causality=listed.causality(name), variability=variability, initial="calculated")
         listed.add(name, "OUTPUT", listed.places[name], limited=True, **more)
         listed.places_of[name] = len(listed.variables) - 1

@@ -12,12 +12,12 @@ from gantrytau_fmu.code.formulas import Formulas
 class Dependencies:
     """On what rates, outputs and samples depend, through the implicit blocks and the sampled variables.
 
-    rates, outputs, samples: boolean rows over (time, states, inputs, parameters).
+    rates, outputs, samples (of Discretes, too): boolean rows over (time, states, inputs, parameters).
     """
 
     def __init__(self, formulas: Formulas, wanted: Sequence[ca.SX]):
         arrays = formulas.arrays
-        held, inputs = len(formulas.held), len(formulas.inputs)
+        held, inputs = len(formulas.held) + len(formulas.discretes), len(formulas.inputs)
         sizes = [1, arrays["x"].numel(), inputs + held, arrays["p"].numel()]
         z = np.zeros((arrays["z"].numel(), sum(sizes)), dtype=bool)
         place = 0
@@ -25,7 +25,7 @@ class Dependencies:
             z[place : place + len(block.names)] = self._rows(formulas, block.residual, z).any(axis=0)
             place += len(block.names)
         own = slice(1 + sizes[1] + inputs, 1 + sizes[1] + inputs + held)
-        samples = self._rows(formulas, formulas.samples, z)
+        samples = self._rows(formulas, column([formulas.samples, formulas.jump.discretes]), z)
         for _ in range(held):  # what is held may depend on what is held
             samples |= samples[:, own] @ samples
         known = np.eye(sum(sizes), dtype=bool)

@@ -92,7 +92,7 @@ def starts_of(
 
 def _declared(dae: Dae, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]]) -> list[_Declared]:
     """Starts in parameters, and those that are fixed; the fixed first."""
-    known = {*dae.known, *(s.name for s in dae.flat.sampled)}
+    known = set(dae.known)
     found = [
         (name, dae.to_reduced(start), v.fixed)
         for v in dae.flat.variables
@@ -169,12 +169,11 @@ def _determined(
 
 
 def _held_starts(dae: Dae, numbers: Mapping[str, np.ndarray]) -> list[ca.SX]:
-    """Of sampled variables before their first sample: as declared, else the numbers that were found."""
+    """Of sampled variables and Discretes before their first instant: as declared, else the numbers that were found."""
     declared = {n: s for v in dae.flat.variables if v.start for n, s in zip(v.elements, v.start, strict=True)}
-    first = len(numbers["u"]) - len(dae.flat.sampled)
+    names = (*(s.name for s in dae.flat.sampled), *dae.flat.discretes)
+    first = len(numbers["u"]) - len(names)
     return [
-        ca.SX(float(numbers["u"][first + k]))
-        if (start := declared.get(s.name)) is None
-        else dae.to_reduced(start)
-        for k, s in enumerate(dae.flat.sampled)
+        ca.SX(float(numbers["u"][first + k])) if (start := declared.get(n)) is None else dae.to_reduced(start)
+        for k, n in enumerate(names)
     ]

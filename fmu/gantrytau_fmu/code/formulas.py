@@ -1,8 +1,9 @@
 """The formulas of an FMU, taken from a Dae: what the runtime evaluates, in the arrays that it holds.
 
-t time, x states, u what is known from outside (inputs, then sampled variables), z unknowns of the blocks that
-have no closed form, p parameters, m modes of frictions with exact stick-slip (1 forward, -1 backward, 0 locked), then
-of what switches. The force of such a friction is one of the z; its equation depends on the mode.
+t time, x states, u what is known from outside (inputs, then sampled variables, then Discretes), z unknowns of the blocks
+that have no closed form, p parameters, e which conditions of whens have become true, m modes of frictions with exact
+stick-slip (1 forward, -1 backward, 0 locked), then of what switches. The force of such a friction is one of the z; its
+equation depends on the mode.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.fmu_starts import Starts, starts_of
+from gantrytau_fmu.code.jumps import JumpFormulas, jump_of
 from gantrytau_fmu.code.switching import Switching, WithModes, switching, written
 
 HOLD = 0.01  # s, time in which the speed left at the instant of locking dies away
@@ -39,9 +41,9 @@ class Formulas:
     """Expressions in the symbols of `arrays`, by name of the array.
 
     careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
-    expression by name; samples: new values of `held`, clocks: which period each follows; friction: speed and
-    breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends; switching: what
-    turns at events.
+    expression by name; samples: new values of `held`, clocks: which period each follows; jump: what whens do; friction:
+    speed and breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends;
+    switching: what turns at events.
     """
 
     dae: Dae
@@ -53,6 +55,8 @@ class Formulas:
     samples: ca.SX
     clocks: tuple[int, ...]
     periods: ca.SX
+    discretes: tuple[str, ...]
+    jump: JumpFormulas
     blocks: tuple[ImplicitBlock, ...]
     outputs: Mapping[str, ca.SX]
     frictions: tuple[str, ...]
@@ -111,25 +115,23 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
 
     wanted = at_once([dae.expression(n) for n in outputs])
     updates = at_once([dae.to_reduced(s.expression) for s in sampled])
-    laws = [system.to_system(law) for law in found.laws]
-    speeds = system.to_system([dae.expression(f.speed) for f in frictions])
-    accelerations = system.to_system([dae.expression(f"der({f.speed})") for f in frictions])
+    slides, rows, friction = _frictions(found, system)
     initial = at_once([dae.to_reduced(e.residual) for e in flat.initial_equations])
-    everything = [system.ode, system.residuals, *wanted, *updates, *speeds, *accelerations, *initial]
-    differentiated = _input_derivatives(dae, column(everything))
+    everything = [system.ode, system.residuals, *wanted, *updates, *rows, friction, *initial]
+    jump = jump_of(found, at_once)
+    differentiated = _input_derivatives(dae, column([*everything, *jump.everything]))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
     forces = [_symbol(system, f.force) for f in frictions]
-    slides = [ca.SX.sym(f"(mode of {f.force})") for f in frictions]
-    terms = zip(slides, accelerations, speeds, forces, laws, strict=True)
-    rows = [ca.if_else(mode == 0, a + v / HOLD, f - mode * law[0] - law[1]) for mode, a, v, f, law in terms]
+    held = [_symbol(system, n) for n in (*(s.name for s in sampled), *flat.discretes)]
     blocks = _blocks(system, frictions, forces, rows)
     arrays = {
         "t": system.time,
         "x": system.x,
-        "u": column([*free, *differentiated.values(), *(_symbol(system, s.name) for s in sampled)]),
+        "u": column([*free, *differentiated.values(), *held]),
         "z": column([b.unknowns for b in blocks]),
         "p": system.p,
         "m": column([*slides, turning.modes]),
+        "e": jump.rose,
     }
     periods, clocks = _clocks(system, sampled)
     starts = starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays)
@@ -143,10 +145,12 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         samples=column(updates),
         clocks=clocks,
         periods=periods,
+        discretes=flat.discretes,
+        jump=jump,
         blocks=blocks,
         outputs=dict(zip(outputs, wanted, strict=True)),
         frictions=tuple(f.force for f in frictions),
-        friction=column([e for v, law in zip(speeds, laws, strict=True) for e in (v, law[2])]),
+        friction=friction,
         roots=_roots(system, turning),
         starts=starts,
         parameters=system.parameters,
@@ -155,9 +159,23 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
     )
 
 
+def _frictions(found: WithModes, system: System) -> tuple[list[ca.SX], list[ca.SX], ca.SX]:
+    """Of frictions that stick: their modes, their equations, and speeds and breakaway forces by turns."""
+    slides, rows, watched = [], [], []
+    for friction, law in zip(found.dae.flat.frictions, found.laws, strict=True):
+        mode, force = ca.SX.sym(f"(mode of {friction.force})"), _symbol(system, friction.force)
+        moves = [found.dae.expression(name) for name in (friction.speed, f"der({friction.speed})")]
+        v, a, coulomb, smooth, breakaway = system.to_system([*moves, *law])
+        slides.append(mode)
+        rows.append(ca.if_else(mode == 0, a + v / HOLD, force - mode * coulomb - smooth))
+        watched += [v, breakaway]
+    return slides, rows, column(watched)
+
+
 def _evaluated(dae: Dae, outputs: Sequence[str]) -> list[str]:
     """What needs an output function: outputs that are no states, and parameters that follow from others."""
-    direct = {*dae.states, *(f"der({n})" for n in dae.states), *(s.name for s in dae.flat.sampled)}
+    instants = (*(s.name for s in dae.flat.sampled), *dae.flat.discretes)
+    direct = {*dae.states, *(f"der({n})" for n in dae.states), *instants}
     dependent = [n for n, e in dae.table.expressions.items() if not e.is_constant()]
     varying = [n for n in outputs if n not in direct and not dae.expression(n).is_constant()]
     return [*dependent, *varying]

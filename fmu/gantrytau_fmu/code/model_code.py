@@ -21,6 +21,7 @@ SELDOM = {
     "gt_by_parameters",
     "gt_initial_slopes",
     "gt_pivots",
+    "gt_jump",
 }
 
 
@@ -89,7 +90,11 @@ def _by_value(model: ModelGraph, name: str, roots: Sequence[int]) -> list[CFunct
 def _moving(model: ModelGraph) -> list[str]:
     """For each divisor a variable that moves it, a state if there is one."""
     formulas, graph, found = model.formulas, model.graph, []
-    names = {"x": formulas.states, "u": (*formulas.inputs, *formulas.held), "z": formulas.z_names}
+    names = {
+        "x": formulas.states,
+        "u": (*formulas.inputs, *formulas.held, *formulas.discretes),
+        "z": formulas.z_names,
+    }
     for divisor in model.roots["gt_pivots"]:
         leaves = [graph.nodes[n] for n in graph.reached([divisor])]
         places = [(array, index) for kind, array, index in (leaf for leaf in leaves if leaf[0] == "INPUT")]
@@ -108,7 +113,10 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_STATES=len(formulas.states),
         GT_INPUTS=len(formulas.inputs),
         GT_HELD_COUNT=len(formulas.held),
-        GT_KNOWN=len(formulas.inputs) + len(formulas.held),
+        GT_DISCRETES=len(formulas.discretes),
+        GT_WHENS=len(formulas.jump.labels),
+        GT_REINITS=len(formulas.jump.states),
+        GT_KNOWN=len(formulas.inputs) + len(formulas.held) + len(formulas.discretes),
         GT_ALGEBRAICS=sum(counts),
         GT_BLOCKS=len(counts),
         GT_LARGEST_BLOCK=max(counts, default=0),
@@ -157,10 +165,13 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _integers("gt_turn_counts", [turn.counts for turn in switching.turns]),
         _integers("gt_turn_timed", switching.timed),
         _texts("gt_conditions", switching.conditions),
+        _integers("gt_reinit_states", formulas.jump.states),
+        _texts("gt_when_names", formulas.jump.labels),
+        _texts("gt_when_ends", formulas.jump.messages),
         _texts("gt_x_names", formulas.states),
         _texts("gt_z_names", formulas.z_names),
         _texts("gt_root_names", formulas.roots),
-        _texts("gt_held_names", formulas.held),
+        _texts("gt_held_names", (*formulas.held, *formulas.discretes)),
         _texts("gt_clock_names", [formulas.held[k] for k in held]),
         "typedef struct {",
         "  void (*residual)(const double *const *a, double *restrict r, double *restrict w);",
@@ -180,7 +191,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{escaped}"'
 
 

@@ -11,7 +11,7 @@ from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
-ARRAYS = ("t", "x", "u", "z", "p", "m", *SEEDS)
+ARRAYS = ("t", "x", "u", "z", "p", "m", "e", *SEEDS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +77,8 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         "gt_roots": column(list(formulas.roots.values())),
         "gt_periods": formulas.periods,
         "gt_samples": formulas.samples,
+        "gt_conditions_hold": formulas.jump.conditions,
+        "gt_jump": column([formulas.jump.acts, formulas.jump.discretes, formulas.jump.values]),
         "gt_turning": column([formulas.switching.margins, formulas.switching.noise]),
         "gt_turning_rates": _along(formulas.switching.margins, point, way),
         "gt_forward": _along(everything, point, way),

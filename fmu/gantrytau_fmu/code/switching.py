@@ -4,7 +4,7 @@ Only what motions depend on gets a mode that is kept; what outputs alone look at
 asked for. Both ways of solving the blocks share the modes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -23,11 +23,14 @@ from gantrytau_fmu.code.arrays import column
 
 @dataclass(frozen=True, eq=False)
 class WithModes:
-    """A model whose equations hold modes; laws: those of its frictions, (coulomb, smooth, breakaway) each."""
+    """A model whose equations hold modes; laws: those of its frictions, (coulomb, smooth, breakaway) each; conditions: of
+    its whens.
+    """
 
     dae: Dae
     pieces: InModes
     laws: tuple[tuple[ca.SX, ca.SX, ca.SX], ...]
+    conditions: tuple[ca.SX, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,38 +61,38 @@ class Switching:
 
 def written(dae: Dae) -> WithModes:
     """The equations of a model with modes, its blocks solved anew; as they are where nothing switches."""
-    frictions = dae.flat.frictions
-    known = {
-        f"{f.force} {k}": dae.to_reduced(e)
-        for f in frictions
-        for k, e in enumerate((f.coulomb, f.smooth, f.breakaway))
-    }
-    pieces = in_modes(dae, known)
+    frictions, whens = dae.flat.frictions, dae.flat.whens
+    asked = [e for f in frictions for e in (f.coulomb, f.smooth, f.breakaway)] + [
+        one.condition for one in whens
+    ]
+    pieces = in_modes(dae, {f"({k})": dae.to_reduced(e) for k, e in enumerate(asked)})
     found = list(pieces.known.values())
-    laws = tuple((found[k], found[k + 1], found[k + 2]) for k in range(0, len(found), 3))
-    if not pieces.switched.switches:
-        return WithModes(dae, pieces, laws)
-    start = {dae.flat.time.name(): 0.0, **dae.table.values, **dae.start}
-    start = {**dae.start, **pieces.numbers(start)}
-    indexed = replace(dae.indexed, residuals=pieces.residuals)
-    dae = replace(dae, indexed=indexed, start=start)
-    pattern = Pattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
-    return WithModes(replace(dae, blocks=solved(dae, pattern).blocks), pieces, laws)
+    count = 3 * len(frictions)
+    laws = tuple((found[k], found[k + 1], found[k + 2]) for k in range(0, count, 3))
+    modes = {turn.mode.name() for turn in pieces.switched.switches}
+    if modes:
+        point = {dae.flat.time.name(): 0.0, **dae.table.values, **dae.start}
+        dae = replace(dae, start={**dae.start, **pieces.numbers(point)})
+    if modes & {leaf.name() for leaf in ca.symvar(column(list(pieces.residuals.values())))}:
+        dae = replace(dae, indexed=replace(dae.indexed, residuals=pieces.residuals))
+        pattern = Pattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
+        dae = replace(dae, blocks=solved(dae, pattern).blocks)
+    return WithModes(dae, pieces, laws, tuple(found[count:]))
 
 
-def moving(system: System, laws: Sequence[tuple[ca.SX, ...]]) -> ca.SX:
-    """What motions depend on."""
+def moving(found: WithModes, system: System) -> ca.SX:
+    """What motions depend on, and what is done when."""
     frictions = system.dae.flat.frictions
     speeds = [system.dae.expression(name) for f in frictions for name in (f.speed, f"der({f.speed})")]
-    of_frictions = system.to_system([*speeds, *(e for law in laws for e in law)]) if frictions else []
-    return column([system.ode, system.residuals, *of_frictions])
+    instants = [*speeds, *(e for law in found.laws for e in law), *found.conditions]
+    return column([system.ode, system.residuals, *(system.to_system(instants) if instants else [])])
 
 
 def switching(found: WithModes, system: System, also: frozenset[str] = frozenset()) -> Switching:
     """The turns that the motions of a system depend on; also: names of modes that are kept beside."""
     way = Substitution(system.definitions)
     needed = [
-        moving(system, found.laws),
+        moving(found, system),
         *(t.mode for t in found.pieces.switched.switches if t.mode.name() in also),
     ]
     turns, outside = sorted_out(found.pieces.switched.switches, needed, way)

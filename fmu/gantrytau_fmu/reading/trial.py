@@ -165,11 +165,12 @@ def _cosimulate(fmu: Any, model: Any, journal: Journal) -> None:
     step = float(said or fixed or (stop - start) / 100)
     count = max(1, min(STEPS, math.floor((stop - start) / step * (1 + 1e-9))))
 
-    def advance(first: int, last: int) -> None:
-        for k in range(first, last):
-            fmu.doStep(start + k * step, step)
+    def advance(first: int, last: int) -> bool:
+        return all(_goes_on(fmu, start + k * step, step) for k in range(first, last))
 
-    advance(0, count - 1)
+    if not advance(0, count - 1):
+        _read(fmu, model, journal)
+        return
     if model.coSimulation.canGetAndSetFMUstate:
         _restore(fmu, model, journal, lambda: advance(count - 1, count))
     else:
@@ -177,7 +178,19 @@ def _cosimulate(fmu: Any, model: Any, journal: Journal) -> None:
     _read(fmu, model, journal)
 
 
-def _restore(fmu: Any, model: Any, journal: Journal, advance: Callable[[], None]) -> None:
+def _goes_on(fmu: Any, time: float, size: float) -> bool:
+    """Take a step; false if the FMU asks to end the run there."""
+    try:
+        reply = fmu.doStep(time, size)
+    except Exception as error:
+        discarded = getattr(error, "status", None) == 2 and hasattr(fmu, "fmi2GetBooleanStatus")
+        if discarded and fmu.getBooleanStatus(3):  # fmi2Terminated
+            return False
+        raise
+    return not (reply and reply[1])
+
+
+def _restore(fmu: Any, model: Any, journal: Journal, advance: Callable[[], bool]) -> None:
     """A step after a state is saved, and the same step once it is restored, give the same outputs."""
     two = model.fmiVersion == "2.0"
     get, put, free = (

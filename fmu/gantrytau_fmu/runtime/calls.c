@@ -267,6 +267,9 @@ static gt_status gt_call_step(gt_component *c, const char *function, double poin
     if (c->it->now.stop_defined && point + size > c->it->now.stop + slack + 1e-5 * size)
         return GT_REFUSE(c, "%s: the step ends at %.12g s, expected no later than the stop time, %.12g s", function,
                          point + size, c->it->now.stop);
+    if (c->it->now.ended)
+        return GT_REFUSE(c, "%s: the run has ended at %.12g s (%s), expected no further step", function, c->it->time,
+                         gt_when_ends[c->it->now.ended - 1]);
     c->stepped = gt_fail(c, gt_step(c->it, point, size, reached));
     return c->stepped;
 }

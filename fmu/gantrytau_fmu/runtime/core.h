@@ -16,7 +16,7 @@ typedef enum { GT_OK, GT_WARNING, GT_DISCARD, GT_ERROR, GT_FATAL } gt_status; /*
 typedef enum { GT_LOG_EVENTS, GT_LOG_CALLS, GT_LOG_WARNING, GT_LOG_ERROR, GT_LOG_CATEGORIES } gt_category;
 #define GT_CATEGORY_NAMES { "logEvents", "logCalls", "logStatusWarning", "logStatusError" }
 
-/* What a variable is; `index` counts within its kind. */
+/* What a variable is; `index` counts within its kind. GT_HELD: sampled variables and Discretes. */
 typedef enum {
     GT_TIME, GT_CONSTANT, GT_PARAMETER, GT_INPUT, GT_STATE, GT_DERIVATIVE, GT_OUTPUT, GT_HELD, GT_MODE, GT_INDICATOR
 } gt_kind;

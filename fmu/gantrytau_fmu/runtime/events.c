@@ -1,5 +1,5 @@
 /* Events: sampled variables at multiples of their period, friction that locks, slides forward or backward, switches that
- * turn (turns.c).
+ * turn (turns.c), and what is done when conditions become true.
  *
  * While a friction is locked its force is an unknown that keeps the speed at zero; it breaks away when that
  * force passes its limit. A sliding one locks when its speed comes to zero.
@@ -7,6 +7,9 @@
 
 #define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
 #define GT_MARGIN 1e-9       /* of the breakaway force */
+#define GT_MOST_ROUNDS 50    /* of whens at one instant */
+#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, or of a second, or in one communication step */
+#define GT_CROWDED 1e-4
 #define GT_ON_TIME 1e-6      /* of a period: instants that close are the same, also where masters add up their steps */
 
 /* Speed and breakaway force of each friction, (2, GT_FRICTIONS), rows first. */
@@ -229,16 +232,108 @@ static gt_status gt_sample(gt_instance *it, int *sampled) {
     return GT_OK;
 }
 
+/* Which conditions of whens hold at the present point, with its modes. */
+static gt_status gt_find_conditions(gt_instance *it, int *holds) {
+    double found[GT_ROOM(GT_WHENS)];
+    const gt_status status = gt_refresh(it);
+    int i;
+    if (status != GT_OK) return status;
+    gt_conditions_hold(it->a, found, it->w);
+    for (i = 0; i < GT_WHENS; i++) holds[i] = found[i] != 0; /* NaN holds: what is not finite stops the run elsewhere */
+    return GT_OK;
+}
+
+/* What is true at the start has not become true. */
+static gt_status gt_begin_whens(gt_instance *it) {
+    int changed;
+    gt_status status = GT_OK;
+    it->now.ended = it->now.events = 0;
+    it->now.events_since = it->now.time;
+    if (!GT_WHENS) return GT_OK;
+    status = gt_agree(it, &changed);
+    return status == GT_OK ? gt_find_conditions(it, it->now.holds) : status;
+}
+
+static gt_status gt_jump_fails(gt_instance *it, const char *name) {
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at time = %.9g s the new value of %s is not a finite number; look for a division by zero or "
+                  "a root of a negative number in the actions of its when", GT_NAME, it->now.time, name);
+}
+
+/* Act where conditions have become true since they were looked at last, all from the values before; *acted: whether any has. */
+static gt_status gt_act(gt_instance *it, gt_event_info *info, int *acted) {
+    double found[GT_ROOM(GT_WHENS + GT_DISCRETES + GT_REINITS)];
+    double *const discretes = it->now.u + GT_INPUTS + GT_HELD_COUNT;
+    int holds[GT_ROOM(GT_WHENS)], i;
+    gt_status status = gt_find_conditions(it, holds);
+    *acted = 0;
+    if (status != GT_OK) return status;
+    for (i = 0; i < GT_WHENS; i++) {
+        it->e[i] = holds[i] && !it->now.holds[i];
+        *acted |= it->e[i] != 0;
+        if (it->e[i] != 0) it->last_event = gt_when_names[i];
+    }
+    memcpy(it->now.holds, holds, sizeof holds);
+    if (!*acted) return GT_OK;
+    gt_jump(it->a, found, it->w);
+    for (i = 0; i < GT_DISCRETES; i++)
+        if (!isfinite(found[GT_WHENS + i])) return gt_jump_fails(it, gt_held_names[GT_HELD_COUNT + i]);
+    for (i = 0; i < GT_REINITS; i++)
+        if (!isfinite(found[GT_WHENS + GT_DISCRETES + i])) return gt_jump_fails(it, gt_x_names[gt_reinit_states[i]]);
+    for (i = 0; i < GT_WHENS; i++) {
+        if (found[i] == 0) continue;
+        gt_say(it, GT_OK, GT_LOG_EVENTS, "%s: at time = %.9g s %s acts", GT_NAME, it->now.time, gt_when_names[i]);
+        if (!*gt_when_ends[i] || it->now.ended) continue;
+        it->now.ended = i + 1; /* a warning, so that it is told also where events are not */
+        gt_say(it, GT_OK, GT_LOG_WARNING, "%s: ended at time = %.9g s: %s", GT_NAME, it->now.time, gt_when_ends[i]);
+    }
+    memcpy(discretes, found + GT_WHENS, GT_DISCRETES * sizeof(double));
+    for (i = 0; i < GT_REINITS; i++) {
+        double *x = it->now.x + gt_reinit_states[i];
+        info->states_changed |= *x != found[GT_WHENS + GT_DISCRETES + i];
+        *x = found[GT_WHENS + GT_DISCRETES + i];
+    }
+    it->now.stale = it->outputs_stale = 1;
+    return GT_OK;
+}
+
+/* Refuse events that come ever faster, so that the time stands still. */
+static gt_status gt_count(gt_instance *it) {
+    const double span = it->now.stop_defined ? it->now.stop - it->now.start : 1;
+    if (it->now.time - it->now.events_since > GT_CROWDED * span) {
+        it->now.events = 0;
+        it->now.events_since = it->now.time;
+    }
+    if (++it->now.events <= GT_MOST_EVENTS) return GT_OK;
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s, the last of %s at time = %.9g s: they come ever faster, "
+                  "or turn back and forth without end; let what repeats come to rest, as by a condition on its speed, or smooth "
+                  "it", GT_NAME, GT_MOST_EVENTS, GT_CROWDED * span, it->last_event, it->now.time);
+}
+
+/* All that happens at the present instant, in rounds, until no condition becomes true any more. */
 static gt_status gt_update(gt_instance *it, gt_event_info *info) {
-    int sampled = 0, changed = 0, turned = 0;
+    int sampled = 0, happened = 0, acted = 1, round;
+    const char *actor = NULL;
     double turn = INFINITY;
     gt_status status = gt_sample(it, &sampled);
     memset(info, 0, sizeof *info);
-    if (status == GT_OK) status = gt_agree(it, &turned);
-    if (status == GT_OK) status = gt_friction_events(it, &changed);
+    for (round = 0; status == GT_OK && acted; round++) {
+        int turned = 0, changed = 0;
+        if (round > GT_MOST_ROUNDS)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: after %d rounds at time = %.9g s %s still becomes true: what it does makes itself true "
+                          "again; let it do so once, as by a Discrete that says so", GT_NAME, GT_MOST_ROUNDS, it->now.time, it->last_event);
+        acted = 0;
+        status = gt_agree(it, &turned);
+        if (status == GT_OK) status = gt_friction_events(it, &changed);
+        if (GT_WHENS && status == GT_OK) status = gt_act(it, info, &acted);
+        if (acted) actor = it->last_event;
+        happened |= turned | changed | acted;
+    }
+    if (actor) it->last_event = actor;
+    if (happened && status == GT_OK) status = gt_count(it);
     if (status == GT_OK) status = gt_next_turn(it, &turn);
     if (status != GT_OK) return status;
-    info->again = sampled || changed || turned;
+    info->again = sampled || happened;
+    info->terminate = it->now.ended != 0;
     info->next = fmin(gt_next_sample(it, INFINITY), turn);
     info->next_defined = info->next < INFINITY;
     return GT_OK;

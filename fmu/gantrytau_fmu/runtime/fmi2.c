@@ -246,9 +246,12 @@ GT_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const
 
 GT_EXPORT fmi2Status fmi2DoStep(fmi2Component component, fmi2Real point, fmi2Real size, fmi2Boolean final) {
     double reached;
+    gt_status status;
     GT_ENTER_2(GT_COSIMULATION, GT_STEP);
     (void)final;
-    return (fmi2Status)gt_call_step(c, __func__, point, size, &reached);
+    status = gt_call_step(c, __func__, point, size, &reached);
+    if (status == GT_OK && c->it->now.ended) status = c->stepped = GT_DISCARD; /* section 4.2.2: fmi2Terminated tells why */
+    return (fmi2Status)status;
 }
 
 GT_EXPORT fmi2Status fmi2CancelStep(fmi2Component component) {
@@ -270,5 +273,5 @@ GT_EXPORT fmi2Status fmi2CancelStep(fmi2Component component) {
 GT_STATUS_2(fmi2GetStatus, fmi2Status, fmi2DoStepStatus, (fmi2Status)c->stepped)
 GT_STATUS_2(fmi2GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->it->time)
 GT_STATUS_2(fmi2GetIntegerStatus, fmi2Integer, -1, 0)
-GT_STATUS_2(fmi2GetBooleanStatus, fmi2Boolean, fmi2Terminated, 0)
+GT_STATUS_2(fmi2GetBooleanStatus, fmi2Boolean, fmi2Terminated, c->it->now.ended != 0)
 GT_STATUS_2(fmi2GetStringStatus, fmi2String, fmi2PendingStatus, "no step is running in the background")

@@ -364,11 +364,14 @@ GT_EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
 
 GT_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 point, fmi3Float64 size, fmi3Boolean final,
                                 fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
+    gt_status status;
     GT_ENTER_3(GT_COSIMULATION, GT_STEP);
     (void)final;
     if (!gt_has(c, __func__, "a result", event && terminate && early ? reached : NULL, 1)) return fmi3Error;
     *event = *terminate = *early = false;
-    return (fmi3Status)gt_call_step(c, __func__, point, size, reached);
+    status = gt_call_step(c, __func__, point, size, reached);
+    *terminate = status == GT_OK && c->it->now.ended; /* at `reached`, before the end of the step */
+    return (fmi3Status)status;
 }
 
 GT_EXPORT fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time) {

@@ -115,8 +115,11 @@ static gt_status gt_initialize(gt_instance *it) {
     memset(it->now.ticks, 0, sizeof it->now.ticks);
     status = gt_check_clocks(it);
     if (status == GT_OK) status = gt_begin_modes(it);
+    if (status == GT_OK) status = gt_begin_whens(it);
     if (status == GT_OK && !it->cosimulation) return gt_get_rates(it, rates); /* samples are taken in the first event mode */
-    memcpy(it->now.first_held, it->now.u + GT_INPUTS, GT_HELD_COUNT * sizeof(double));
+    memcpy(it->now.first_held, it->now.u + GT_INPUTS, GT_STEPPING * sizeof(double));
+    memcpy(it->now.first_x, it->now.x, sizeof it->now.x);
+    memcpy(it->now.first_holds, it->now.holds, sizeof it->now.holds);
     it->now.first = 1;
     if (status == GT_OK) status = gt_update(it, &info);
     if (status == GT_OK) status = gt_get_rates(it, rates);

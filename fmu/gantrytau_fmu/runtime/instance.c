@@ -7,6 +7,7 @@
 
 #define GT_ROOM(n) ((n) + 1) /* ISO C knows no arrays of length zero */
 #define GT_SIDES (GT_BLOCKS + GT_ROOTS) /* what shows singular poses: determinants, and roots in closed forms */
+#define GT_STEPPING (GT_HELD_COUNT + GT_DISCRETES) /* what changes at instants only */
 #define GT_MODES (GT_FRICTIONS + GT_TURNS)
 #define GT_INDICATORS (GT_FRICTIONS + GT_GAPS) /* GT_GAPS: of each switch, two of one that counts */
 #define GT_SLOPES (GT_STATES + GT_ALGEBRAICS + GT_OUTPUTS)
@@ -16,7 +17,7 @@
 typedef struct {
     double time;
     double x[GT_ROOM(GT_STATES)];
-    double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables */
+    double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables, then Discretes */
     double z[GT_ROOM(GT_ALGEBRAICS)]; /* unknowns of the implicit blocks */
     double p[GT_ROOM(GT_PARAMETERS)];
     double m[GT_ROOM(GT_MODES)];      /* of frictions: 1 forward, -1 backward, 0 locked; then of what switches */
@@ -29,7 +30,13 @@ typedef struct {
     /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
     double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)], kept_rates[GT_ROOM(GT_STATES)]; /* there, in Model Exchange */
-    double first_held[GT_ROOM(GT_HELD_COUNT)]; /* held variables before the first samples */
+    /* held variables, Discretes, states and conditions before the first samples */
+    double first_held[GT_ROOM(GT_STEPPING)], first_x[GT_ROOM(GT_STATES)];
+    int first_holds[GT_ROOM(GT_WHENS)];
+    int holds[GT_ROOM(GT_WHENS)];     /* whether conditions of whens did when they were looked at last */
+    int ended;                        /* number, from 1, of the when that has ended the run */
+    int events;                       /* since events_since, s */
+    double events_since;
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
     int first;     /* no step was taken yet: the first samples are taken again with the inputs it begins with */
@@ -52,6 +59,7 @@ struct gt_instance {
     double matrices[GT_ROOM(GT_MATRICES)]; /* factored Jacobians of the blocks, one after another */
     int pivots[GT_ROOM(GT_ALGEBRAICS)];
     double scales[GT_ROOM(GT_ALGEBRAICS)];
+    double e[GT_ROOM(GT_WHENS)]; /* 1 where a condition has become true */
     double dt, dx[GT_ROOM(GT_STATES)], du[GT_ROOM(GT_KNOWN)], dz[GT_ROOM(GT_ALGEBRAICS)], dp[GT_ROOM(GT_PARAMETERS)];
     double g[GT_ROOM(GT_SLOPES)];
     /* slopes of the initial equations by the states that they determine, factored */
@@ -81,6 +89,7 @@ static gt_status gt_say(gt_instance *it, gt_status status, gt_category category,
 static gt_status gt_initial_equations(gt_instance *it);
 static gt_status gt_check_clocks(gt_instance *it);
 static gt_status gt_begin_modes(gt_instance *it);
+static gt_status gt_begin_whens(gt_instance *it);
 static gt_status gt_agree(gt_instance *it, int *changed);
 static int gt_other_side(const gt_instance *it);
 
@@ -116,12 +125,13 @@ static void gt_reset(gt_instance *it) {
     it->a[3] = it->now.z;
     it->a[4] = it->now.p;
     it->a[5] = it->now.m;
-    it->a[6] = &it->dt;
-    it->a[7] = it->dx;
-    it->a[8] = it->du;
-    it->a[9] = it->dz;
-    it->a[10] = it->dp;
-    it->a[11] = it->c;
+    it->a[6] = it->e;
+    it->a[7] = &it->dt;
+    it->a[8] = it->dx;
+    it->a[9] = it->du;
+    it->a[10] = it->dz;
+    it->a[11] = it->dp;
+    it->a[12] = it->c;
     gt_point_at(it, &it->now.time, it->now.x);
 }
 

@@ -3,7 +3,6 @@
 #ifndef GT_MOST_STEPS
 #define GT_MOST_STEPS 20000
 #endif
-#define GT_MOST_EVENTS 1000
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LEAST_LOOK 1e-4     /* of a communication step: shorter slips may be missed */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
@@ -227,7 +226,7 @@ static gt_status gt_handle_events(gt_instance *it, int *events) {
         *events += again;
         if (*events > GT_MOST_EVENTS)
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, the last of %s at time = %.9g s; take "
-                          "a shorter step, a longer sampling period, or smooth friction", GT_NAME, GT_MOST_EVENTS, it->last_event,
+                          "a shorter step or a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS, it->last_event,
                           it->now.time);
     }
     return GT_OK;
@@ -244,14 +243,18 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
     it->now.time = time;
     it->stepping = 1;
     if (GT_CLOCKS && it->now.first) {
-        memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_HELD_COUNT * sizeof(double));
+        memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_STEPPING * sizeof(double));
+        memcpy(it->now.x, it->now.first_x, sizeof it->now.x);
+        memcpy(it->now.holds, it->now.first_holds, sizeof it->now.holds);
+        it->now.ended = 0;
         memset(it->now.ticks, 0, sizeof it->now.ticks);
         it->now.stale = it->outputs_stale = 1;
     }
     it->now.first = 0;
     while (status == GT_OK) {
         double next;
-        if (GT_CLOCKS || GT_MODES) status = gt_handle_events(it, &events);
+        if (GT_CLOCKS || GT_MODES || GT_WHENS) status = gt_handle_events(it, &events);
+        if (it->now.ended) break;
         if (status == GT_OK) status = gt_next_turn(it, &turn);
         next = fmin(GT_CLOCKS ? gt_next_sample(it, end) : INFINITY, turn);
         if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);

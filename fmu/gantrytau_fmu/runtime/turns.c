@@ -6,6 +6,9 @@
  */
 
 #define GT_SAME_TIMES 8     /* spacings of the time, within which margins of time alone are zero */
+#define GT_NEAR 16          /* times rounding, and times in s, and shares of the time: what a crossing is located to */
+#define GT_LATE 2e-13
+#define GT_LATE_BY_TIME 4e-14
 #define GT_MOST_AGREED 24   /* rounds in which modes lead to each other */
 #define GT_MOST_AT_ONCE 8   /* switches of which all choices are tried */
 #define GT_DEEP 0.5         /* of the lower end: a dip between two places that may reach below that is looked at */
@@ -79,11 +82,13 @@ static gt_status gt_look_at_gaps(gt_instance *it, gt_gaps *found) {
 }
 
 /* The modes just after the present instant: where a margin is zero, its rate decides. */
-static void gt_following(const gt_margins *at, double *modes) {
+static void gt_following(const gt_margins *at, double time, double *modes) {
     int i;
     for (i = 0; i < GT_TURNS; i++) {
         const double value = at->values[i], whole = gt_turn_counts[i] ? nearbyint(value) : 0;
-        if (fabs(value - whole) <= at->noise[i] && at->rates[i] != 0)
+        /* as near as a crossing is located, so that what turns round there is not left behind it */
+        const double near = GT_NEAR * at->noise[i] + (GT_LATE + GT_LATE_BY_TIME * fabs(time)) * fabs(at->rates[i]);
+        if (fabs(value - whole) <= near && at->rates[i] != 0)
             modes[i] = gt_turn_counts[i] ? whole - (at->rates[i] < 0) : at->rates[i] > 0;
         else
             modes[i] = gt_turn_counts[i] ? floor(value) : gt_turn_closed[i] ? value >= 0 : value > 0;
@@ -97,7 +102,7 @@ static gt_status gt_led_to(gt_instance *it, const double *modes, double *found) 
     memcpy(it->now.m + GT_FRICTIONS, modes, GT_TURNS * sizeof(double));
     it->now.stale = it->outputs_stale = 1;
     status = gt_look(it, &margins);
-    if (status == GT_OK) gt_following(&margins, found);
+    if (status == GT_OK) gt_following(&margins, it->now.time, found);
     return status;
 }
 
@@ -152,7 +157,7 @@ static gt_status gt_agree(gt_instance *it, int *changed) {
         else {
             gt_margins margins;
             status = gt_look(it, &margins);
-            if (status == GT_OK) gt_following(&margins, found);
+            if (status == GT_OK) gt_following(&margins, it->now.time, found);
         }
         if (status != GT_OK) return status;
         if (gt_are_equal(found, tried[count])) break;

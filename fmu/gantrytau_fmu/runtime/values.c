@@ -11,7 +11,7 @@ static gt_status gt_known_reference(gt_instance *it, unsigned reference) {
 }
 
 static void gt_start_values(gt_instance *it) {
-    double x[GT_ROOM(GT_STATES) + GT_ROOM(GT_HELD_COUNT)];
+    double x[GT_ROOM(GT_STATES) + GT_ROOM(GT_STEPPING)];
     int i;
     if (!it->now.starts_stale) return;
     it->now.starts_stale = 0;
@@ -19,7 +19,7 @@ static void gt_start_values(gt_instance *it) {
     gt_starts(it->a, x, it->w);
     for (i = 0; i < GT_STATES; i++)
         if (!it->now.given[i]) it->now.x[i] = x[i];
-    memcpy(it->now.u + GT_INPUTS, x + GT_STATES, GT_HELD_COUNT * sizeof(double));
+    memcpy(it->now.u + GT_INPUTS, x + GT_STATES, GT_STEPPING * sizeof(double));
 }
 
 static gt_status gt_get_outputs(gt_instance *it) {

@@ -1,0 +1,56 @@
+"""What happens in an FMU where conditions become true: Discretes and states get new values, or the run ends."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gantrytau.flattening.whens import one_round
+from gantrytau_fmu.code.arrays import column
+from gantrytau_fmu.code.switching import WithModes
+
+
+@dataclass(frozen=True, eq=False)
+class JumpFormulas:
+    """One round of the whens of a model, in the symbols of the arrays.
+
+    conditions: 1 where they hold, in modes; rose: symbols, 1 where a condition has become true; acts: which whens act;
+    discretes, values: new values of the Discretes and of the states whose places are `states`; labels: where the whens
+    are stated, messages: what they say of the end of the run, "" of those that do not end it.
+    """
+
+    conditions: ca.SX
+    rose: ca.SX
+    acts: ca.SX
+    discretes: ca.SX
+    states: tuple[int, ...]
+    values: ca.SX
+    labels: tuple[str, ...]
+    messages: tuple[str, ...]
+
+    @property
+    def everything(self) -> tuple[ca.SX, ...]:
+        """All expressions."""
+        return self.conditions, self.discretes, self.values
+
+
+def jump_of(found: WithModes, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]]) -> JumpFormulas:
+    """The round of a model's whens; to_system: leads from reduced symbols to those of the arrays."""
+    dae, whens = found.dae, found.dae.flat.whens
+    round_ = one_round(dae.flat)
+    places, values = [], []
+    for name, value in round_.states:
+        alias = dae.reduced.aliases[name]  # factor * root + offset
+        places.append(dae.choice.states.index(alias.symbol))
+        values.append((dae.to_reduced(value) - alias.offset) / alias.factor)
+    discretes = [dae.to_reduced(e) for e in round_.discretes.elements()]
+    return JumpFormulas(
+        conditions=column([ca.densify(e) for e in to_system(found.conditions)]),
+        rose=round_.rose,
+        acts=round_.acts,
+        discretes=column(to_system(discretes)),
+        states=tuple(places),
+        values=column(to_system(values)),
+        labels=tuple(one.label for one in whens),
+        messages=tuple(one.message for one in whens),
+    )
