@@ -13,7 +13,10 @@ from gantrytau import (
     Real,
     between,
     der,
+    exp,
+    fabs,
     if_else,
+    require,
     stick_slip,
     tanh,
 )
@@ -158,6 +161,85 @@ class LinearFriction(TanhFriction):
         slope = self.w / self.w_s
         sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
         yield self.tau == self.tau_c * sign + self.tau_v * self.w
+
+
+class AsymmetricFriction(Friction):
+    """Coulomb and viscous friction that differ with the direction, the sign smoothed by tanh: `tau_c=(6.0, 4.5)`.
+
+    Each side counts by its share (1 + tanh(w / w_s)) / 2, so that torque and slope have no jump and it brakes at any speed.
+    """
+
+    tau_c = Parameter(
+        [0.0, 0.0], unit="N.m", min=0.0, description="Coulomb friction at positive and at negative speed"
+    )
+    tau_v = Parameter(
+        [0.0, 0.0],
+        unit="N.m.s/rad",
+        min=0.0,
+        description="viscous friction at positive and at negative speed",
+    )
+    w_s = Parameter(0.05, unit="rad/s", min=0.0, description="smoothing speed")
+
+    def equations(self):
+        yield from super().equations()
+        sign = tanh(self.w / self.w_s)
+        plus, minus = (1 + sign) / 2, (1 - sign) / 2
+        coulomb = self.tau_c[0] * plus + self.tau_c[1] * minus
+        viscous = self.tau_v[0] * plus + self.tau_v[1] * minus
+        yield self.tau == coulomb * sign + viscous * self.w
+
+
+class StribeckFriction(TanhFriction):
+    """Friction that falls from static to Coulomb with the speed (Armstrong-Helouvry 1994), the sign smoothed by tanh.
+
+    tau = (tau_c + (tau_s - tau_c) exp(-(|w| / w_stribeck)^n)) tanh(w / w_s) + tau_v w.
+    |w| is smoothed alike: take w_s well below w_stribeck.
+    """
+
+    tau_s = Parameter(
+        TanhFriction.tau_c, unit="N.m", min=0.0, description="static friction, at least the Coulomb friction"
+    )
+    w_stribeck = Parameter(
+        0.1, unit="rad/s", min=0.0, description="Stribeck speed, at which the fall has come to 1/e"
+    )
+    n = Parameter(2.0, unit="1", min=0.0, description="exponent of the Stribeck speed, usually 0.5 to 2")
+    w_s = Parameter(0.005, unit="rad/s", min=0.0, description="smoothing speed")
+
+    def equations(self):
+        yield from Friction.equations(self)
+        yield require(
+            self.tau_s >= self.tau_c,
+            "expected a static friction tau_s of at least the Coulomb friction tau_c",
+        )
+        yield require(self.w_stribeck > 0, "expected a Stribeck speed above zero")
+        slope = self.w / self.w_s
+        sign = tanh(slope)
+        # |w|, but w_s at rest, where the sign is zero: smooth for any exponent
+        size = self.w_s * (slope * sign + 1 - sign**2)
+        fall = exp(-((size / self.w_stribeck) ** self.n))
+        yield self.tau == (self.tau_c + (self.tau_s - self.tau_c) * fall) * sign + self.tau_v * self.w
+
+
+class DahlFriction(Friction):
+    """Coulomb friction that gives like a spring before it slides (Dahl 1968), and viscous friction.
+
+    z' = w - sigma_0 |w| z / tau_c, tau = sigma_0 z + tau_v w: but for tau_v it depends on the way, not on the rate.
+    To and fro by X on either side costs 4 tau_c (X - x tanh(X / x)) each time, x = tau_c / sigma_0.
+    """
+
+    tau_c = Parameter(1.0, unit="N.m", min=0.0, description="Coulomb friction, which long ways lead to")
+    sigma_0 = Parameter(1e4, unit="N.m/rad", min=0.0, description="stiffness before it slides")
+    tau_v = Parameter(0.0, unit="N.m.s/rad", min=0.0, description="viscous friction")
+    z = Real(unit="rad", description="deflection before sliding", start=0.0, nominal=tau_c / sigma_0)
+
+    def equations(self):
+        yield from super().equations()
+        yield require(
+            self.tau_c > 0, "expected a Coulomb friction tau_c above zero; take Frictionless for none"
+        )
+        yield require(self.sigma_0 > 0, "expected a stiffness sigma_0 above zero")
+        yield der(self.z) == self.w - self.sigma_0 * fabs(self.w) * self.z / self.tau_c
+        yield self.tau == self.sigma_0 * self.z + self.tau_v * self.w
 
 
 class StickSlipFriction(Friction):

@@ -13,7 +13,10 @@ from gantrytau import (
     Real,
     between,
     der,
+    exp,
+    fabs,
     if_else,
+    require,
     stick_slip,
     tanh,
 )
@@ -142,6 +145,79 @@ class LinearFriction(TanhFriction):
         slope = self.v / self.v_s
         sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
         yield self.f == self.f_c * sign + self.f_v * self.v
+
+
+class AsymmetricFriction(Friction):
+    """Coulomb and viscous friction that differ with the direction, the sign smoothed by tanh: `f_c=(6.0, 4.5)`.
+
+    Each side counts by its share (1 + tanh(v / v_s)) / 2, so that force and slope have no jump and it brakes at any speed.
+    """
+
+    f_c = Parameter(
+        [0.0, 0.0], unit="N", min=0.0, description="Coulomb friction at positive and at negative speed"
+    )
+    f_v = Parameter(
+        [0.0, 0.0], unit="kg/s", min=0.0, description="viscous friction at positive and at negative speed"
+    )
+    v_s = Parameter(0.05, unit="m/s", min=0.0, description="smoothing speed")
+
+    def equations(self):
+        yield from super().equations()
+        sign = tanh(self.v / self.v_s)
+        plus, minus = (1 + sign) / 2, (1 - sign) / 2
+        coulomb = self.f_c[0] * plus + self.f_c[1] * minus
+        viscous = self.f_v[0] * plus + self.f_v[1] * minus
+        yield self.f == coulomb * sign + viscous * self.v
+
+
+class StribeckFriction(TanhFriction):
+    """Friction that falls from static to Coulomb with the speed (Armstrong-Helouvry 1994), the sign smoothed by tanh.
+
+    f = (f_c + (f_s - f_c) exp(-(|v| / v_stribeck)^n)) tanh(v / v_s) + f_v v.
+    |v| is smoothed alike: take v_s well below v_stribeck.
+    """
+
+    f_s = Parameter(
+        TanhFriction.f_c, unit="N", min=0.0, description="static friction, at least the Coulomb friction"
+    )
+    v_stribeck = Parameter(
+        0.1, unit="m/s", min=0.0, description="Stribeck speed, at which the fall has come to 1/e"
+    )
+    n = Parameter(2.0, unit="1", min=0.0, description="exponent of the Stribeck speed, usually 0.5 to 2")
+    v_s = Parameter(0.005, unit="m/s", min=0.0, description="smoothing speed")
+
+    def equations(self):
+        yield from Friction.equations(self)
+        yield require(
+            self.f_s >= self.f_c, "expected a static friction f_s of at least the Coulomb friction f_c"
+        )
+        yield require(self.v_stribeck > 0, "expected a Stribeck speed above zero")
+        slope = self.v / self.v_s
+        sign = tanh(slope)
+        # |v|, but v_s at rest, where the sign is zero: smooth for any exponent
+        size = self.v_s * (slope * sign + 1 - sign**2)
+        fall = exp(-((size / self.v_stribeck) ** self.n))
+        yield self.f == (self.f_c + (self.f_s - self.f_c) * fall) * sign + self.f_v * self.v
+
+
+class DahlFriction(Friction):
+    """Coulomb friction that gives like a spring before it slides (Dahl 1968), and viscous friction.
+
+    z' = v - sigma_0 |v| z / f_c, f = sigma_0 z + f_v v: but for f_v it depends on the way, not on the rate.
+    To and fro by X on either side costs 4 f_c (X - x tanh(X / x)) each time, x = f_c / sigma_0.
+    """
+
+    f_c = Parameter(1.0, unit="N", min=0.0, description="Coulomb friction, which long ways lead to")
+    sigma_0 = Parameter(1e4, unit="N/m", min=0.0, description="stiffness before it slides")
+    f_v = Parameter(0.0, unit="kg/s", min=0.0, description="viscous friction")
+    z = Real(unit="m", description="deflection before sliding", start=0.0, nominal=f_c / sigma_0)
+
+    def equations(self):
+        yield from super().equations()
+        yield require(self.f_c > 0, "expected a Coulomb friction f_c above zero; take Frictionless for none")
+        yield require(self.sigma_0 > 0, "expected a stiffness sigma_0 above zero")
+        yield der(self.z) == self.v - self.sigma_0 * fabs(self.v) * self.z / self.f_c
+        yield self.f == self.sigma_0 * self.z + self.f_v * self.v
 
 
 class StickSlipFriction(Friction):

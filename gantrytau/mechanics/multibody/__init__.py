@@ -18,6 +18,14 @@ coordinate and does not mind which of the two is nearer to the world. Its flange
 """
 
 from gantrytau.mechanics.multibody.bodies import Body, PointMass
+from gantrytau.mechanics.multibody.bushing import Bushing
+from gantrytau.mechanics.multibody.contact import (
+    ContactLaw,
+    HuntCrossley,
+    LinearContact,
+    PegContact,
+    SurfaceContact,
+)
 from gantrytau.mechanics.multibody.forces import (
     FrameForce,
     FrameTorque,
@@ -45,6 +53,8 @@ from gantrytau.mechanics.multibody.sensors import CutSensor, PoseSensor, Relativ
 
 __all__ = [
     "Body",
+    "Bushing",
+    "ContactLaw",
     "CutSensor",
     "Cylindrical",
     "Fixed",
@@ -53,7 +63,10 @@ __all__ = [
     "Frame",
     "FrameForce",
     "FrameTorque",
+    "HuntCrossley",
     "LineForce",
+    "LinearContact",
+    "PegContact",
     "PointMass",
     "PoseSensor",
     "Prismatic",
@@ -61,6 +74,7 @@ __all__ = [
     "Revolute",
     "Spherical",
     "SphericalSpherical",
+    "SurfaceContact",
     "TwoFrames",
     "Universal",
     "World",

@@ -33,3 +33,20 @@ def turning(R: Any) -> ca.SX:
     """Axis of the rotation R times 2 tan(angle / 2), (3,): the rotation itself if small, large at half a turn."""
     axial = ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / 2
     return 4 * axial / (1 + ca.trace(R))
+
+
+def rotation_vector(R: Any) -> ca.SX:
+    """Axis of the rotation R times its angle, (3,) in rad: smooth up to half a turn, where the axis may be either.
+
+    axis * tan(angle / 4) is halved until the series of the arc tangent is exact to rounding in eight terms, so that it
+    has no quotient 0/0 where nothing is turned.
+    """
+    axial = ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / 2
+    cosine = ca.sqrt(1 + ca.trace(R)) / 2  # of half the angle
+    part, share = axial / (2 * cosine * (1 + cosine)), 4
+    while share < 32:
+        part, share = part / (1 + ca.sqrt(1 + ca.dot(part, part))), 2 * share
+    square, series = ca.dot(part, part), ca.SX(0)
+    for k in reversed(range(8)):
+        series = 1 / (2 * k + 1) - square * series
+    return share * series * part
