@@ -30,7 +30,8 @@ def draw(result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | 
     )
     for axis, (unit, members) in zip(axes[:, 0], axes_of_unit.items(), strict=True):
         for name in members:
-            axis.plot(result.time, result[name], label=name)
+            style = "steps-post" if name in result.held else "default"
+            axis.plot(result.time, result[name], label=name, drawstyle=style)
         axis.set_ylabel(_label(result, members, unit))
         axis.grid(alpha=0.3)
         if len(members) > 1:

@@ -1,7 +1,7 @@
 """Signals over time, looked up by name: the record below results, files and figures."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -24,6 +24,8 @@ class Series:
     units, descriptions: scalar or vector name -> text; a name left out has none.
     title: what was computed, for figures and files.
     aliases: further name -> the name in `values` that it equals; a minus sign before it says the negative.
+    held: names of scalars that hold their values from one time to the next, as what is sampled does.
+    ended: why it ends where it does, "stop" where that was asked for.
 
     Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
     matrix `R`, (times, 3, 3). `time` is a name, too.
@@ -38,6 +40,8 @@ class Series:
         descriptions: Mapping[str, str] | None = None,
         title: str = "",
         aliases: Mapping[str, str] | None = None,
+        held: Iterable[str] = (),
+        ended: str = "stop",
     ):
         self._time = np.array(time, dtype=float)
         if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
@@ -51,6 +55,8 @@ class Series:
         self._descriptions = dict(descriptions or {})
         self._title = title
         self._aliases = dict(aliases or {})
+        self._held = frozenset(held)
+        self._ended = ended
         self._names = (*(name for name in values if name != "time"), *self._aliases)
         self._scalars = frozenset(self._names)
         self._arrays = _arrays(self._names)
@@ -73,6 +79,16 @@ class Series:
     def title(self) -> str:
         """What was computed."""
         return self._title
+
+    @property
+    def ended(self) -> str:
+        """Why it ends where it does: "stop" where that was asked for, else what `terminate` said, or what went wrong."""
+        return self._ended
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Names of scalars that hold their values from one time to the next, and are drawn as steps."""
+        return self._held
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,6 +136,38 @@ class Series:
         last = self[name][-1]
         return last if last.ndim else float(last)
 
+    def at(self, t: ArrayLike, name: str) -> Any:
+        """A variable at a time, or at times (n,), in s: a float, (n,), or with the shape of a vector or matrix behind.
+
+        Where it jumps it is the value behind the jump. Between two output times it is held, if it holds its values, else
+        interpolated: by a cubic where its derivative is known by name, `der(x)`, by a straight line otherwise. ModelError
+        for a time outside of the result.
+        """
+        times = np.asarray(t, dtype=float)
+        if not np.all((times >= self._time[0]) & (times <= self._time[-1])):
+            raise ModelError(
+                f"{self._title or 'Result'}: at: found t = {t}, expected times from {self._time[0]:.6g} s to "
+                f"{self._time[-1]:.6g} s"
+            )
+        if name in self._arrays:
+            columns = [np.asarray(self.at(times, str(element))) for element in self._arrays[name].flat]
+            return np.stack(columns, axis=-1).reshape(*times.shape, *self._arrays[name].shape)
+        values = self[name]
+        left = np.searchsorted(self._time, times, side="right") - 1
+        right = np.minimum(left + 1, self._time.size - 1)
+        h = self._time[right] - self._time[left]
+        s = (times - self._time[left]) / np.where(h > 0, h, 1.0)
+        found = values[left]
+        if name not in self._held:
+            found = found + s * (values[right] - values[left])
+            rate = f"der({name})"
+            if rate in self._scalars:  # the cubic with these values and rates at both ends
+                mean = values[right] - values[left]
+                found = found + s * (1 - s) * (
+                    (1 - s) * (h * self[rate][left] - mean) - s * (h * self[rate][right] - mean)
+                )
+        return found if times.ndim else float(found)
+
     def select(self, names: Sequence[str]) -> Self:
         """Only the named variables, vectors with all their elements; ModelError for an unknown name."""
         values: dict[str, Values] = {}
@@ -130,7 +178,8 @@ class Series:
             )  # an unknown name raises
         units = {name: self.unit(name) for name in values}
         words = {name: self.description(name) for name in values}
-        return type(self)(self._time, values, units=units, descriptions=words, title=self._title)
+        own = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
+        return type(self)(self._time, values, units=units, descriptions=words, **own)
 
     def __repr__(self) -> str:
         title = f"{self._title}: " if self._title else ""

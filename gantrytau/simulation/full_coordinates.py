@@ -16,6 +16,7 @@ from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
+from gantrytau.simulation.events.rounds import Rounds
 from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
@@ -34,10 +35,11 @@ class Coordinates:
     rows the names of their equations.
 
     states: names of x, every derivative below the highest; sampled: inputs given by samples; held: variables
-    that the model samples; known: expression of each known symbol in time and w (values of the sampled
-    inputs, their slopes, values of the held variables, modes of the switches); substitutions: all symbols in terms of
-    (t, x, z, w), one after the other; pieces: the equations with modes; renewal: what the held variables become at an
-    instant; sizes: typical magnitudes of the states, powers of two; all 1 if there are none.
+    that the model samples; known: expression of each known symbol in time and w
+    (values of the sampled inputs, their slopes, values of the held variables, of the discretes, modes of the switches);
+    substitutions: all symbols in terms of (t, x, z, w), one after the other; pieces: the equations with modes; renewal:
+    what the held variables become at an instant; rounds: what whens do; sizes: typical magnitudes of the states, powers
+    of two; all 1 if there are none.
     """
 
     dae: Translated
@@ -58,10 +60,16 @@ class Coordinates:
     pivots: ca.SX
     pieces: InModes
     switches: Switches
+    rounds: Rounds
     dropped: ca.Function
     renewal: ca.SX
     conditioning: Conditioning
     sizes: tuple[float, ...] = ()
+
+    @property
+    def discretes(self) -> tuple[str, ...]:
+        """Variables that whens set, which are held as well."""
+        return self.dae.flat.discretes
 
     @property
     def constrained(self) -> bool:
@@ -71,7 +79,7 @@ class Coordinates:
     @property
     def stepwise(self) -> bool:
         """Whether there are signals that are known interval by interval."""
-        return bool(self.sampled or self.held or len(self.switches))
+        return bool(self.sampled or self.held or self.discretes or len(self.switches))
 
     def integrator(
         self,
@@ -265,6 +273,24 @@ class Coordinates:
                 raise SolveError(
                     f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when
                 )
+        return x
+
+    def followed(self, x: np.ndarray, t: float, w: np.ndarray) -> np.ndarray:
+        """A point, (n,), at which the states of the model are those of x, and what follows from them by constraints is such
+        that all hold; SolveError where there is none.
+        """
+        x, own = x.copy(), set(self.dae.choice.states)
+        for columns, level, names in self._levels:
+            free = [k for k, c in enumerate(columns) if self.states[c] not in own]
+            for _ in range(STEPS):
+                residual, jacobian = (np.array(m) for m in level(x, t, t, w))
+                scale = np.abs(jacobian) @ np.maximum(np.abs(x[columns]), LEAST)
+                if np.all(np.abs(residual.ravel()) <= LARGEST_DRIFT * scale):
+                    break
+                step = np.linalg.lstsq(jacobian[:, free], residual.ravel(), rcond=1e-12)[0]
+                x[np.array(columns)[free]] -= step
+            else:
+                raise SolveError(f"the constraints {'; '.join(names[:4])} cannot be met", time=t)
         return x
 
     def opened(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> tuple[int, str] | None:

@@ -1,7 +1,6 @@
 """One run over a grid: in chunks, held to the constraints, from event to event, watched for singular poses."""
 
 from collections.abc import Mapping
-from itertools import product
 
 import numpy as np
 
@@ -9,16 +8,16 @@ from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
+from gantrytau.simulation.events.changes import SHORT, Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
-from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
-from gantrytau.simulation.trail import LEAST_STEPS, Trail
+from gantrytau.simulation.trail import Trail
 
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
@@ -28,11 +27,7 @@ STEPS_BETWEEN = (
     8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
 )
 STARTING = 60  # steps of the integrator after it starts anew
-MOST_AT_ONCE = 8  # switches of which all choices are tried
 REFINED = 50  # intervals ahead that are divided as well
-SAME_INSTANT = 50  # events within SHORT of the run: chattering
-SHORT = 1e-9
-MOST_EVENTS = 500  # in a 500th of the run
 
 
 class Run:
@@ -56,10 +51,8 @@ class Run:
         self.integrators = Integrators(coordinates, tolerance, longest, interval)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
-        self.events: list[float] = []  # times at which states made something switch
-        self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, end)
-        self.sizes = self.integrators.sizes
-        sampler = Sampler(coordinates, tolerance, self.sizes, longest)
+        self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
+        sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
         self.sampler = sampler if sampler.suits else None
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -68,19 +61,21 @@ class Run:
         kept = trail.kept[trail.kept <= self.done]
         return trail.t[kept], trail.x[kept], trail.z[kept], trail.rows(kept)
 
+    @property
+    def ended(self) -> str:
+        """Why it ended: "stop", or what a when said."""
+        return self.changes.ended or "stop"
+
     def largest(self) -> np.ndarray:
         """The largest absolute value of each state so far."""
         return np.abs(self.trail.x[: self.done + 1]).max(axis=0)
 
     def go(self) -> None:
         trail = self.trail
-        trail.x[0], trail.z[0], modes = self.coordinates.start(trail.t[0], trail.inputs(0))
-        trail.held[0, trail.held.shape[1] - modes.size :] = modes
-        self._renew(0)
-        self._turn()
+        self.changes.begin()
         with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
-            while self.done < trail.last:
+            while self.done < trail.last and not self.changes.ended:
                 progress.at(trail.t[self.done])
                 if self.integrators.pressed:
                     raise KeyboardInterrupt
@@ -102,11 +97,11 @@ class Run:
                 )  # else places were only laid closer, and nothing is sampled twice
                 stopped = forward and bool(trail.stops[self.done])
                 if stopped and trail.twice(self.done):
-                    self._jump()
+                    self.done = self.changes.behind_inputs(self.done)
                 if turned or stopped:
                     if forward:
-                        self._renew(self.done)
-                    self._turn(by_states=turned)
+                        self.changes.renew(self.done)
+                    self.done = self.changes.turn(self.done, by_states=turned)
             if self.integrators.pressed:
                 raise KeyboardInterrupt
 
@@ -120,9 +115,9 @@ class Run:
         self._watch(here, self.done)
         self._hold_together(self.trail.shown(here, self.done))
         if self.trail.twice(self.done):
-            self._jump()
-            self._renew(self.done)
-        self._turn()
+            self.done = self.changes.behind_inputs(self.done)
+            self.changes.renew(self.done)
+        self.done = self.changes.turn(self.done)
         return True
 
     def _shorter(self) -> float | None:
@@ -147,80 +142,6 @@ class Run:
             return CHUNK * GROWTH
         return min(last, max(CHUNK, last // 50))
 
-    def _renew(self, k: int) -> None:
-        """Give new values to what is sampled at a place, all from the values just before."""
-        trail = self.trail
-        due = trail.due[k]
-        if not due.any():
-            return
-        t = float(trail.t[k])
-        new = np.array(self.coordinates.renewed(trail.x[k], trail.z[k], t, t, trail.inputs(k))).ravel()
-        for name, value, now in zip(self.coordinates.held, new, due, strict=True):
-            if now and not np.isfinite(value):
-                raise run_ends.sampled_badly(self.coordinates.dae, t, name)
-        trail.held[k, : due.size][due] = new[due]
-        trail.z[k] = self._settled(k)
-
-    def _jump(self) -> None:
-        """From the place before a jump of inputs to that behind it."""
-        trail, k = self.trail, self.done
-        trail.x[k + 1], trail.z[k + 1], trail.held[k + 1] = trail.x[k], trail.z[k], trail.held[k]
-        self.done = k + 1
-        trail.z[k + 1] = self._settled(k + 1)
-
-    def _settled(self, k: int) -> np.ndarray:
-        """The algebraics of a place."""
-        places, trail = slice(k, k + 1), self.trail
-        w = trail.inputs(k)[None]
-        return self.coordinates.settle(trail.x[places], trail.z[places], trail.t[places], w)[0]
-
-    def _turn(self, *, by_states: bool = False) -> None:
-        """Find the modes that hold from the last place on, and lay a second place there if they are others."""
-        switches, trail, k = self.coordinates.switches, self.trail, self.done
-        if not len(switches):
-            return
-        first = self._modes(k).copy()
-        margins = self._margins(*self._columns(np.array([k])))
-        modes = switches.following(margins)
-        if not np.array_equal(modes, first):
-            if k > 0:
-                trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
-                self.done = k = k + 1
-            self._agree(k, modes)
-        if by_states:
-            self._count(modes, first)
-        end = self.by_time.next(float(trail.t[k]), trail.inputs(k))
-        if end is not None:
-            trail.stop_at(end, k)
-
-    def _agree(self, k: int, modes: np.ndarray) -> None:
-        """Give a place modes that agree with the margins they lead to, from these on; SolveError if there are none."""
-        tried = [self._modes(k).copy()]
-        while not any(np.array_equal(modes, old) for old in tried):
-            tried.append(modes)
-            modes = self._led_to(k, modes)
-            if np.array_equal(modes, tried[-1]):
-                return
-        # one leads to another in a circle: all choices of what changed, the nearest to the first first
-        trail = self.trail
-        changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
-        if changing.size <= MOST_AT_ONCE:
-            choices = product(*(np.unique([old[i] for old in tried]).tolist() for i in changing))
-            for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
-                modes = tried[0].copy()
-                modes[changing] = choice
-                if np.array_equal(self._led_to(k, modes), modes):
-                    return
-        raise run_ends.no_side(self.coordinates.dae, float(trail.t[k]), self._conditions(changing))
-
-    def _led_to(self, k: int, modes: np.ndarray) -> np.ndarray:
-        """The modes that belong to the margins of a place that has these modes."""
-        trail, places = self.trail, slice(k, k + 1)
-        self._modes(k)[:] = modes
-        trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
-        trail.z[k] = self._settled(k)
-        return self.coordinates.switches.following(self._margins(*self._columns(np.array([k]))))
-
     def _nearer(self) -> bool:
         """Whether something is about to switch where the integration fails: then the next place is laid nearer.
 
@@ -229,8 +150,8 @@ class Run:
         switches, trail, k = self.coordinates.switches, self.trail, self.done
         if not len(switches):
             return False
-        margins = self._margins(*self._columns(np.array([k])))
-        gaps = switches.gaps(margins, self._modes(k))
+        margins = self.changes.margins(np.array([k]))
+        gaps = switches.gaps(margins, self.changes.modes(k))
         left, rates, scale = (a[0] for a in (gaps.values, gaps.rates, gaps.noise / ROUNDING))
         h = trail.t[k + 1] - trail.t[k]
         closing = (rates < 0) & (left <= -FORESIGHT * h * rates)
@@ -242,30 +163,12 @@ class Run:
                 trail.insert(k, np.array([trail.t[k] + h / 2]))
             return bool(h > SHORT**2 * self.span)
         for gap in np.flatnonzero(close):
-            trail.x[k] = switches.behind(int(gap), self._point(k), self._modes(k), self.sizes)
+            trail.x[k] = switches.behind(
+                int(gap), self.changes.point(k), self.changes.modes(k), self.changes.sizes
+            )
         self.integrators.by_modes = True
-        self._turn(by_states=True)
+        self.done = self.changes.turn(k, by_states=True)
         return True
-
-    def _count(self, modes: np.ndarray, before: np.ndarray) -> None:
-        """SolveError if states made something switch too often."""
-        t, events = float(self.trail.t[self.done]), self.events
-        events.append(t)
-        for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
-            if len(events) > many and t - events[-many] < share * self.span:
-                conditions = self._conditions(np.flatnonzero(modes != before))
-                raise run_ends.chattering(self.coordinates.dae, t, conditions)
-
-    def _modes(self, k: int) -> np.ndarray:
-        return self.trail.held[k, self.trail.held.shape[1] - len(self.coordinates.switches) :]
-
-    def _columns(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """States, algebraics, times and inputs at places."""
-        trail = self.trail
-        return trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
-
-    def _margins(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Margins:
-        return self.coordinates.switches.look(x, z, t, w, self.sizes)
 
     def _advance(self, count: int) -> bool:
         """Integrate some intervals, or up to where something switches; whether it does."""
@@ -318,17 +221,19 @@ class Run:
         switches = self.coordinates.switches
         if not len(switches):
             return None
-        gaps = switches.gaps(self._margins(*self._columns(places)), self._modes(places[0]))
+        gaps = switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
         return first_crossing(self.trail.t[places], gaps)
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
         trail, k, switches = self.trail, self.done, self.coordinates.switches
-        low, modes = self._point(k), self._modes(k).copy()
+        low, modes = self.changes.point(k), self.changes.modes(k).copy()
 
         def look(point: Point) -> Margins:
             x, z, t, w = point
-            return switches.gaps(self._margins(x[None], z[None], np.array([t]), w[None]), modes)
+            return switches.gaps(
+                switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes
+            )
 
         if found.certain:
             there = located(low, float(trail.t[k + 1]), found.guess, self.integrators.step, look)
@@ -343,9 +248,6 @@ class Run:
         gaps = look(there)
         return bool(np.any(gaps.values < -gaps.noise))
 
-    def _point(self, k: int) -> Point:
-        return self.trail.x[k], self.trail.z[k], float(self.trail.t[k]), self.trail.inputs(k)
-
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places; `done` is then the last before it."""
         if not self.coordinates.conditioning.needed:
@@ -354,7 +256,7 @@ class Run:
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
         places = places[np.append(np.diff(trail.t[places]) > 0, True)]
-        look = self._look(*self._columns(places))
+        look = self._look(*self.changes.columns(places))
         for k in places[:-1][doubtful(trail.t[places], look)]:
             if k <= self.seen:
                 continue
@@ -368,7 +270,7 @@ class Run:
         return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], w.T)
 
     def _weakest(self, point: Point) -> list[str]:
-        return self.coordinates.weakest(point, self._point(0))
+        return self.coordinates.weakest(point, self.changes.point(0))
 
     def _singular_pose(self, found: Approach) -> SolveError:
         return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))
@@ -381,12 +283,6 @@ class Run:
         endless = self.coordinates.not_finite(found.point, step)
         return run_ends.stopped(self.coordinates.dae, found.point[2], error, endless)
 
-    def _conditions(self, switches: np.ndarray) -> list[str]:
-        """What some switches ask for, in the model's words."""
-        turns, pieces = self.coordinates.switches.turns, self.coordinates.pieces
-        found = [pieces.asked(turns[int(i)].mode.name(), self.coordinates.dae) for i in switches]
-        return list(dict.fromkeys(found))
-
     def _approach(self) -> Approach:
         """Walk from the last place to the next, or to a singular pose before it."""
 
@@ -396,4 +292,4 @@ class Run:
 
         k = self.done
         end = float(self.trail.t[min(k + 1, self.trail.last)])
-        return approach(self._point(k), end, self.integrators.step, look)
+        return approach(self.changes.point(k), end, self.integrators.step, look)

@@ -15,6 +15,7 @@ from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
+from gantrytau.simulation.events.rounds import rounds_of
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.signals import SampledCourse, Signal
 from gantrytau.simulation.singular_poses import Conditioning
@@ -23,17 +24,17 @@ from gantrytau.simulation.singular_poses import Conditioning
 def all_coordinates(
     dae: Translated, signals: Mapping[str, Signal], outputs: Sequence[str] = ()
 ) -> Coordinates:
-    """The model in all its coordinates, with its inputs as the signals say. Raises ModelError for an input
-    without value, or a sampled one that has to be differentiated.
+    """The model in all its coordinates, its inputs as signals say; ModelError for one without value, or sampled and
+    differentiated.
     """
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), SampledCourse))
     held = tuple(s.name for s in dae.flat.sampled)
-    w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held)), ca.SX.sym("t0")
+    w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held) + len(dae.flat.discretes)), ca.SX.sym("t0")
     chains, given = dae.reduced.chains, dependents(dae)
     states = _states(dae, {name for _, name in given})
+    rates = column([chains.rate(n) for n in states])
     highest = {derivative_name(n, top): chains.sx(n, top) for n, top in dae.indexed.orders.items()}
     known = _known_symbols(dae, signals, sampled, w, t0, outputs)
-    known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
     pieces = in_modes(dae, known)
     last = {(i, c): pieces.residuals[i, c] for i, c in enumerate(dae.indexed.counts)}
     solved = _highest_blocks(dae, states, last, highest, pieces.numbers(dae.start))
@@ -41,7 +42,7 @@ def all_coordinates(
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
-    moving = [column([chains.rate(n) for n in states]), column(solved.residuals), *levels]
+    moving = [rates, column(solved.residuals), column(pieces.conditions), *levels]
     wanted = [
         *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
@@ -51,20 +52,20 @@ def all_coordinates(
     ]
     found = substitution.inserted(wanted)
     turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
-    ode, algebraic, *rest = outside.inserted(found)
+    ode, algebraic, conditions, *rest = outside.inserted(found)
     invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
     w = ca.vertcat(w, *(turn.mode for turn in turns))
+    arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
+    switches = Switches(turns, arguments, ode, algebraic)
     divisors = _divisors(solved, pivots, list(last), list(highest))
-    x, z = column([chains.named(n) for n in states]), column(solved.tears)
-    arguments = [x, z, time, t0, w]
     return Coordinates(
         dae=dae,
         states=states,
         algebraics=tuple(y.name() for y in solved.tears),
         sampled=sampled,
         held=held,
-        x=x,
-        z=z,
+        x=arguments[0],
+        z=arguments[1],
         w=w,
         t0=t0,
         ode=ode,
@@ -75,8 +76,9 @@ def all_coordinates(
         substitutions=(substitution, outside),
         pivots=pivots,
         pieces=pieces,
-        switches=Switches(turns, arguments, ode, algebraic),
-        dropped=ca.Function("dropped", [x, time, t0, w], [ca.densify(dropped)], {"cse": True}),
+        switches=switches,
+        rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
+        dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
         conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
     )
@@ -167,7 +169,7 @@ def _known_symbols(
     t0: ca.SX,
     outputs: Sequence[str],
 ) -> dict[str, ca.SX]:
-    """Inputs and those of their derivatives that occur, as expressions of time and samples."""
+    """Inputs and those of their derivatives that occur, as expressions of time and samples, and what is held."""
     sampled_at = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
     occurring = {leaf.name() for leaf in ca.symvar(sampled_at)}
     occurring |= {x.name for row in dae.indexed.incidence.values() for x in row}
@@ -198,4 +200,6 @@ def _known_symbols(
         for order in range(top + 1):
             known[derivative_name(name, order)] = signal
             signal = ca.densify(ca.jacobian(signal, time))
+    held = (*(s.name for s in dae.flat.sampled), *dae.flat.discretes)
+    known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
     return known

@@ -27,7 +27,7 @@ def other_constraints(run: Run) -> tuple[np.ndarray, Translated] | None:
     there are no others. The times are places of the run, as even as these.
     """
     dae = run.coordinates.dae
-    if not dae.redundant or dae.flat.sampled or not run.done:
+    if not dae.redundant or dae.flat.sampled or dae.flat.whens or not run.done:
         return None
     places = np.unique(np.linspace(0, run.done, min(run.done, LOOKED_AT) + 1).astype(int))
     course = _numbers(run, places)
@@ -70,4 +70,5 @@ def joined(parts: Sequence[Result], grid: np.ndarray) -> Result:
     times = np.concatenate([part.time[kept] for part, kept in zip(parts, rows, strict=True)])
     first = parts[0].select(names)
     words = {name: first.description(name) for name in names}
-    return Result(times, values, units=first.units, descriptions=words, title=first.title)
+    own = dict(title=first.title, held=first.held, ended=parts[-1].ended)
+    return Result(times, values, units=first.units, descriptions=words, **own)

@@ -106,3 +106,49 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
         time=t,
         equations=[],
     )
+
+
+def endless_rounds(dae: Translated, t: float, labels: Sequence[str]) -> SolveError:
+    """Whens act at one instant without end."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(labels)} {_become(labels)} true again and again at one instant: what "
+        "is done there makes the condition false and true anew. Let what acts lead to a side that stays; .result holds the "
+        "motion up to there",
+        time=t,
+        equations=labels,
+    )
+
+
+def accumulating(dae: Translated, t: float, label: str) -> SolveError:
+    """A when acts in ever shorter intervals."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {label} becomes true again and again, in intervals so short that rounding decides "
+        "what is next: its instants accumulate there (Zeno). Let the motion end in a rest, as by a Discrete that a when "
+        "sets where the speed is small, or end it with terminate(...); .result holds the motion up to there",
+        time=t,
+        equations=[label],
+    )
+
+
+def set_badly(dae: Translated, t: float, name: str, labels: Sequence[str]) -> SolveError:
+    """What a when sets at time t is not finite."""
+    return SolveError(
+        f"{dae.name}: {' and '.join(labels)}: at t = {t:.6g} s the new value of {dae.spoken(name)} is not finite; .result "
+        "holds the motion up to there: look for a division by zero or a root of a negative number",
+        time=t,
+        equations=labels,
+    )
+
+
+def inconsistent(dae: Translated, t: float, labels: Sequence[str], error: SolveError) -> SolveError:
+    """What a when sets at time t contradicts the constraints."""
+    return SolveError(
+        f"{dae.name}: {' and '.join(labels)}: at t = {t:.6g} s there is no motion with the new values of its states: {error}"
+        "; .result holds the motion up to there: set other states, or values that the mechanism can reach",
+        time=t,
+        equations=labels,
+    )
+
+
+def _become(labels: Sequence[str]) -> str:
+    return "becomes" if len(labels) == 1 else "become"

@@ -17,7 +17,7 @@ from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import DoubtfulResult, ModelError, SolveError
-from gantrytau.flattening.flat_checks import refuse_sticking, refuse_whens
+from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
@@ -65,6 +65,8 @@ def simulate(
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
     exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
+    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
+    `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are.
@@ -72,7 +74,6 @@ def simulate(
     _check(start, stop, tolerance, points, max_step)
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
-    refuse_whens(dae.flat)
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
     wanted = names(outputs or ())
@@ -107,7 +108,8 @@ def _all_runs(
     left = grid
     while True:
         run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
-        parts.append(result_of(run.coordinates, *run.so_far(), outputs))
+        ended = run.ended if error is None else str(error) or "interrupted"
+        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))
         found = other_constraints(run) if isinstance(error, SolveError) else None
         if found is None:
             break

@@ -22,8 +22,11 @@ def result_of(
     z: np.ndarray,
     w: np.ndarray,
     outputs: Sequence[str] | None,
+    ended: str = "stop",
 ) -> Result:
-    """Every variable and derivative (or only `outputs`) at the given times; w: what is sampled, held and switched there."""
+    """Every variable and derivative (or only `outputs`) at the given times; w: what is sampled, held and switched there;
+    ended: why there are no more of them.
+    """
     dae = coordinates.dae
     names, function = coordinates.kept(
         ("variables", None if outputs is None else tuple(outputs)), lambda: _variables(coordinates, outputs)
@@ -36,7 +39,9 @@ def result_of(
     for parameter in dae.flat.parameters if outputs is None else ():
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
     units, words = labels(dae)
-    return Result(times, table, units=units, descriptions=words, title=dae.name)
+    events = {*coordinates.held, *coordinates.discretes}
+    steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
+    return Result(times, table, units=units, descriptions=words, title=dae.name, held=steps, ended=ended)
 
 
 def _variables(coordinates: Coordinates, outputs: Sequence[str] | None) -> tuple[list[str], ca.Function]:

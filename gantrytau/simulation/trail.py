@@ -15,9 +15,9 @@ LEAST_STEPS = (
 
 class Trail:
     """Places in order of time: t (n,) in s, which repeats where something jumps, before and behind; x, z: states and
-    algebraics, a row each; held: what is held from there on, sampled variables, then modes; due: which of the former
-    are sampled there; driven: inputs that are given by samples, behind their jumps; stops: whether an integration ends
-    there; kept: places that results show.
+    algebraics, a row each; held: what is held from there on, sampled variables, discretes, then modes; due: which of the
+    first are sampled there; driven: inputs that are given by samples, behind their jumps; stops: whether an integration
+    ends there; kept: places that results show.
     """
 
     def __init__(
@@ -51,9 +51,10 @@ class Trail:
         size = self.t.size
         self.x = np.full((size, len(coordinates.states)), np.nan)
         self.z = np.full((size, len(coordinates.algebraics)), np.nan)
-        self.held = np.full((size, len(coordinates.held) + len(coordinates.switches)), np.nan)
+        names = (*coordinates.held, *coordinates.discretes)
+        self.held = np.full((size, len(names) + len(coordinates.switches)), np.nan)
         self.held[0] = [
-            *(coordinates.dae.start[n] for n in coordinates.held),
+            *(coordinates.dae.start[n] for n in names),
             *(0.0 for _ in coordinates.switches.turns),
         ]
 
@@ -130,6 +131,10 @@ class Trail:
         self.x[k + 1], self.z[k + 1] = self.x[k], self.z[k]
         if not written:
             self.kept[self.kept == k] = k + 1
+
+    def show(self, *places: int) -> None:
+        """Let results have some places as well."""
+        self.kept = np.union1d(self.kept, places)
 
     def stop_at(self, t: float, behind: int) -> None:
         """Let an integration end at a time behind a place."""

@@ -48,9 +48,10 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
 
 
 def _zero(a: float, b: float, c: float, d: float) -> float:
-    """The first zero of a cubic between 0, where it is not below zero, and 1, where it is."""
+    """The first zero of a falling cubic between 0, where it is not below zero but for rounding, and 1, where it is."""
     roots = np.roots([d, c, b, a]).tolist() if np.all(np.isfinite([a, b, c, d])) else []
-    inside = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
+    real = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
+    inside = [s for s in real if b + s * (2 * c + s * 3 * d) <= 0]
     return min(inside, default=0.5)
 
 

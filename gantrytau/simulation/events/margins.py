@@ -22,6 +22,10 @@ class Margins:
     rates: np.ndarray
     noise: np.ndarray
 
+    def blurred(self, errors: np.ndarray | float) -> "Margins":
+        """The same, known no better than by some errors."""
+        return Margins(self.values, self.rates, np.maximum(self.noise, errors))
+
 
 class Switches:
     """What turns where its margin passes zero (or a whole number, if it counts).
@@ -85,10 +89,14 @@ class Switches:
         on = np.where(self._closed, margins >= 0, margins > 0)
         return np.where(self._counts, np.floor(margins), on)
 
+    def whole(self, margins: np.ndarray) -> np.ndarray:
+        """Where margins turn: at the nearest whole number, if they count, else at zero."""
+        return np.where(self._counts, np.round(margins), 0.0)
+
     def following(self, margins: Margins) -> np.ndarray:
         """The modes just after one place: where a margin is zero, its rate decides."""
         values, rates, noise = margins.values[0], margins.rates[0], margins.noise[0]
-        whole = np.where(self._counts, np.round(values), 0.0)
+        whole = self.whole(values)
         rest = values - whole
         turning = (np.abs(rest) <= noise) & (rates != 0)
         after = np.where(self._counts, whole - (rates < 0), rates > 0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import Substitution, values_at
+from gantrytau.compiler.alphabets import Substitution, column, values_at
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
@@ -17,10 +17,13 @@ from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
 
 @dataclass(frozen=True, eq=False)
 class InModes:
-    """Residuals by (equation, times differentiated), expressions of known symbols by name, and what switches in them."""
+    """Residuals by (equation, times differentiated), expressions of known symbols by name, conditions of whens, and what
+    switches in them.
+    """
 
     residuals: Mapping[Key, ca.SX]
     known: Mapping[str, ca.SX]
+    conditions: tuple[ca.SX, ...]
     switched: Switched
 
     def numbers(self, point: Mapping[str, float]) -> dict[str, float]:
@@ -41,14 +44,16 @@ class InModes:
 
 
 def in_modes(dae: Translated, known: Mapping[str, ca.SX]) -> InModes:
-    """The equations of a model and its known symbols (their expressions in time) with modes."""
+    """The equations of a model, its known symbols (their expressions in time) and its conditions with modes."""
     residuals = dae.indexed.residuals
-    rows = [*residuals.values(), *known.values()]
+    conditions = dae.to_reduced(column([one.condition for one in dae.flat.whens])).elements()
+    rows = [*residuals.values(), *known.values(), *conditions]
     steady = set(dae.table.independent)
     names = {leaf.name() for leaf in ca.symvar(ca.vertcat(*rows))} - steady if rows else set()
     found = switched(rows, names)
-    first, second = found.expressions[: len(residuals)], found.expressions[len(residuals) :]
-    return InModes(dict(zip(residuals, first, strict=True)), dict(zip(known, second, strict=True)), found)
+    written = iter(found.expressions)
+    first = {key: next(written) for key in residuals}
+    return InModes(first, {name: next(written) for name in known}, tuple(written), found)
 
 
 def sorted_out(

@@ -37,9 +37,9 @@ class Sampler:
 
     @property
     def suits(self) -> bool:
-        """Whether the model is of a kind that can go this way: what it samples, without algebraic unknowns."""
+        """Whether the model is of a kind that can go this way: what it samples, without algebraic unknowns and whens."""
         c = self.coordinates
-        if not c.held or c.algebraics or not c.states:
+        if not c.held or c.algebraics or not c.states or c.rounds.whens:
             return False
         switches, half = c.switches, 2 * len(c.sampled)
         timed = ca.vertcat(

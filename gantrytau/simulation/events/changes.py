@@ -1,0 +1,257 @@
+"""What changes at one place of a run: what is sampled there, the sides of its switches, and what whens do.
+
+At an instant all that is sampled takes its new values first. Then the switches get the sides that hold behind it, and whens
+whose conditions became true act, in rounds: Discretes and states get new values, what follows from them is made
+consistent, the switches get their sides anew, until no condition becomes true any more.
+"""
+
+from itertools import product
+
+import numpy as np
+
+from gantrytau.errors import SolveError
+from gantrytau.simulation import run_ends
+from gantrytau.simulation.events.crossings import JUST_BEHIND
+from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.rounds import MOST, Made
+from gantrytau.simulation.events.time_events import TimeEvents
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.singular_poses import Point
+from gantrytau.simulation.trail import LEAST_STEPS, Trail
+
+MOST_AT_ONCE = 8  # switches of which all choices are tried
+SAME_INSTANT = 50  # events within SHORT of the run: chattering
+SHORT = 1e-9
+MOST_EVENTS = 500  # in a 500th of the run
+HOP = (
+    1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
+)
+HOPS = 3  # of them, one after another
+
+
+class Changes:
+    """What changes at the places of a trail."""
+
+    def __init__(self, coordinates: Coordinates, trail: Trail, sizes: np.ndarray, span: float):
+        """sizes: of the states; span: of the run, s."""
+        self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
+        begin = float(trail.t[0])
+        self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
+        self.events: list[float] = []  # times at which states made something switch
+        self.ended = ""  # what a when said that ended the run
+        self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
+        self._hops = np.zeros(self._holding.size, dtype=int)
+        self._acted: dict[
+            int, tuple[float, np.ndarray]
+        ] = {}  # when: last time, and rates of all margins behind it
+        self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
+
+    def modes(self, k: int) -> np.ndarray:
+        """The modes of a place, to read and to write."""
+        return self.trail.held[k, self.trail.held.shape[1] - len(self.coordinates.switches) :]
+
+    def columns(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """States, algebraics, times and inputs at places."""
+        trail = self.trail
+        return trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
+
+    def point(self, k: int) -> Point:
+        """A place as a point."""
+        return self.trail.x[k], self.trail.z[k], float(self.trail.t[k]), self.trail.inputs(k)
+
+    def margins(self, places: np.ndarray) -> Margins:
+        """The margins at places."""
+        return self.coordinates.switches.look(*self.columns(places), self.sizes)
+
+    def conditions(self, switches: np.ndarray) -> list[str]:
+        """What some switches ask for, in the model's words."""
+        turns, pieces = self.coordinates.switches.turns, self.coordinates.pieces
+        found = [pieces.asked(turns[int(i)].mode.name(), self.coordinates.dae) for i in switches]
+        return list(dict.fromkeys(found))
+
+    def begin(self) -> None:
+        """The first place: what is true there has not become so."""
+        trail = self.trail
+        trail.x[0], trail.z[0], modes = self.coordinates.start(trail.t[0], trail.inputs(0))
+        trail.held[0, trail.held.shape[1] - modes.size :] = modes
+        self._holding[:] = True
+        self.renew(0)
+        self.turn(0)
+
+    def renew(self, k: int) -> None:
+        """Give new values to what is sampled at a place, all from the values just before."""
+        trail = self.trail
+        due = trail.due[k]
+        if not due.any():
+            return
+        t = float(trail.t[k])
+        if self._holding.size:
+            self._unsampled = k, trail.held[k].copy(), trail.z[k].copy()
+        new = np.array(self.coordinates.renewed(trail.x[k], trail.z[k], t, t, trail.inputs(k))).ravel()
+        for name, value, now in zip(self.coordinates.held, new, due, strict=True):
+            if now and not np.isfinite(value):
+                raise run_ends.sampled_badly(self.coordinates.dae, t, name)
+        trail.held[k, : due.size][due] = new[due]
+        trail.z[k] = self._settled(k)
+
+    def behind_inputs(self, k: int) -> int:
+        """From the place before a jump of inputs to that behind it, which is returned."""
+        trail = self.trail
+        trail.x[k + 1], trail.z[k + 1], trail.held[k + 1] = trail.x[k], trail.z[k], trail.held[k]
+        trail.z[k + 1] = self._settled(k + 1)
+        return k + 1
+
+    def turn(self, k: int, *, by_states: bool = False) -> int:
+        """Find the modes and values that hold from a place on, and lay a second place there if they are others.
+
+        The last place at this instant is returned.
+        """
+        switches, trail, left = self.coordinates.switches, self.trail, k
+        if not len(switches) and not self._holding.size:
+            return k
+        first = self.modes(k).copy()
+        if len(switches):
+            margins = self.margins(np.array([k]))
+            modes = switches.following(margins)
+            if not np.array_equal(modes, first):
+                if k > 0:
+                    trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
+                    k = k + 1
+                self._agree(k, modes)
+            if by_states:
+                self._count(self.modes(k), first, float(trail.t[k]))
+        k = self._act(left, k)
+        end = self.by_time.next(float(trail.t[k]), trail.inputs(k))
+        if end is not None and not self.ended:
+            trail.stop_at(end, k)
+        return k
+
+    def _act(self, left: int, k: int) -> int:
+        """Let whens act whose conditions became true, in rounds; left: the first place at this instant."""
+        rounds, trail = self.coordinates.rounds, self.trail
+        if not self._holding.size:
+            return k
+        for _ in range(MOST):
+            now = rounds.holding(self.point(k))
+            rose, self._holding = now & ~self._holding, now
+            if not rose.any() or self.ended:
+                return k
+            made = rounds.made(self.point(k), rose)
+            self._refuse_bad(made, k)
+            if k == left:
+                trail.repeat(k, written=True)
+                k = k + 1
+            if self._unsampled is not None and self._unsampled[0] == left:
+                _, trail.held[left], trail.z[left] = self._unsampled
+            trail.show(left, k)
+            self._make(made, k, rose)
+        labels = [one.label for one, again in zip(rounds.whens, rose, strict=True) if again]
+        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), labels)
+
+    def _make(self, made: Made, k: int, rose: np.ndarray) -> None:
+        """Give a place the values of a round, and what follows from them."""
+        coordinates, trail = self.coordinates, self.trail
+        t, held = float(trail.t[k]), len(coordinates.held)
+        before = self.margins(np.array([k])) if len(coordinates.switches) else None
+        trail.held[k, held : held + len(coordinates.discretes)] = made.discretes
+        if coordinates.rounds.places.size:
+            trail.x[k, coordinates.rounds.places] = made.states
+            try:
+                trail.x[k] = coordinates.followed(trail.x[k], t, trail.inputs(k))
+            except SolveError as error:
+                raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
+        trail.z[k] = self._settled(k)
+        if before is not None:
+            after = self.margins(np.array([k]))
+            self._watch_hops(made.acts != 0, t, before, after)
+            errors = _location_errors(before, after, t, coordinates.switches.whole(before.values))
+            modes = coordinates.switches.following(after.blurred(errors))
+            if not np.array_equal(modes, self.modes(k)):
+                self._agree(k, modes, errors)
+        self.ended = "; ".join(
+            one.message
+            for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
+            if acts and one.message
+        )
+
+    def _labels(self, chosen: np.ndarray) -> list[str]:
+        return [one.label for one, some in zip(self.coordinates.rounds.whens, chosen, strict=True) if some]
+
+    def _refuse_bad(self, made: Made, k: int) -> None:
+        """SolveError for a new value that is not finite."""
+        names = [
+            *self.coordinates.discretes,
+            *(self.coordinates.states[i] for i in self.coordinates.rounds.places),
+        ]
+        for name, value in zip(names, [*made.discretes, *made.states], strict=True):
+            if not np.isfinite(value):
+                raise run_ends.set_badly(
+                    self.coordinates.dae, float(self.trail.t[k]), name, self._labels(made.acts)
+                )
+
+    def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
+        """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
+        for i in np.flatnonzero(acts):
+            own = list(self.coordinates.rounds.of[i])
+            if i in self._acted and own:
+                last, rates = self._acted[i]
+                away = np.abs(rates[own]) * (t - last) / 4  # of a parabola: the farthest
+                self._hops[i] = self._hops[i] + 1 if np.all(away < HOP * before.noise[0][own]) else 0
+                if self._hops[i] >= HOPS:
+                    raise run_ends.accumulating(
+                        self.coordinates.dae, t, self.coordinates.rounds.whens[i].label
+                    )
+            self._acted[int(i)] = t, after.rates[0].copy()
+
+    def _settled(self, k: int) -> np.ndarray:
+        """The algebraics of a place."""
+        places, trail = slice(k, k + 1), self.trail
+        w = trail.inputs(k)[None]
+        return self.coordinates.settle(trail.x[places], trail.z[places], trail.t[places], w)[0]
+
+    def _agree(self, k: int, modes: np.ndarray, errors: np.ndarray | float = 0.0) -> None:
+        """Give a place modes that agree with the margins they lead to, from these on; SolveError if there are none.
+
+        errors: by which margins are known at least.
+        """
+        tried = [self.modes(k).copy()]
+        while not any(np.array_equal(modes, old) for old in tried):
+            tried.append(modes)
+            modes = self._led_to(k, modes, errors)
+            if np.array_equal(modes, tried[-1]):
+                return
+        # one leads to another in a circle: all choices of what changed, the nearest to the first first
+        changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
+        if changing.size <= MOST_AT_ONCE:
+            choices = product(*(np.unique([old[i] for old in tried]).tolist() for i in changing))
+            for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
+                modes = tried[0].copy()
+                modes[changing] = choice
+                if np.array_equal(self._led_to(k, modes, errors), modes):
+                    return
+        raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
+
+    def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float) -> np.ndarray:
+        """The modes that belong to the margins of a place that has these modes."""
+        trail, places = self.trail, slice(k, k + 1)
+        self.modes(k)[:] = modes
+        trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
+        trail.z[k] = self._settled(k)
+        return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
+
+    def _count(self, modes: np.ndarray, before: np.ndarray, t: float) -> None:
+        """SolveError if states made something switch too often."""
+        events = self.events
+        events.append(t)
+        for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
+            if len(events) > many and t - events[-many] < share * self.span:
+                conditions = self.conditions(np.flatnonzero(modes != before))
+                raise run_ends.chattering(self.coordinates.dae, t, conditions)
+
+
+def _location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+    """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
+    rest = np.abs(before.values - whole)[0]
+    near = rest <= JUST_BEHIND * before.noise[0] + 8 * np.spacing(abs(t)) * np.abs(before.rates[0])
+    same = np.abs(after.values - before.values)[0] <= after.noise[0]
+    return np.where(near & same, 1.1 * rest, 0.0)

@@ -1,0 +1,101 @@
+"""What whens make of a place where their conditions become true: functions of states, algebraics, time and what is held."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.compiler.translated import Translated
+from gantrytau.flattening.flat_model import When
+from gantrytau.flattening.whens import Jump, one_round
+from gantrytau.simulation.events.margins import Switches
+from gantrytau.simulation.singular_poses import Point
+
+MOST = 100  # rounds at one instant
+
+
+@dataclass(frozen=True)
+class Made:
+    """What one round makes: which whens act, (whens,); new values of the Discretes, and of the states at `Rounds.places`."""
+
+    acts: np.ndarray
+    discretes: np.ndarray
+    states: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds:
+    """The whens of a model. places: of the states that they set, in x; of: of the switches in each condition."""
+
+    whens: tuple[When, ...]
+    places: np.ndarray
+    of: tuple[tuple[int, ...], ...]
+    conditions: ca.Function
+    jump: ca.Function
+
+    def holding(self, point: Point) -> np.ndarray:
+        """Which conditions hold at a point."""
+        x, z, t, w = point
+        return np.array(self.conditions(x, z, t, t, w)).ravel() != 0
+
+    def made(self, point: Point, rose: np.ndarray) -> Made:
+        """A round at a point where some conditions became true."""
+        x, z, t, w = point
+        return Made(*(np.array(f).ravel() for f in self.jump(x, z, t, t, w, rose)))
+
+
+def rounds_of(
+    dae: Translated,
+    states: Sequence[str],
+    conditions: ca.SX,
+    substitutions: Sequence[Substitution],
+    switches: Switches,
+    arguments: Sequence[ca.SX],
+) -> Rounds:
+    """The whens in the symbols of a simulation.
+
+    conditions: (whens,), with modes; substitutions: one after another, from reduced symbols to the arguments, x, z,
+    time, t0, w.
+    """
+    jump = one_round(dae.flat)
+    names, values = [n for n, _ in jump.states], _of_roots(dae, jump)
+    found = [dae.to_reduced(jump.acts), dae.to_reduced(jump.discretes), column(values)]
+    for substitution in substitutions:
+        found = substitution.inserted(found)
+    acts, discretes, new = found
+    roots = [dae.reduced.aliases[n] for n in names]
+    rose = [jump.rose] if dae.flat.whens else [ca.SX.sym("rose", 0)]
+    made = [ca.densify(e) for e in (acts, discretes, new)]
+    return Rounds(
+        dae.flat.whens,
+        np.array([states.index(a.symbol) for a in roots], dtype=int),
+        _switches_of(conditions, switches),
+        ca.Function("conditions", list(arguments), [ca.densify(conditions)], {"cse": True}),
+        ca.Function("jump", [*arguments, *rose], made, {"cse": True}),
+    )
+
+
+def _of_roots(dae: Translated, jump: Jump) -> list[ca.SX]:
+    """The new values of the states behind the variables that are set, in reduced symbols."""
+    found = []
+    for name, value in jump.states:
+        alias = dae.reduced.aliases[name]
+        found.append(dae.to_reduced(alias.root_value(value)))
+    return found
+
+
+def _switches_of(conditions: ca.SX, switches: Switches) -> tuple[tuple[int, ...], ...]:
+    """The switches in each condition, and in the margins of these."""
+    places = {turn.mode.name(): k for k, turn in enumerate(switches.turns)}
+    found = []
+    for condition in conditions.elements():
+        own: set[int] = set()
+        left = [condition]
+        while left:
+            new = {places[n] for leaf in ca.symvar(left.pop()) if (n := leaf.name()) in places} - own
+            own |= new
+            left += [switches.turns[k].margin for k in new]
+        found.append(tuple(sorted(own)))
+    return tuple(found)
