@@ -24,9 +24,7 @@ from gantrytau.simulation.singular_poses import Conditioning
 def all_coordinates(
     dae: Translated, signals: Mapping[str, Signal], outputs: Sequence[str] = ()
 ) -> Coordinates:
-    """The model in all its coordinates, its inputs as signals say; ModelError for one without value, or sampled and
-    differentiated.
-    """
+    """The model in all its coordinates, with inputs as signals say; ModelError for one that is not known well enough."""
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), SampledCourse))
     held = tuple(s.name for s in dae.flat.sampled)
     w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held) + len(dae.flat.discretes)), ca.SX.sym("t0")

@@ -252,6 +252,6 @@ class Changes:
 def _location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
     """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
     rest = np.abs(before.values - whole)[0]
-    near = rest <= JUST_BEHIND * before.noise[0] + 8 * np.spacing(abs(t)) * np.abs(before.rates[0])
+    near = rest <= 2 * JUST_BEHIND * before.noise[0] + 8 * np.spacing(abs(t)) * np.abs(before.rates[0])
     same = np.abs(after.values - before.values)[0] <= after.noise[0]
     return np.where(near & same, 1.1 * rest, 0.0)
