@@ -74,6 +74,8 @@ from gantrytau.language.parameter_files import parameter_text, parameters_of, re
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time
+from gantrytau.language.tables.read_table import read_table
+from gantrytau.language.tables.tables import table
 from gantrytau.results.figures import has_windows
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
@@ -155,6 +157,7 @@ __all__ = [
     "prbs",
     "pre",
     "read_parameters",
+    "read_table",
     "read_toml",
     "reinit",
     "replacing",
@@ -169,6 +172,7 @@ __all__ = [
     "steps",
     "stick_slip",
     "study",
+    "table",
     "tan",
     "tanh",
     "terminate",

@@ -59,12 +59,17 @@ SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 
 
 class Dimensioned(NamedTuple):
-    """An expression as it is written, its unit, what is wrong with it, and whether it is the time but for numbers."""
+    """An expression as it is written, its unit, what is wrong with it, and whether it is the time but for numbers.
+
+    condition: whether it is true or false; piece: whether it is a difference of conditions, which chooses in a table.
+    """
 
     unit: Unit
     text: str
     fault: str = ""
     clock: bool = False
+    condition: bool = False
+    piece: bool = False
 
 
 def check_units(flat: FlatModel) -> None:
@@ -159,10 +164,15 @@ def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
         unit, fault = NUMBER, None
     carried = next((term.fault for term in operands if term.fault), "")
     plain = [term for term in operands if term.unit != NUMBER]
+    condition, piece = operator in RELATIONS, False
+    if operator == ca.OP_SUB:  # the numbers of a table take the unit that is asked for
+        piece = bool(plain) and all(term.condition or term.piece for term in plain)
+    if operator == ca.OP_IF_ELSE_ZERO and operands[0].piece:
+        unit = ANY
     clock = (
         bool(plain) and all(term.clock and term.unit == unit for term in plain) and operator in CLOCK | KEEP
     )
-    return Dimensioned(unit, _words(operator, words), carried or fault or "", clock)
+    return Dimensioned(unit, _words(operator, words), carried or fault or "", clock, condition, piece)
 
 
 def _unit(

@@ -10,7 +10,7 @@ from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.rods import Rods
 from gantrytau.language.statements import Equation, Requirement
-from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.language.symbols import Range, derivative_name, split_derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ class FlatModel:
     scalars known from outside; absent: declared names that this model has no use for, and why;
     requirements: conditions on parameters; sampled, discretes, frictions: scalars that are set at instants, no unknowns
     either, discretes by `whens`; before: symbols of the values of discretes just before an instant, by their names;
-    rods: what a robot says of its links, by name.
+    ranges: where tables end that are not defined beyond; rods: what a robot says of its links, by name.
     """
 
     name: str
@@ -168,6 +168,7 @@ class FlatModel:
     whens: tuple[When, ...] = ()
     discretes: tuple[str, ...] = ()
     before: Mapping[str, ca.SX] = field(default_factory=dict)
+    ranges: tuple[Range, ...] = ()
     rods: Rods | None = None
 
     @cached_property

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import casadi as ca
+
 from gantrytau.errors import told
 from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
@@ -26,7 +28,7 @@ from gantrytau.language.events import Sampling, Sticking, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
-from gantrytau.language.symbols import scalars, time, writing
+from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
 
 
 def flatten(model: Model) -> FlatModel:
@@ -64,8 +66,10 @@ def _stated(instance: Instance) -> _Stated:
                 found.ways.append((path, name, number, statement))
             else:
                 found.equations += equality(statement, path, name, number)
+        ranges = tuple(instance.symbols.ranges)
         for number, statement in _statements(component.initial_equations, path, name):
             found.initial += equality(statement, path, name, number)
+        instance.symbols.ranges[:] = ranges  # what is asked at the start alone is not watched
     return found
 
 
@@ -126,8 +130,16 @@ def write_out(instance: Instance) -> FlatModel:
         whens=whens,
         discretes=discretes,
         before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
+        ranges=_ranges(instance.symbols, spread),
         rods=rods_of(instance.root),
     )
+
+
+def _ranges(symbols: Symbols, spread: Spread) -> tuple[Range, ...]:
+    """What has been noted in the equations, in the symbols of the flat model."""
+    whole = [Equation(r.expression, ca.SX(0), "", "", 0) for r in symbols.ranges]
+    written = spread.substituted(whole)
+    return tuple(replace(r, expression=e.left) for r, e in zip(symbols.ranges, written, strict=True))
 
 
 def _events(

@@ -47,7 +47,6 @@ def refuse_calls(place: str, *expressions: ca.SX) -> None:
     if called:
         raise ModelError(
             f"{place}: found a call of the function '{called[0].name()}', a table or a function from outside, "
-            "expected an expression of symbols; `table` is to come for tables. Until then write a formula, straight "
-            "pieces with if_else, or a casadi.Function of a formula; a course over time can be an Input with samples "
-            "(times, values)"
+            "expected an expression of symbols; write table(x, xs, ys) for a table, a formula, or a casadi.Function of a "
+            "formula; a course over time can be an Input with samples (times, values)"
         )

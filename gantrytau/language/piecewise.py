@@ -5,12 +5,15 @@ looks as if it were the same everywhere. Written with modes, every piece has der
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.language.instructions import computed
+from gantrytau.language.tables.local_polynomials import polynomials
+
+MANY = 8  # numbers with which one expression is compared, from where on one mode counts them
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     function = ca.Function("switched", [ca.vertcat(*leaves)], [whole])
     if not any(function.instruction_id(k) in _SWITCHING for k in range(function.n_instructions())):
         return Switched(tuple(expressions), ())
-    reader = _Walk([])
+    reader = _Walk()
     (found,) = computed(
         ca.Function("switched", [ca.vertcat(*leaves)], [whole], {"cse": True}),
         lambda _, i: (leaves[i], moving[i]),
@@ -64,11 +67,10 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     )
     if not reader.switches:
         return Switched(tuple(expressions), ())
-    pieces = ca.vertsplit(
-        ca.vertcat(*(e for e, _ in found)), np.cumsum([0, *(e.numel() for e in dense)]).tolist()
-    )
+    written, switches = reader.counted([e for e, _ in found])
+    pieces = ca.vertsplit(ca.vertcat(*written), np.cumsum([0, *(e.numel() for e in dense)]).tolist())
     shaped = (ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True))
-    return Switched(tuple(shaped), tuple(reader.switches))
+    return Switched(tuple(shaped), switches)
 
 
 _COMPARING = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_IF_ELSE_ZERO)
@@ -80,9 +82,15 @@ _Value = tuple[ca.SX, bool]  # an expression, and whether it moves with the symb
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """Computes with expressions, and notes what switches."""
+    """Computes with expressions, and notes what switches.
 
-    switches: list[Turn]
+    steps: of an expression by its node the modes that say whether it has reached a number, by that number.
+    """
+
+    switches: list[Turn] = field(default_factory=list)
+    steps: dict[int, tuple[ca.SX, dict[float, ca.SX]]] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
+    _modes: dict[tuple[int | bool, ...], ca.SX] = field(default_factory=dict)
 
     def operation(self, operator: int, operands: list[_Value]) -> _Value:
         a = operands[0][0]
@@ -97,10 +105,12 @@ class _Walk:
 
     def _switching(self, operator: int, a: ca.SX, b: ca.SX) -> ca.SX | None:
         """What an operator is, written with modes; None for one that does not switch."""
-        if operator == ca.OP_LT:
-            return self._mode(b - a)
-        if operator == ca.OP_LE:
-            return self._mode(b - a, closed=True)
+        if operator in (ca.OP_LT, ca.OP_LE):
+            mode = self._mode(b - a, closed=operator == ca.OP_LE)
+            if a.is_constant() and mode.is_symbolic():
+                edge = float(a) if operator == ca.OP_LE else float(np.nextafter(float(a), np.inf))
+                self.steps.setdefault(b.element_hash(), (b, {}))[1].setdefault(edge, mode)
+            return mode
         if operator == ca.OP_EQ:
             return self._mode(b - a, closed=True) * self._mode(a - b, closed=True)
         if operator == ca.OP_NE:
@@ -133,18 +143,53 @@ class _Walk:
 
     def _of_modes(self, condition: ca.SX) -> bool:
         """Whether a condition is made of modes, which jump where they are noted already."""
-        noted = {s.mode.name() for s in self.switches}
-        return all(leaf.name() in noted for leaf in ca.symvar(condition))
+        return all(leaf.name() in self._names for leaf in ca.symvar(condition))
 
     def _mode(self, margin: ca.SX, *, closed: bool = False, counts: bool = False) -> ca.SX:
         if margin.is_constant():
             return Turn(margin, margin, closed, counts).value
-        for old in self.switches:
-            if old.closed == closed and old.counts == counts and ca.is_equal(old.margin, margin, 3):
-                return old.mode
-        new = Turn(ca.SX.sym(f"(mode {len(self.switches)})"), margin, closed, counts)
-        self.switches.append(new)
-        return new.mode
+        parts = (margin,) if margin.is_symbolic() else (margin.dep(k) for k in range(margin.n_dep()))
+        key = closed, counts, margin.op(), *(part.element_hash() for part in parts)
+        if key not in self._modes:
+            new = Turn(ca.SX.sym(f"(mode {len(self.switches)})"), margin, closed, counts)
+            self.switches.append(new)
+            self._modes[key] = new.mode
+            self._names.add(new.mode.name())
+        return self._modes[key]
+
+    def counted(self, expressions: Sequence[ca.SX]) -> tuple[list[ca.SX], tuple[Turn, ...]]:
+        """Expressions and switches, with one mode that counts how many of many numbers an expression has reached."""
+        told: dict[str, tuple[ca.SX, ca.SX]] = {}  # by a mode: its symbol, and what it is of one that counts
+        counts: dict[str, Turn] = {}  # by the first mode of those that it stands for
+        for quantity, modes in self.steps.values():
+            if len(modes) < MANY:
+                continue
+            edges = np.array(sorted(modes))
+            mode = ca.SX.sym(f"(count {len(counts)})")
+            told.update((modes[e].name(), (modes[e], mode >= k + 1)) for k, e in enumerate(edges.tolist()))
+            counts[next(iter(modes.values())).name()] = Turn(mode, reached(quantity, edges), counts=True)
+        if not told:
+            return list(expressions), tuple(self.switches)
+        symbols, values = zip(*told.values(), strict=True)
+        kept = [t for t in self.switches if t.mode.name() not in told or t.mode.name() in counts]
+        kept = [counts.get(t.mode.name(), t) for t in kept]
+        found = ca.substitute(
+            [*expressions, *(t.margin for t in kept)], [ca.vertcat(*symbols)], [ca.vertcat(*values)]
+        )
+        turns = [replace(t, margin=m) for t, m in zip(kept, found[len(expressions) :], strict=True)]
+        return list(found[: len(expressions)]), tuple(turns)
+
+
+def reached(x: ca.SX, edges: np.ndarray) -> ca.SX:
+    """How many of some numbers (n,), n > 1, that rise, an expression has reached, as a smooth expression in between.
+
+    Whole where it reaches one, and straight between two; beyond the ends it levels off, so that it counts no further.
+    """
+    count = np.arange(1.0, edges.size + 1)
+    (value,), _ = polynomials(edges, count[:, None], "linear", "linear").at(x)
+    below, above = (edges[0] - x) / (edges[1] - edges[0]), (x - edges[-1]) / (edges[-1] - edges[-2])
+    value = ca.if_else(below > 0, 0.5 + 0.5 / (1 + 2 * below), value)
+    return ca.if_else(above > 0, edges.size + 0.5 - 0.5 / (1 + 2 * above), value)
 
 
 def with_modes(found: Switched, expressions: Sequence[ca.SX]) -> list[ca.SX]:

@@ -12,6 +12,7 @@ import casadi as ca
 from gantrytau.errors import ModelError
 from gantrytau.language.instructions import refuse_calls
 
+LONG = 60  # of an expression in a message, from where on only its symbols are named
 time = ca.SX.sym("time")  # the independent variable of every model, in s
 
 
@@ -40,11 +41,31 @@ class Symbol:
     order: int
 
 
+@dataclass(frozen=True, eq=False)
+class Range:
+    """Numbers between which a scalar expression has to stay, in its unit, lest something is not defined."""
+
+    expression: ca.SX
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """What has to stay there, as it is written."""
+        text = str(self.expression)
+        return (
+            text
+            if len(text) < LONG
+            else f"an expression of {', '.join(map(str, ca.symvar(self.expression)))}"
+        )
+
+
 class Symbols:
-    """All scalar symbols of one model, found by name or by the CasADi node that stands for them."""
+    """All scalar symbols of one model, found by name or by the CasADi node that stands for them; ranges: noted so far."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, Symbol] = {}
+        self.ranges: list[Range] = []
         self._by_node: dict[int, Symbol] = {}
 
     def add(self, name: str, kind: str, base: str | None = None, order: int = 0) -> Symbol:
@@ -133,6 +154,13 @@ def writing(symbols: Symbols):
         yield
     finally:
         _current.reset(token)
+
+
+def note_range(expression: ca.SX, low: float, high: float) -> None:
+    """Note where a scalar expression of the model that is being written out has to stay."""
+    symbols = _current.get()
+    if symbols is not None and not expression.is_constant():
+        symbols.ranges.append(Range(expression, low, high))
 
 
 def der(expression: Any, order: int = 1) -> ca.SX:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
+from gantrytau.language.symbols import Range
 
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
@@ -91,6 +92,17 @@ def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveErr
         f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} {turn} back and forth without end: what holds on either "
         "side leads back to the other. Smooth it, as tanh(x / small) for sign(x), or let it keep its side within a band; "
         "friction that sticks is stick_slip, in an FMU; .result holds the motion up to there",
+        time=t,
+        equations=[],
+    )
+
+
+def left_table(dae: Translated, t: float, table: Range) -> SolveError:
+    """The argument of a table leaves it at time t."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {table.name} leaves its table, which ends at {table.low:g} and {table.high:g}, and "
+        "is not defined beyond. Add points, or let it go on with outside='hold' or 'linear'; .result holds the motion up to "
+        "there",
         time=t,
         equations=[],
     )

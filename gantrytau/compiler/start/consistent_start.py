@@ -1,8 +1,11 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
+from collections.abc import Mapping
+
 import casadi as ca
 
 from gantrytau.compiler.aliases import Reduced
+from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues
@@ -36,6 +39,7 @@ def consistent_start(
             thorough=thorough,
         )
     except InitializationError as error:
+        refuse_outside(flat, reduced, guess.values, error)
         if held or not guess.fixed:
             raise
         # a fixed start may belong to a later level than the states that have to follow it
@@ -47,6 +51,23 @@ def consistent_start(
         extra = _initial_level(flat, reduced, stages)
         values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
     return values
+
+
+def refuse_outside(
+    flat: FlatModel, reduced: Reduced, values: Mapping[str, float], error: InitializationError
+) -> None:
+    """InitializationError in place of another if a table that is not defined beyond its ends is left at some values."""
+    for one in flat.ranges:
+        expression = reduced.to_reduced(one.expression)
+        if not all(leaf.name() in values for leaf in ca.symvar(expression)):
+            continue
+        found = float(values_at(expression, values)[0, 0])
+        if not one.low <= found <= one.high:
+            raise InitializationError(
+                f"{flat.name}: {one.name} starts at {found:g}, expected {one.low:g} to {one.high:g}, where its table is "
+                "defined: start within, add points, or let it go on with outside='hold' or 'linear'",
+                residuals=error.residuals,
+            ) from None
 
 
 def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:

@@ -113,6 +113,7 @@ class Changes:
         if len(switches):
             margins = self.margins(np.array([k]))
             modes = switches.following(margins)
+            self._refuse_outside(k, modes)
             if not np.array_equal(modes, first):
                 if k > 0:
                     trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
@@ -125,6 +126,13 @@ class Changes:
         if end is not None and not self.ended:
             trail.stop_at(end, k)
         return k
+
+    def _refuse_outside(self, k: int, modes: np.ndarray) -> None:
+        """SolveError if a table that is not defined beyond its ends is left at a place that gets these modes."""
+        x, z, t, w = self.point(k)
+        w = np.concatenate([w[: w.size - modes.size], modes])
+        for number in np.flatnonzero(np.array(self.coordinates.rounds.left(x, z, t, t, w)).ravel()):
+            raise run_ends.left_table(self.coordinates.dae, t, self.coordinates.dae.flat.ranges[int(number)])
 
     def _act(self, left: int, k: int) -> int:
         """Let whens act whose conditions became true, in rounds; left: the first place at this instant."""

@@ -17,8 +17,8 @@ from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
 
 @dataclass(frozen=True, eq=False)
 class InModes:
-    """Residuals by (equation, times differentiated), expressions of known symbols by name, conditions of whens, and what
-    switches in them.
+    """Residuals by (equation, times differentiated), expressions of known symbols by name, conditions of whens,
+    then of ranges that are left, and what switches in them.
     """
 
     residuals: Mapping[Key, ca.SX]
@@ -46,7 +46,8 @@ class InModes:
 def in_modes(dae: Translated, known: Mapping[str, ca.SX]) -> InModes:
     """The equations of a model, its known symbols (their expressions in time) and its conditions with modes."""
     residuals = dae.indexed.residuals
-    conditions = dae.to_reduced(column([one.condition for one in dae.flat.whens])).elements()
+    left = [1 - (r.expression >= r.low) + (r.expression > r.high) for r in dae.flat.ranges]
+    conditions = dae.to_reduced(column([*(one.condition for one in dae.flat.whens), *left])).elements()
     rows = [*residuals.values(), *known.values(), *conditions]
     steady = set(dae.table.independent)
     names = {leaf.name() for leaf in ca.symvar(ca.vertcat(*rows))} - steady if rows else set()

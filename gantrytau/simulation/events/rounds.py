@@ -27,12 +27,16 @@ class Made:
 
 @dataclass(frozen=True, eq=False)
 class Rounds:
-    """The whens of a model. places: of the states that they set, in x; of: of the switches in each condition."""
+    """The whens of a model. places: of the states that they set, in x; of: of the switches in each condition.
+
+    left: which of its ranges are left.
+    """
 
     whens: tuple[When, ...]
     places: np.ndarray
     of: tuple[tuple[int, ...], ...]
     conditions: ca.Function
+    left: ca.Function
     jump: ca.Function
 
     def holding(self, point: Point) -> np.ndarray:
@@ -56,8 +60,8 @@ def rounds_of(
 ) -> Rounds:
     """The whens in the symbols of a simulation.
 
-    conditions: (whens,), with modes; substitutions: one after another, from reduced symbols to the arguments, x, z,
-    time, t0, w.
+    conditions: of whens, then of ranges that are left, with modes; substitutions: one after another, from
+    reduced symbols to the arguments, x, z, time, t0, w.
     """
     jump = one_round(dae.flat)
     names, values = [n for n, _ in jump.states], _of_roots(dae, jump)
@@ -68,11 +72,13 @@ def rounds_of(
     roots = [dae.reduced.aliases[n] for n in names]
     rose = [jump.rose] if dae.flat.whens else [ca.SX.sym("rose", 0)]
     made = [ca.densify(e) for e in (acts, discretes, new)]
+    conditions, left = ca.vertsplit(conditions, [0, len(dae.flat.whens), conditions.numel()])
     return Rounds(
         dae.flat.whens,
         np.array([states.index(a.symbol) for a in roots], dtype=int),
         _switches_of(conditions, switches),
         ca.Function("conditions", list(arguments), [ca.densify(conditions)], {"cse": True}),
+        ca.Function("left", list(arguments), [ca.densify(left)], {"cse": True}),
         ca.Function("jump", [*arguments, *rose], made, {"cse": True}),
     )
 

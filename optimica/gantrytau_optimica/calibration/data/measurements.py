@@ -1,7 +1,6 @@
 """Measured poses for calibration: actuator positions, tool positions, orientations, guideways."""
 
 import copy
-import csv
 import re
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -12,13 +11,13 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import of_quaternions
+from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.calibration.data.findings import Finding
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _ACTUATOR = re.compile(r"q[1-9]\d*")
-_SEPARATORS = (";", "\t", ",")
 
 
 class Measurements:
@@ -184,19 +183,7 @@ def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str,
 
     wrong: says what is wrong with the names of columns.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            first = file.readline()
-            separator = next((one for one in _SEPARATORS if one in first), ",")
-            file.seek(0)
-            reader = csv.reader(file, delimiter=separator)
-            rows = [(reader.line_num, row) for row in reader if "".join(row).strip()]
-    except OSError as error:
-        raise ModelError(f"{path}: found no file to read ({error.strerror}), expected a CSV file") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ModelError(
-            f"{path}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
-        ) from None
+    rows, separator = read_cells(path)
     if not rows:
         raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
     header = [name.strip() for name in rows[0][1]]
@@ -212,26 +199,13 @@ def _twice(header: Sequence[str]) -> str:
     return f"found several columns {', '.join(twice)}, expected one of each name" if twice else ""
 
 
-def _cells(path: Path, line: int, row: Sequence[str], header: Sequence[str], separator: str) -> list[float]:
+def _cells(path: Path, line: int, row: list[str], header: Sequence[str], separator: str) -> list[float]:
     """The numbers of a line; of columns that are not read NaN."""
-    if len(row) != len(header):
-        commas = separator == "," and len(row) > len(header)
-        remedy = "; where decimals have commas, separate cells by semicolons" if commas else ""
-        raise ModelError(
-            f"{path}: line {line} has {len(row)} cells, expected {len(header)} as the header{remedy}"
-        )
-    found = []
-    for name, cell in zip(header, row, strict=True):
-        text = cell.strip() if _read(name) else ""
-        try:
-            found.append(float(text if separator == "," else text.replace(",", ".")) if text else np.nan)
-        except ValueError:
-            decimals = "" if separator == "," else ", or a comma"
-            raise ModelError(
-                f"{path}: line {line}, column {name}: found {text!r}, expected a number, with a point{decimals} before "
-                "decimals and nothing between thousands"
-            ) from None
-    return found
+    check_cells(path, line, row, len(header), separator)
+    return [
+        number_of(path, line, name, cell, separator) if _read(name) else np.nan
+        for name, cell in zip(header, row, strict=True)
+    ]
 
 
 def _read(name: str) -> bool:

@@ -1,0 +1,1 @@
+"""Tables of numbers as expressions, and the files that hold them."""

@@ -1,0 +1,63 @@
+"""Curves and maps from CSV files, in the ways that spreadsheets write them."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError, read_table, table
+
+
+def written(folder, text):
+    path = folder / "curve.csv"
+    path.write_text(text, encoding="utf-8-sig")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["angle,torque\n0,0.5\n1.5,2\n", "angle;torque\n0;0,5\n1,5;2\n\n", "angle\ttorque\n0\t0.5\n1,5\t2\n"],
+)
+def test_a_curve_is_read_with_commas_semicolons_and_tabs(tmp_path, text):
+    xs, ys = read_table(written(tmp_path, text))
+    assert xs.tolist() == [0.0, 1.5]
+    assert ys.tolist() == [0.5, 2.0]
+    assert table(0.75, xs, ys) == 1.25
+
+
+def test_two_columns_are_chosen_by_name(tmp_path):
+    path = written(tmp_path, "name;speed;torque\na;1;2\nb;2;7\n")
+    assert table(1.5, *read_table(path, columns=("speed", "torque"))) == 4.5
+
+
+def test_a_map_is_read_whole(tmp_path):
+    (xs, ys), values = read_table(written(tmp_path, ";0;10,5;20\n1;1;2;3\n2;4;5;6\n"))
+    assert xs.tolist() == [1, 2]
+    assert ys.tolist() == [0, 10.5, 20]
+    assert np.array_equal(values, [[1, 2, 3], [4, 5, 6]])
+    assert table((1.5, 10.5), (xs, ys), values) == 3.5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a,b\n", "found 1 lines, expected a header"),
+        ("a,b\n1,2\n3\n", "line 3 has 1 cells, expected 2"),
+        ("a,b\n1,5,2,5\n", "line 2 has 4 cells, expected 2 .*separate cells by semicolons"),
+        ("a,b\n1,x\n", "line 2, column b: found 'x', expected a number"),
+        ("a,b\n1,\n", "line 2, column b: found an empty cell, expected a number"),
+        ("1,2\n3,4\n", "found numbers in the first line, expected the names of the columns"),
+        ("a,b,c\n1,2,3\n", r"found the columns a, b, c, expected two of a curve; name them, columns="),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused_with_its_line(tmp_path, text, words):
+    with pytest.raises(ModelError, match=f"curve.csv: {words}"):
+        read_table(written(tmp_path, text))
+
+
+def test_a_column_that_is_not_there_is_named(tmp_path):
+    path = written(tmp_path, "speed,torque\n1,2\n")
+    with pytest.raises(
+        ModelError, match=r"found no columns sped, expected one of speed, torque.*mean 'speed'"
+    ):
+        read_table(path, columns=("sped", "torque"))
+    with pytest.raises(ModelError, match="found no file to read"):
+        read_table(tmp_path / "missing.csv")
