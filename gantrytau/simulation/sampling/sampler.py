@@ -10,11 +10,10 @@ from gantrytau.errors import SolveError
 from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.sampling.passage import Passage, passage
+from gantrytau.simulation.sampling.buffers import CALLS, Passages, Steps
 from gantrytau.simulation.sampling.runge_kutta import ORDER
 from gantrytau.simulation.trail import Trail
 
-CALLS = (1, 8, 64, 512)  # passages in one call
 MOST = 256  # steps from place to place: with more, an implicit method is quicker, though it starts anew
 SAFETY = 0.9  # of the step that the last error suggests
 SHRINK, GROW = 0.2, 5.0  # of a step, at once
@@ -34,6 +33,7 @@ class Sampler:
         self.step = np.inf  # s, that the last errors allow
         self.most = CALLS[1]  # passages in the next call
         self.wait = self.waited = 0  # asked in vain, times, before and since the last trial
+        self.passages = Passages(coordinates)
 
     @property
     def suits(self) -> bool:
@@ -101,65 +101,40 @@ class Sampler:
         count = int(np.searchsorted(ends, size, side="right"))
         parts, ends = parts[:count], ends[:count]
         places = np.arange(here, here + count + 1)
-        y, e3, e5, u = self._passages(trail, places, parts, size)
-        h, rows = u[1], ends - 1
-        before = np.hstack([self._state(trail, here)[:, None], y[:, :-1]])
-        error = self._error(before, y, h, e3, e5)
+        told = self._told(trail, places, parts)
+        first = np.concatenate([trail.x[here], trail.held[here]])
+        found = self.passages.steps(first, told, size, (trail.last - here) * len(told) / count)
+        error = self._error(found, told[:, 1])
         good = int(np.argmax(error > 1)) if np.any(error > 1) else error.size
-        self._adapt(error[: good + 1], h)
+        self._adapt(error[: good + 1], told[:, 1])
         accepted = int(np.searchsorted(ends, good, side="right"))
-        turn = self._first_turn(before, y, u, int(ends[accepted - 1]) if accepted else 0)
+        turn = self._first_turn(found, told, int(ends[accepted - 1]) if accepted else 0)
         reached = accepted if turn is None else int(np.searchsorted(ends, turn, side="right"))
-        n = self.sizes.size
-        there = y[:, rows[:reached]].T
+        n, there = self.sizes.size, found.after[ends[:reached] - 1]
         trail.x[places[1 : reached + 1]], trail.held[places[1 : reached + 1]] = there[:, :n], there[:, n:]
         self.most = min(size * 8, CALLS[-1]) if reached == count else max(CALLS[0], size // 8)
         return reached, turn is not None
 
-    def _state(self, trail: Trail, k: int) -> np.ndarray:
-        return np.concatenate([trail.x[k], trail.held[k]])
-
-    def _passages(
-        self, trail: Trail, places: np.ndarray, parts: np.ndarray, size: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """States and error estimates behind each of the steps, and what they were told, a column each."""
+    def _told(self, trail: Trail, places: np.ndarray, parts: np.ndarray) -> np.ndarray:
+        """What the passages between places are told, a row each; parts: steps from place to place."""
         t, half = trail.t[places], 2 * len(self.coordinates.sampled)
         interval = np.repeat(np.arange(parts.size), parts)
         inner = np.arange(interval.size) - np.repeat(np.cumsum(parts) - parts, parts)
-        h = (np.diff(t) / parts)[interval]
+        h, begin = (np.diff(t) / parts)[interval], t[interval]
         due = trail.due[places[1:]][interval] & (inner == parts[interval] - 1)[:, None]
         w = trail.rows(places)[:, :half]
-        u = np.vstack([t[interval] + inner * h, h, t[interval], due.T, w[interval].T, w[interval + 1].T])
-        u = np.hstack([u, np.repeat(u[:, -1:], size - interval.size, axis=1)])
-        u[1, interval.size :] = 0.0  # what is left of the call stands still
-        u[3 : 3 + due.shape[1], interval.size :] = 0.0
-        y, e3, e5 = (
-            np.array(f)[:, : interval.size]
-            for f in self._function(size)(self._state(trail, int(places[0])), u)
-        )
-        return y, e3, e5, u[:, : interval.size]
+        return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[interval + 1]])
 
-    def _function(self, size: int) -> ca.Function:
-        function = self._passage.function
-        return self.coordinates.kept(
-            ("passages", size), lambda: function if size == 1 else function.mapaccum("passages", size)
-        )
-
-    @property
-    def _passage(self) -> Passage:
-        return self.coordinates.kept("passage", lambda: passage(self.coordinates))
-
-    def _error(
-        self, before: np.ndarray, y: np.ndarray, h: np.ndarray, e3: np.ndarray, e5: np.ndarray
-    ) -> np.ndarray:
+    def _error(self, found: Steps, h: np.ndarray) -> np.ndarray:
         """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""
         n = self.sizes.size
         with np.errstate(invalid="ignore", over="ignore"):
-            scale = self.tolerance * (self.sizes[:, None] + np.maximum(np.abs(before[:n]), np.abs(y[:n])))
-            third, fifth = (np.abs(e / scale).max(axis=0) for e in (e3, e5))
+            largest = np.maximum(np.abs(found.before[:, :n]), np.abs(found.after[:, :n]))
+            scale = self.tolerance * (self.sizes + largest)
+            third, fifth = (np.abs(e / scale).max(axis=1) for e in (found.third, found.fifth))
             whole = np.sqrt(fifth**2 + 0.01 * third**2)
             error = h * fifth**2 / np.where(whole > 0, whole, 1.0)
-        return np.where(np.isfinite(error) & np.isfinite(y).all(axis=0), error, np.inf)
+        return np.where(np.isfinite(error) & np.isfinite(found.after).all(axis=1), error, np.inf)
 
     def _adapt(self, error: np.ndarray, h: np.ndarray) -> None:
         """Choose the next step from errors, of which the last may be above the tolerance."""
@@ -171,29 +146,26 @@ class Sampler:
         else:
             self.step = GROW * h.max()
 
-    def _first_turn(self, before: np.ndarray, y: np.ndarray, u: np.ndarray, count: int) -> int | None:
+    def _first_turn(self, found: Steps, told: np.ndarray, count: int) -> int | None:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
         c = self.coordinates
-        switches, n, m = c.switches, len(c.states), len(c.held)
-        live = np.array([k not in self._passage.by_held for k in range(len(switches))], dtype=bool)
+        switches, n, m, half = c.switches, len(c.states), len(c.held), len(c.sampled)
+        live = np.array([k not in self.passages.one.by_held for k in range(len(switches))], dtype=bool)
         if not live.any() or not count:
             return None
-        start = 3 + m
-        inputs = u[start : start + (u.shape[0] - start) // 2, :count]
-        half = inputs.shape[0] // 2
-        values, slopes = inputs[:half], inputs[half:]
-        own, no_z = before[n:, :count], np.zeros((count, 0))
+        t, h, begin = (told[:count, k] for k in range(3))
+        values, slopes = told[:count, 3 + m : 3 + m + half], told[:count, 3 + m + half : 3 + m + 2 * half]
+        own, no_z = found.before[:count, n:], np.zeros((count, 0))
 
-        def gaps(x: np.ndarray, t: np.ndarray) -> Margins:
-            w = np.vstack([values + slopes * (t - u[2, :count]), slopes, own]).T
-            return switches.gaps(switches.look(x.T, no_z, t, w, self.sizes), own[m:].T)
+        def gaps(x: np.ndarray, at: np.ndarray) -> Margins:
+            w = np.hstack([values + slopes * (at - begin)[:, None], slopes, own])
+            return switches.gaps(switches.look(x, no_z, at, w, self.sizes), own[:, m:])
 
-        t = u[0, :count]
-        near, far = gaps(before[:n, :count], t), gaps(y[:n, :count], t + u[1, :count])
+        near, far = gaps(found.before[:count, :n], t), gaps(found.after[:count, :n], t + h)
         chosen = np.concatenate([live, live[[turn.counts for turn in switches.turns]]])
         both = [
             np.stack([a, b], axis=1).reshape(2 * count, -1)[:, chosen]
             for a, b in ((near.values, far.values), (near.rates, far.rates), (near.noise, far.noise))
         ]
-        found = first_crossing(np.stack([t, t + u[1, :count]], axis=1).ravel(), Margins(*both))
-        return None if found is None else (found.place + 1) // 2
+        first = first_crossing(np.stack([t, t + h], axis=1).ravel(), Margins(*both))
+        return None if first is None else (first.place + 1) // 2

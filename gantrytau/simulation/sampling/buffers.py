@@ -1,0 +1,82 @@
+"""Hundreds of passages in one call, from and to memory of NumPy."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.sampling.compiled import compiled
+from gantrytau.simulation.sampling.passage import Passage, passage
+
+CALLS = (1, 8, 64, 512)  # passages in one call
+WORTH = 10_000  # passages of a model: for so many a compiler is asked, which takes as long as these
+
+
+@dataclass(frozen=True)
+class Steps:
+    """States and what is held before and behind each step, and the two estimates of its error, a row each."""
+
+    before: np.ndarray
+    after: np.ndarray
+    third: np.ndarray
+    fifth: np.ndarray
+
+
+class Buffer:
+    """Memory of a call of so many passages, a row each."""
+
+    def __init__(self, calls: ca.Function, size: int):
+        self._first = np.zeros(calls.size1_in(0))
+        self._told = np.zeros((size, calls.size1_in(1)))
+        self._found = [np.zeros((size, calls.size1_out(k))) for k in range(3)]
+        self._memory, self._go = calls.buffer()
+        for k, array in enumerate((self._first, self._told)):
+            self._memory.set_arg(k, memoryview(array))
+        for k, array in enumerate(self._found):
+            self._memory.set_res(k, memoryview(array))
+
+    def steps(self, first: np.ndarray, told: np.ndarray) -> Steps:
+        """Passages from the first states and what is held, one behind the other, told (steps, k) as `Passage` says."""
+        count = len(told)
+        self._first[:] = first
+        self._told[:count] = told
+        self._told[count:] = told[-1]
+        self._told[count:, 1] = 0.0  # what is left of the call stands still
+        self._go()
+        after, third, fifth = (array[:count] for array in self._found)
+        return Steps(np.vstack([first[None], after[:-1]]), after, third, fifth)
+
+
+class Passages:
+    """Passages of a model: interpreted, or by machine code where there are many and a compiler; the numbers are the same."""
+
+    def __init__(self, coordinates: Coordinates):
+        self.coordinates = coordinates
+        self._buffers: dict[tuple[int, bool], Buffer] = {}
+
+    @property
+    def one(self) -> Passage:
+        """A single one."""
+        return self.coordinates.kept("passage", lambda: passage(self.coordinates))
+
+    def steps(self, first: np.ndarray, told: np.ndarray, size: int, expected: float) -> Steps:
+        """As of `Buffer`, in a call of `size`; expected: how many are left of the run."""
+        so_far = self.coordinates.kept("passages so far", lambda: np.zeros(1))
+        key = size, bool(so_far[0] + expected > WORTH and self._machine is not None)
+        so_far += len(told)
+        if key not in self._buffers:
+            self._buffers[key] = Buffer(
+                self.coordinates.kept(("passages", *key), lambda: self._calls(*key)), size
+            )
+        return self._buffers[key].steps(first, told)
+
+    def _calls(self, size: int, machine: bool) -> ca.Function:
+        function = self._machine if machine else None
+        function = function or self.one.function
+        return function if size == 1 else function.mapaccum("passages", size)
+
+    @property
+    def _machine(self) -> ca.Function | None:
+        """The passage compiled, if there is a compiler."""
+        return self.coordinates.kept("compiled passage", lambda: compiled(self.one.function))
