@@ -14,7 +14,7 @@ WORTH = 10_000  # passages of a model: for so many a compiler is asked, which ta
 
 
 @dataclass(frozen=True)
-class Steps:
+class StepsTaken:
     """States and what is held before and behind each step, and the two estimates of its error, a row each."""
 
     before: np.ndarray
@@ -36,7 +36,7 @@ class Buffer:
         for k, array in enumerate(self._found):
             self._memory.set_res(k, memoryview(array))
 
-    def steps(self, first: np.ndarray, told: np.ndarray) -> Steps:
+    def steps(self, first: np.ndarray, told: np.ndarray) -> StepsTaken:
         """Passages from the first states and what is held, one behind the other, told (steps, k) as `Passage` says."""
         count = len(told)
         self._first[:] = first
@@ -45,7 +45,7 @@ class Buffer:
         self._told[count:, 1] = 0.0  # what is left of the call stands still
         self._go()
         after, third, fifth = (array[:count] for array in self._found)
-        return Steps(np.vstack([first[None], after[:-1]]), after, third, fifth)
+        return StepsTaken(np.vstack([first[None], after[:-1]]), after, third, fifth)
 
 
 class Passages:
@@ -60,7 +60,7 @@ class Passages:
         """A single one."""
         return self.coordinates.kept("passage", lambda: passage(self.coordinates))
 
-    def steps(self, first: np.ndarray, told: np.ndarray, size: int, expected: float) -> Steps:
+    def steps(self, first: np.ndarray, told: np.ndarray, size: int, expected: float) -> StepsTaken:
         """As of `Buffer`, in a call of `size`; expected: how many are left of the run."""
         so_far = self.coordinates.kept("passages so far", lambda: np.zeros(1))
         key = size, bool(so_far[0] + expected > WORTH and self._machine is not None)

@@ -10,7 +10,7 @@ from gantrytau.errors import SolveError
 from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.sampling.buffers import CALLS, Passages, Steps
+from gantrytau.simulation.sampling.buffers import CALLS, Passages, StepsTaken
 from gantrytau.simulation.sampling.runge_kutta import ORDER
 from gantrytau.simulation.trail import Trail
 
@@ -125,7 +125,7 @@ class Sampler:
         w = trail.rows(places)[:, :half]
         return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[interval + 1]])
 
-    def _error(self, found: Steps, h: np.ndarray) -> np.ndarray:
+    def _error(self, found: StepsTaken, h: np.ndarray) -> np.ndarray:
         """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""
         n = self.sizes.size
         with np.errstate(invalid="ignore", over="ignore"):
@@ -146,7 +146,7 @@ class Sampler:
         else:
             self.step = GROW * h.max()
 
-    def _first_turn(self, found: Steps, told: np.ndarray, count: int) -> int | None:
+    def _first_turn(self, found: StepsTaken, told: np.ndarray, count: int) -> int | None:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
         c = self.coordinates
         switches, n, m, half = c.switches, len(c.states), len(c.held), len(c.sampled)
