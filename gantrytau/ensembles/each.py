@@ -1,6 +1,7 @@
 """One function for many arguments, as part of a longer call: the first here, the rest on all processors where that pays."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -15,31 +16,42 @@ Argument = TypeVar("Argument")
 Value = TypeVar("Value")
 
 
-def each(function: Callable[[Argument], Value], arguments: Sequence[Argument]) -> Iterator[tuple[int, Value]]:
+def each(
+    function: Callable[[Argument], Value], arguments: Iterable[Argument], count: int
+) -> Iterator[tuple[int, Value]]:
     """The place of each argument and the value there, as they are finished; alike wherever they are computed.
 
-    Raises what the function raises here, and GantryTauError with its words where it is raised in another process.
+    count: of arguments, at most. Raises what the function raises; errors that are not of the toolkit come from another
+    process as a GantryTauError with their words.
     """
+    left = iter(enumerate(arguments))
     begin = perf_counter()
-    for place, argument in enumerate(arguments[:1]):
+    for place, argument in islice(left, 1):
         yield place, function(argument)
-    left = range(1, len(arguments))
-    if within_a_case() or (perf_counter() - begin) * len(left) < WORTH:
-        for place in left:
-            yield place, function(arguments[place])
+    if within_a_case() or (perf_counter() - begin) * (count - 1) < WORTH:
+        for place, argument in left:
+            yield place, function(argument)
         return
-    cases = [Case(place, (place,), {"argument": arguments[place]}) for place in left]
+    cases = [Case(place, (place,), {"argument": argument}) for place, argument in left]
     for outcome in outcomes(_Called(function), cases, PROCESSES):
         if not outcome.good:
             raise GantryTauError(f"{outcome.kind}: {outcome.error}")
-        yield outcome.number, outcome.value
+        value, error = outcome.value
+        if error is not None:
+            raise error
+        yield outcome.number, value
 
 
 class _Called:
-    """A function of an argument as the task of a case."""
+    """A function of an argument as the task of a case, which gives the value or the error of the toolkit."""
 
     def __init__(self, function: Callable[[Any], Any]):
         self.function = function
 
-    def __call__(self, case: Case) -> Any:
-        return self.function(case.chosen["argument"])
+    def __call__(self, case: Case) -> tuple[Any, GantryTauError | None]:
+        try:
+            return self.function(case.chosen["argument"]), None
+        except GantryTauError as error:
+            if getattr(error, "interrupted", False):
+                raise
+            return None, error

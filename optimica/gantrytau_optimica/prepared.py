@@ -13,17 +13,17 @@ from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber
+from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
-from gantrytau_optimica.policy import Guesses
+from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
-from gantrytau_optimica.refinement.multistart import searched
+from gantrytau_optimica.refinement.multistart import Guesses, searched
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import Pressed, Solver, SolverSettings
+from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings
 from gantrytau_optimica.solving.moving_points import settled
 from gantrytau_optimica.solving.second_look import moved_aside
 from gantrytau_optimica.solving.warm_start import warm_start
@@ -69,14 +69,18 @@ class Prepared:
         size, rows = self.program.places.size, self.program.assembled.rows
         return f"<Prepared {self.built.read.name}: {size} unknowns, {rows} conditions>"
 
-    def solve(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
+    def solve(
+        self, parameters: Mapping[str, Any] | None = None, guess: GivenGuesses | None = None
+    ) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
         settings = self.solver.settings
         reached = BestSoFar(Clock(settings.max_time, settings.progress))
         with reached.kept():
             return replace(self, reached=reached).search(parameters, guess)
 
-    def search(self, parameters: Mapping[str, Any] | None = None, guess: Guesses | None = None) -> Optimum:
+    def search(
+        self, parameters: Mapping[str, Any] | None = None, guess: GivenGuesses | None = None
+    ) -> Optimum:
         """`solve` as a part of a call that has `reached` something already, and looks after Ctrl-C itself."""
         read, reached = self.built.read, self._reached
         given = self.guess if guess is None else read_guesses(guess, read)
@@ -107,11 +111,11 @@ class Prepared:
 
         def solve(program: Program, first: np.ndarray) -> Optimum:
             """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none."""
-            found = self._solved(optimum.built, program, self._solver(program, again), first)
+            found = self.solved(optimum.built, program, self._solver(program, again), first)
             worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
             if (found.success and not worse) or not reached.clock.left:
                 return found
-            close = self._solved(
+            close = self.solved(
                 optimum.built, program, self._solver(program, replace(again, near=True)), first
             )
             return (
@@ -141,16 +145,8 @@ class Prepared:
         most = min(settings.max_iterations, MOST_TRIED)
         solver = self._solver(coarse, replace(settings, max_iterations=most))
 
-        def solve(problem: ControlProblem) -> Optimum:
-            guesses = {s.name: s.guess for s in problem.signals}
-            same = coarse.problem.with_signals(lambda _, s: replace(s, guess=guesses[s.name]))
-            guessed = coarse.with_numbers(replace(same, free=problem.free))
-            return self._solved(
-                replace(built, problem=guessed.problem), guessed, solver, first_guess(guessed)
-            )
-
         clock = self._reached.clock
-        best = searched(solve, built, self.starts, clock)
+        best = searched(_FromGuesses(self, built, coarse, solver), built, self.starts, clock)
         if best.search is None:
             return solved_or_raise(best)
         self._reached.keep(best)
@@ -163,7 +159,7 @@ class Prepared:
             clock.enter(f"branch {number} of {len(branches)}, on the whole mesh")
             nearby = warm_start(list(branch.optimum.phases.values()), program)
             for one in (close, self.solver):
-                found.append(self._solved(built, program, one, nearby))
+                found.append(self.solved(built, program, one, nearby))
                 if found[-1].success or not clock.left:
                     break
         if not clock.left and not any(o.success for o in found):
@@ -177,7 +173,7 @@ class Prepared:
             settings = self.solver.settings
             most = min(settings.max_iterations, MOST_AGAIN)
             nearby = self._solver(program, replace(settings, near=True, max_iterations=most))
-            optimum = self._solved(built, program, nearby, first)
+            optimum = self.solved(built, program, nearby, first)
             if optimum.success:
                 return optimum
         optimum = self._minimum(built, program, first)
@@ -188,20 +184,20 @@ class Prepared:
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
         solver = self._solver(plain, self.solver.settings)
-        free = self._solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
+        free = self.solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
             return optimum
-        again = self._solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
+        again = self.solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
 
     def _minimum(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
         """From one first guess; if that ends where the objective falls to a side, from there."""
-        found = self._solved(built, program, self.solver, first)
+        found = self.solved(built, program, self.solver, first)
         for _ in range(MOST_ASIDE):
             aside = moved_aside(found.program, found.solution, first) if found.success else None
             if aside is None or not self._reached.clock.left:
                 break
-            better = self._solved(found.built, found.program, self.solver, aside)
+            better = self.solved(found.built, found.program, self.solver, aside)
             if not (better.success and better.objective < found.objective):
                 solution = replace(found.solution, status=NO_MINIMUM)
                 return replace(found, solution=solution)
@@ -236,7 +232,7 @@ class Prepared:
         )
         program = transcribe(built.problem, meshes, layouts[0].scheme, located)
         solver = self._solver(program, replace(self.solver.settings, near=True))
-        again = self._solved(built, program, solver, warm_start(list(found.phases.values()), program))
+        again = self.solved(built, program, solver, warm_start(list(found.phases.values()), program))
         return again if again.success else found
 
     def _coarse(self, built: Built) -> Program:
@@ -252,7 +248,7 @@ class Prepared:
         meshes = [Mesh(np.unique(np.append(layout.mesh.borders[::2], 1.0))) for layout in layouts]
         return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
 
-    def _solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
+    def solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends from a first guess of the unknowns of a program; what was reached knows it as well."""
         clock = self._reached.clock
         try:
@@ -291,6 +287,41 @@ class Prepared:
             return replace(number, guess=number_guess(number.name, guess, number.guess))
         value = values.get(number.name, self.built.read.dae.parameter_values[number.name])
         return replace(number, guess=value, min=value, max=value)
+
+
+class _FromGuesses:
+    """A program solved from first guesses; sent to another process it makes its solver there, for the time that is left."""
+
+    def __init__(self, prepared: Prepared, built: Built, program: Program, solver: Solver):
+        self.prepared, self.built, self.program, self.solver = prepared, built, program, solver
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        clock = self.prepared.reached.clock if self.prepared.reached else None
+        settings = replace(self.solver.settings, progress=None)
+        return self.built, self.program, settings, clock.left if clock else settings.max_time
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        built, program, settings, left = state
+        solver = Solver(program, settings)
+        prepared = Prepared(built, program, solver, {}, 0.0, reached=BestSoFar(Clock(left)))
+        self.__init__(prepared, built, program, solver)
+
+    def __call__(self, guesses: Guesses) -> tuple[Solution, Program | None]:
+        """Where the solver ended, and the program if points that move made it another one."""
+        program = guesses.on(self.program)
+        built = replace(self.built, problem=program.problem)
+        found = self.prepared.solved(built, program, self.solver, first_guess(program))
+        return found.solution, None if found.program is program else found.program
+
+    def optimum(self, guesses: Guesses, found: tuple[Solution, Program | None]) -> Optimum:
+        """The end of a solve, here or elsewhere, as an optimum that is taken note of."""
+        solution, other = found
+        program = guesses.on(self.program) if other is None else other
+        built = replace(self.built, problem=program.problem)
+        optimum = Optimum(built.read.name, built, program, solution, self.prepared.build_time)
+        if self.prepared.reached is not None:
+            self.prepared.reached.keep(optimum)
+        return optimum
 
 
 def solved_or_raise(optimum: Optimum) -> Optimum:

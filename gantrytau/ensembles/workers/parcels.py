@@ -16,43 +16,53 @@ import casadi as ca
 
 from gantrytau.language.symbols import time
 
+KINDS = (ca.SX, ca.MX)  # of expressions; those of the time are SX
+
 
 def pack(thing: Any) -> bytes:
     """The bytes of a thing; what it holds of files that another process could not import goes along."""
     import cloudpickle
 
     class Packer(cloudpickle.Pickler):
-        def persistent_id(self, obj: Any) -> int | None:
-            if type(obj) is not ca.SX:
+        def persistent_id(self, obj: Any) -> tuple[int, int] | None:
+            if type(obj) not in KINDS:
                 return None
             if id(obj) not in places:
-                places[id(obj)] = len(expressions)
-                expressions.append(obj)
+                kind = KINDS.index(type(obj))
+                places[id(obj)] = kind, len(expressions[kind])
+                expressions[kind].append(obj)
             return places[id(obj)]
 
-    expressions: list[ca.SX] = [time]
-    places: dict[int, int] = {id(time): 0}
+    expressions: tuple[list[Any], ...] = ([time], [])
+    places: dict[int, tuple[int, int]] = {id(time): (0, 0)}
     contents = io.BytesIO()
     with _whole(thing):
         Packer(contents).dump(thing)
     stream = ca.StringSerializer()
-    stream.pack(expressions)
+    for one in expressions:
+        stream.pack(len(one))
+        if one:
+            stream.pack(one)
     return pickle.dumps((stream.encode(), contents.getvalue()))
 
 
 def unpack(parcel: bytes) -> Any:
     """The thing that was packed, its expressions of the symbols of this process where they are of the time."""
     written, contents = pickle.loads(parcel)
-    expressions = ca.StringDeserializer(written).unpack()
-    foreign = expressions[0]
-    timed = [k for k, e in enumerate(expressions) if ca.depends_on(e, foreign)]
-    own = ca.substitute([expressions[k] for k in timed], [foreign], [time])
+    stream = ca.StringDeserializer(written)
+    expressions = []
+    for _ in KINDS:
+        count = stream.unpack()
+        expressions.append(stream.unpack() if count else [])
+    foreign = expressions[0][0]
+    timed = [k for k, e in enumerate(expressions[0]) if ca.depends_on(e, foreign)]
+    own = ca.substitute([expressions[0][k] for k in timed], [foreign], [time])
     for k, expression in zip(timed, own, strict=True):
-        expressions[k] = expression
+        expressions[0][k] = expression
 
     class Unpacker(pickle.Unpickler):
-        def persistent_load(self, pid: Any) -> ca.SX:
-            return expressions[pid]
+        def persistent_load(self, pid: tuple[int, int]) -> Any:
+            return expressions[pid[0]][pid[1]]
 
     return Unpacker(io.BytesIO(contents)).load()
 

@@ -190,7 +190,7 @@ class _Procedure:
         done = {k: self.stages.found(f"trial_{k:03d}", Trial, digest(key, k)) for k in range(count)}
         left = [k for k, known in done.items() if known is None]
         self.stages.progress("trials", count - len(left), count)
-        for place, new in each(trial, left):
+        for place, new in each(trial, left, len(left)):
             self.stages.keep(f"trial_{left[place]:03d}", new, digest(key, left[place]))
             done[left[place]] = new
             self.stages.progress("trials", sum(known is not None for known in done.values()), count)

@@ -1,10 +1,12 @@
 """`starts=`: several first guesses around the default one, and the branches of solutions they lead to."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
+from gantrytau.ensembles.each import each
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
@@ -12,6 +14,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumbe
 from gantrytau_optimica.control.guesses import Guess, horizon, with_algebraics
 from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.solving.clock import Clock
+from gantrytau_optimica.transcription.program import Program
 
 SEED = 20121
 EXTENTS = (0.15, 0.6)  # of the way from start to end, between which it is drawn how far a guess is bent
@@ -47,19 +50,65 @@ class Search:
         return "\n".join([*lines, *(f"  {branch}" for branch in self.branches[:8])])
 
 
-def searched(solve: Callable[[ControlProblem], Optimum], built: Built, starts: int, clock: Clock) -> Optimum:
+class Attempts(Protocol):
+    """Solves from first guesses: here or in another process by a call, then as an optimum of this one."""
+
+    def __call__(self, guesses: "Guesses") -> Any:
+        """Where the solver ends."""
+
+    def optimum(self, guesses: "Guesses", found: Any) -> Optimum:
+        """That as an optimum."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Guesses:
+    """First guesses of all signals by name, and of the free numbers."""
+
+    signals: Mapping[str, Guess]
+    free: tuple[float, ...]
+
+    @classmethod
+    def of(cls, problem: ControlProblem) -> "Guesses":
+        """Those of a problem."""
+        return cls({s.name: s.guess for s in problem.signals}, tuple(n.guess for n in problem.free))
+
+    def on(self, program: Program) -> Program:
+        """A program with these first guesses."""
+        same = program.problem.with_signals(lambda _, s: replace(s, guess=self.signals[s.name]))
+        free = tuple(
+            replace(n, guess=guess) for n, guess in zip(program.problem.free, self.free, strict=True)
+        )
+        return program.with_numbers(replace(same, free=free))
+
+
+def searched(attempts: Attempts, built: Built, starts: int, clock: Clock) -> Optimum:
     """The best optimum from `starts` first guesses, the default one first; if none is found, where that one ended.
 
     Every state that is not itself a derivative is bent by a few half waves, which vanish at the ends; those that are its
-    derivatives follow; free numbers and inputs are drawn from their limits or around their guess. The seed is fixed.
+    derivatives follow; free numbers and inputs are drawn from their limits or around their guess. The seed is fixed. Where
+    a solve takes its time the others run on all processors, with the same answers.
     """
-    random = np.random.default_rng(SEED)
-    tried: list[Optimum] = []
-    for k in range(starts):
-        clock.enter(f"first guess {k + 1} of {starts}")
-        tried.append(solve(built.problem if k == 0 else with_algebraics(built, bent(built.problem, random))))
+    guesses: list[Guesses] = []
+
+    def drawn() -> Iterator[Guesses]:
+        random = np.random.default_rng(SEED)
+        for k in range(starts):
+            if k and not clock.left:
+                return
+            problem = with_algebraics(built, bent(built.problem, random)) if k else built.problem
+            guesses.append(Guesses.of(problem))
+            yield guesses[-1]
+
+    ended: dict[int, Optimum] = {}
+    clock.enter(f"first guess 1 of {starts}")
+    for k, found in each(attempts, drawn(), starts):
+        ended[k] = attempts.optimum(guesses[k], found)
         if not clock.left:
             break
+        if len(ended) < starts:
+            clock.enter(f"first guess {len(ended) + 1} of {starts}")
+    tried = [ended[k] for k in sorted(ended)]
     found = sorted((o for o in tried if o.success), key=lambda o: o.objective)
     if not found:
         return tried[0]

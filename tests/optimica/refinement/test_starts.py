@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der
+from gantrytau.ensembles import each as parts
 from gantrytau_optimica import Free, Optimization, final, optimize
 from tests.optimica.control.test_controls import Effort, best_pieces
 from tests.optimica.control.test_phases import ThereAndBack
@@ -210,3 +211,21 @@ def test_a_limit_on_steps_is_that_of_the_mesh_asked_for():
     assert optimize(Effort, elements=40, controls=controls, starts=2).objective == pytest.approx(
         alone.objective
     )
+
+
+def test_guesses_that_are_solved_in_processes_lead_to_the_same_answer_bit_by_bit(around, monkeypatch):
+    monkeypatch.setattr(parts, "WORTH", 0.0)
+    there = optimize(Around, elements=20, starts=10)
+    assert np.array_equal(there.solution.w, around.solution.w)
+    assert str(there.search) == str(around.search)
+    assert there.objective == around.objective
+    assert np.array_equal(there["point.r"], around["point.r"])
+    assert str(there.playback) == str(around.playback)
+
+
+def test_points_that_move_are_settled_in_processes_too(monkeypatch):
+    here = optimize(ThereAndBack, elements=10, starts=4)
+    monkeypatch.setattr(parts, "WORTH", 0.0)
+    there = optimize(ThereAndBack, elements=10, starts=4)
+    assert np.array_equal(there.solution.w, here.solution.w)
+    assert str(there.search) == str(here.search)
