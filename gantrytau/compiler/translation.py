@@ -167,7 +167,8 @@ def _state_name(reduced: Reduced, name: str) -> str:
 def _wanted_derivatives(flat: FlatModel, find: Sequence[str]) -> tuple[str, ...]:
     """Derivatives that are asked for, or that what is set at instants depends on: they must be known in time."""
     wanted = [n for name in find for n in flat.expand(name) if n.startswith("der(")]
-    return tuple(dict.fromkeys((*wanted, *_sampled_derivatives(flat))))
+    accelerations = [f"der({f.speed})" for f in flat.frictions]  # zero while a friction sticks
+    return tuple(dict.fromkeys((*wanted, *_sampled_derivatives(flat), *accelerations)))
 
 
 def _sampled_derivatives(flat: FlatModel) -> list[str]:

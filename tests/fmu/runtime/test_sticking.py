@@ -1,14 +1,16 @@
 """Exact stick-slip in exported FMUs, against motion pieced together from solutions of the linear equations."""
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gantrytau import Fixed, Model, Parameter, connect, sin, time
+from gantrytau import Fixed, Model, Parameter, Real, connect, der, sin, stick_slip, time
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.translational import StickSlipFriction
+from gantrytau_fmu import cosimulate, export_fmu
 from tests.fmu.exported import Exported, export
 
 STEP = 0.004
@@ -154,3 +156,56 @@ def test_carts_of_a_robot_that_nothing_pushes_enough_stay_where_they_are(exporte
             run.step(STEP)
             places.append(run[tool])
     assert np.abs(np.array(places) - start).max() < 1e-9
+
+
+class OnBelt(Model):
+    """A mass on a spring and on a belt at 0.06 m/s, which it sticks to up to 2 N, and slips on with 1 N."""
+
+    sign = 1.0
+    m = Parameter(1.0, unit="kg", description="mass")
+    c = Parameter(100.0, unit="N/m", description="stiffness")
+    belt = Parameter(0.06, unit="m/s", description="speed of the belt")
+    s = Real(start=0.0, fixed=True, unit="m", description="position")
+    w = Real(start=0.06, fixed=True, unit="m/s", description="speed")
+    slip = Real(unit="m/s", description="speed against the belt")
+    f = Real(unit="N", description="friction")
+
+    def equations(self):
+        yield der(self.s) == self.w
+        yield self.slip == self.sign * (self.w - 0.06)
+        yield self.m * der(self.w) == -self.c * self.s - self.sign * self.f
+        yield stick_slip(self.f, self.slip, coulomb=1.0, smooth=0.0, breakaway=2.0)
+
+
+class OnTunableBelt(OnBelt):
+    """The same, the speed of the belt as a parameter, and slip counted the other way."""
+
+    sign = -1.0
+
+    def equations(self):
+        first, _, *rest = super().equations()
+        yield first
+        yield self.slip == self.sign * (self.w - self.belt)
+        yield from rest
+
+
+def carried(t: float) -> float:
+    """Position: with the belt up to 0.02 m, then an arc about 0.01 m until the speed is that of the belt again."""
+    phase = math.atan2(0.1, 0.06)  # of 0.01 cos(10 t) + 0.006 sin(10 t)
+    arc = (2 * math.pi - 2 * phase) / 10
+    now, s = 0.0, 0.0
+    while True:
+        if t < (stuck := now + (0.02 - s) / 0.06):
+            return s + 0.06 * (t - now)
+        if t < stuck + arc:
+            return 0.01 + 0.01 * math.cos(10 * (t - stuck)) + 0.006 * math.sin(10 * (t - stuck))
+        now, s = stuck + arc, 0.01 + 0.01 * math.cos(10 * arc) + 0.006 * math.sin(10 * arc)
+
+
+@pytest.mark.parametrize("model", [OnBelt, OnTunableBelt])
+def test_a_speed_against_a_belt_sticks_to_the_speed_of_the_belt(tmp_path, model):
+    """The speed of slip is that of the mass but for an offset and a sign."""
+    path = export_fmu(model(), tmp_path / "belt.fmu", tolerance=1e-10)
+    found = cosimulate({"m": path}, stop=2.0, step=0.01)
+    exact = [carried(t) for t in found.time]
+    assert found["m.s"] == pytest.approx(np.array(exact), abs=1e-9)
