@@ -6,7 +6,7 @@ from typing import Any
 
 from gantrytau import Output, Parameter, Real, der, fabs, if_else, require
 from gantrytau.blocks.block import Block
-from gantrytau.errors import ModelError
+from gantrytau.blocks.rational import Rational
 
 
 class Integrator(Block):
@@ -47,30 +47,19 @@ class FirstOrder(Block):
         yield self.T * der(self.y) + self.y == self.k * self.u
 
 
-class TransferFunction(Block):
+class TransferFunction(Rational):
     """y = (b0 s^m + ... + bm) / (a0 s^n + ... + an) u, m <= n: `TransferFunction(numerator=[2.0], denominator=[0.1, 1.0])`.
 
-    Both in falling powers of s, with s in 1/s; the state x, (n,), begins at zero. Raises ModelError where m > n or a0 = 0.
+    Both in falling powers of s, with s in 1/s. Raises ModelError where m > n or a0 = 0.
     """
 
-    numerator = Parameter(description="coefficients of the numerator, falling powers of s, a list")
-    denominator = Parameter(description="coefficients of the denominator, falling powers of s, a list")
-    x = Real(lambda self: max(1, self.denominator.shape[0] - 1), description="state", start=0.0, fixed=True)
-
     def equations(self):
-        b, a = self.numerator.elements(), self.denominator.elements()
+        yield from super().equations()
+        b, a = self.coefficients()
         n = len(a) - 1
-        if len(b) > n + 1:
-            raise ModelError(
-                f"found a numerator of degree {len(b) - 1} over a denominator of degree {n}, expected at most the same: "
-                "it would differentiate its input; leave out zeros in front, or put a filter in series"
-            )
-        if n == 0:
-            raise ModelError("found a denominator of degree 0, expected at least 1; a Gain needs no state")
-        yield require(self.denominator[0] != 0, "expected a denominator that does not begin with zero")
         # controllable canonical form in a time scaled so that the poles stand about one
-        rate, b = _rate(a, b[-1]), [0.0] * (n + 1 - len(b)) + b
-        a, b = ([c / (self.denominator[0] * rate**k) for k, c in enumerate(side)] for side in (a, b))
+        rate = _rate(a, b[n])
+        a, b = ([c / (a[0] * rate**k) for k, c in enumerate(side)] for side in (a, b))
         level = if_else(a[n] == 0, 1, a[n])  # at rest, x[0] is u
         for lower, upper in pairwise(self.x.elements()):
             yield der(lower) == rate * upper

@@ -1,8 +1,9 @@
-"""The PID controller of the textbook, with limits that its integral knows of."""
+"""The PID controller of the textbook, continuous and sampled, with limits that its integral knows of."""
 
+from collections.abc import Iterator
 from typing import Any
 
-from gantrytau import Input, Model, Output, Parameter, Real, connect, der, require
+from gantrytau import Input, Model, Output, Parameter, Real, connect, der, if_else, require, sampled
 from gantrytau.blocks.limiters import Limiter, Unlimited
 from gantrytau.errors import ModelError
 
@@ -47,25 +48,66 @@ class Pid(Model):
             raise ModelError(f"kind: found {self.kind!r}, expected one of {', '.join(KINDS)}")
         yield self.v == self.k * (self.b * self.u_s - self.u_m + self.integral + self.derivative)
         yield connect(self.v, self.actuator.u)
-        yield connect(self.actuator.y, self.y)
         if "I" in self.kind:
             for value, name in ((self.T_i, "T_i"), (self.T_t, "T_t")):
                 yield require(value > 0, f"expected {name} above zero; kind='PD' has no integral")
             yield require(self.k != 0, "expected a gain k that is not zero")
-            too_much = (self.v - self.y) / self.k
-            yield der(self.integral) == (self.u_s - self.u_m) / self.T_i - too_much / self.T_t
         else:
             yield self.integral == 0
-        wanted = self.c * self.u_s - self.u_m
         if "D" in self.kind:
             yield require(self.T_d > 0, "expected T_d above zero; kind='PI' has no derivative")
             yield require(self.N > 0, "expected N above zero")
-            yield self.T_d * der(self.filtered) == self.N * (wanted - self.filtered)
-            yield self.derivative == self.N * (wanted - self.filtered)
         else:
-            yield self.filtered == wanted
+            yield self.filtered == self._weighted()
             yield self.derivative == 0
+        yield from self._memory()
+
+    def _memory(self) -> Iterator[Any]:
+        """What the integral and the filter of the derivative do, and the output."""
+        if "I" in self.kind:
+            yield der(self.integral) == self._integrand()
+        if "D" in self.kind:
+            gap = self.N * (self._weighted() - self.filtered)
+            yield self.T_d * der(self.filtered) == gap
+            yield self.derivative == gap
+        yield connect(self.actuator.y, self.y)
+
+    def _weighted(self) -> Any:
+        """What is differentiated."""
+        return self.c * self.u_s - self.u_m
+
+    def _integrand(self) -> Any:
+        """Rate of the integral, with what takes it back where the actuator does not follow."""
+        too_much = (self.v - self.actuator.y) / self.k
+        return (self.u_s - self.u_m) / self.T_i - too_much / self.T_t
 
     def initial_equations(self):
         if "D" in self.kind:
             yield self.derivative == 0
+
+
+class DiscretePid(Pid):
+    """The same once in a `period`: what it computes at an instant from u_s and u_m just before is held until the next.
+
+    The integral is taken forwards, the derivative backwards (Astrom and Wittenmark, Computer-Controlled Systems, 1997,
+    section 8.5). At the first instant the derivative part is zero.
+    """
+
+    period = Parameter(0.01, unit="s", min=0.0, description="from instant to instant, above zero")
+    began = Real(unit="1", description="whether there was an instant before", start=0.0)
+
+    def _memory(self) -> Iterator[Any]:
+        h = self.period
+        if "I" in self.kind:
+            yield sampled(self.integral, self.integral + h * self._integrand(), period=h)
+        if "D" in self.kind:
+            now, time_constant = self._weighted(), self.T_d / self.N
+            before = if_else(self.began > 0, self.filtered, now)
+            share = (now - before) / (time_constant + h)
+            yield self.derivative == self.T_d * share
+            yield sampled(self.filtered, before + h * share, period=h)
+        yield sampled(self.began, 1.0, period=h)
+        yield sampled(self.y, self.actuator.y, period=h)
+
+    def initial_equations(self):
+        yield from ()

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from gantrytau import Parameter, floor, if_else, limit, require, sin, time
+from gantrytau import Input, Parameter, Real, der, floor, if_else, limit, require, sin, sqrt, tanh, time
 from gantrytau.blocks.block import Source
 
 PERIOD = "expected a period above zero, in s"
@@ -61,3 +61,24 @@ class Pulse(Source):
         periods = (time - self.start_time) / self.period
         inside = if_else(periods - floor(periods) < self.width, self.amplitude, 0)
         yield self.y == self.offset + if_else(time >= self.start_time, inside, 0)
+
+
+class Noise(Source):
+    """Gaussian noise of standard deviation std, white well below `bandwidth`, falling by 20 dB a decade above.
+
+    `white` are numbers of standard deviation 1, each held for `period`: `white_noise(1.0, period, seed)` as input. They
+    pass through a lag; y begins at zero and has its standard deviation after some of 1 / bandwidth.
+    """
+
+    white = Input(unit="1", description="independent normal numbers, each held for a period", start=0.0)
+    std = Parameter(1.0, min=0.0, description="standard deviation of y, in its unit")
+    bandwidth = Parameter(100.0, unit="rad/s", min=0.0, description="angular frequency of -3 dB, above zero")
+    period = Parameter(1e-3, unit="s", min=0.0, description="in which the numbers are held, above zero")
+    x = Real(unit="1", description="filtered numbers", start=0.0, fixed=True)
+
+    def equations(self):
+        yield require(self.bandwidth > 0, "expected a bandwidth above zero")
+        yield require(self.period > 0, PERIOD)
+        yield der(self.x) == self.bandwidth * (self.white - self.x)
+        # from number to number x = a x + (1 - a) white: its variance is (1 - a) / (1 + a)
+        yield self.y == self.std * self.x / sqrt(tanh(self.bandwidth * self.period / 2))
