@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import casadi as ca
 
 from gantrytau.errors import ModelError
 from gantrytau.language.declarations import Formula
+from gantrytau.language.piecewise import smoothly
 
 
 def _lifted(function: Callable[..., Any], name: str, words: str) -> Callable[..., Any]:
@@ -107,11 +108,17 @@ def plain_condition(condition: Any) -> Any:
     return condition.condition() if isinstance(condition, Between) else condition
 
 
-def if_else(condition: Any, then: Any, otherwise: Any) -> Any:
-    """`then` where `condition` (`<`, `>=`, `between`) holds, else `otherwise`; both are evaluated."""
+def if_else(condition: Any, then: Any, otherwise: Any, *, smooth: bool = False) -> Any:
+    """`then` where `condition` (`<`, `>=`, `between`) holds, else `otherwise`; both are evaluated.
+
+    Where the condition turns on states or time, a simulation stops and starts anew. smooth: it does not, because both
+    are the same there, with a derivative or two: it is integrated across, in steps of a 500th of the run or less.
+    """
     if any(isinstance(argument, Formula) for argument in (condition, then, otherwise)):
-        return Formula(if_else, condition, then, otherwise)
+        return Formula(partial(if_else, smooth=smooth), condition, then, otherwise)
     condition = plain_condition(condition)
     if isinstance(condition, ca.SX) and condition.numel() != 1:
         raise ModelError(f"if_else: the condition has shape {condition.shape}, expected one number")
+    if smooth and isinstance(condition, ca.SX):
+        condition = smoothly(condition)
     return ca.if_else(condition, then, otherwise)

@@ -38,16 +38,28 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """Expressions with modes in them, and what these modes are; a switch comes after those in its margin."""
+    """Expressions with modes in them, and what these modes are; a switch comes after those in its margin.
+
+    smooth: whether there are conditions that have none, as they are said to be smooth.
+    """
 
     expressions: tuple[ca.SX, ...]
     switches: tuple[Turn, ...]
+    smooth: bool = False
 
 
-def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None) -> Switched:
+def smoothly(condition: ca.SX) -> ca.SX:
+    """A condition that is said to change nothing where it turns: 1 and it, which CasADi keeps as it is written."""
+    return ca.logic_and(1, condition)
+
+
+def switched(
+    expressions: Sequence[ca.SX], names: Collection[str] | None = None, *, smooth: bool = True
+) -> Switched:
     """Expressions with a mode for everything in them that switches on symbols of these names (None: on any symbol).
 
-    With the value of each mode in its place they are what they were.
+    smooth: also for conditions that are said to be smooth, see `smoothly`. With the value of each mode in its place they
+    are what they were.
     """
     dense = [ca.densify(e) for e in expressions]
     whole = ca.vertcat(*(ca.vec(e) for e in dense)) if dense else ca.SX(0, 1)
@@ -58,7 +70,7 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     function = ca.Function("switched", [ca.vertcat(*leaves)], [whole])
     if not any(function.instruction_id(k) in _SWITCHING for k in range(function.n_instructions())):
         return Switched(tuple(expressions), ())
-    reader = _Walk()
+    reader = _Walk(None if smooth else [])
     (found,) = computed(
         ca.Function("switched", [ca.vertcat(*leaves)], [whole], {"cse": True}),
         lambda _, i: (leaves[i], moving[i]),
@@ -68,9 +80,10 @@ def switched(expressions: Sequence[ca.SX], names: Collection[str] | None = None)
     if not reader.switches:
         return Switched(tuple(expressions), ())
     written, switches = reader.counted([e for e, _ in found])
+    switches = switches if smooth else _in_use(switches, written)
     pieces = ca.vertsplit(ca.vertcat(*written), np.cumsum([0, *(e.numel() for e in dense)]).tolist())
     shaped = (ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True))
-    return Switched(tuple(shaped), switches)
+    return Switched(tuple(shaped), switches, bool(reader.smooth))
 
 
 _COMPARING = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_IF_ELSE_ZERO)
@@ -84,9 +97,11 @@ _Value = tuple[ca.SX, bool]  # an expression, and whether it moves with the symb
 class _Walk:
     """Computes with expressions, and notes what switches.
 
-    steps: of an expression by its node the modes that say whether it has reached a number, by that number.
+    smooth: conditions that are said to be smooth, None where they switch, too; steps: of an expression by its node the
+    modes that say whether it has reached a number, by that number.
     """
 
+    smooth: list[ca.SX] | None
     switches: list[Turn] = field(default_factory=list)
     steps: dict[int, tuple[ca.SX, dict[float, ca.SX]]] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
@@ -95,6 +110,10 @@ class _Walk:
     def operation(self, operator: int, operands: list[_Value]) -> _Value:
         a = operands[0][0]
         b = operands[1][0] if len(operands) > 1 else a
+        if self.smooth is not None and _said_smooth(operator, a, b):
+            (plain,) = with_modes(Switched((), tuple(self.switches)), [b])
+            self.smooth.append(smoothly(plain))
+            return self.smooth[-1], True
         asked = operands[:1] if operator == ca.OP_IF_ELSE_ZERO else operands
         if any(moves for _, moves in asked):
             found = self._switching(operator, a, b)
@@ -115,6 +134,8 @@ class _Walk:
             return self._mode(b - a, closed=True) * self._mode(a - b, closed=True)
         if operator == ca.OP_NE:
             return 1 - self._mode(b - a, closed=True) * self._mode(a - b, closed=True)
+        if operator == ca.OP_IF_ELSE_ZERO and self.smooth is not None and _is_smooth(a):
+            return None
         if operator == ca.OP_IF_ELSE_ZERO and not self._of_modes(a):
             return ca.if_else(self._mode(a) + self._mode(-a), b, 0)
         if operator == ca.OP_FABS:
@@ -190,6 +211,26 @@ def reached(x: ca.SX, edges: np.ndarray) -> ca.SX:
     below, above = (edges[0] - x) / (edges[1] - edges[0]), (x - edges[-1]) / (edges[-1] - edges[-2])
     value = ca.if_else(below > 0, 0.5 + 0.5 / (1 + 2 * below), value)
     return ca.if_else(above > 0, edges.size + 0.5 - 0.5 / (1 + 2 * above), value)
+
+
+def _said_smooth(operator: int, a: ca.SX, b: ca.SX) -> bool:
+    """Whether an operation is what `smoothly` writes."""
+    return operator == ca.OP_AND and a.is_constant() and float(a) == 1.0 and not b.is_constant()
+
+
+def _is_smooth(condition: ca.SX) -> bool:
+    """Whether a condition is what `smoothly` writes, or its opposite."""
+    inner = condition.dep(0) if condition.is_op(ca.OP_NOT) else condition
+    return inner.is_op(ca.OP_AND) and _said_smooth(ca.OP_AND, inner.dep(0), inner.dep(1))
+
+
+def _in_use(switches: Sequence[Turn], expressions: Sequence[ca.SX]) -> tuple[Turn, ...]:
+    """The switches whose modes stand in expressions, or in the margins of those."""
+    used = {leaf.name() for leaf in ca.symvar(ca.vertcat(*expressions))}
+    for turn in reversed(switches):
+        if turn.mode.name() in used:
+            used |= {leaf.name() for leaf in ca.symvar(turn.margin)}
+    return tuple(turn for turn in switches if turn.mode.name() in used)
 
 
 def with_modes(found: Switched, expressions: Sequence[ca.SX]) -> list[ca.SX]:

@@ -17,7 +17,7 @@ from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.trail import LEAST_STEPS, Trail
 
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
@@ -45,6 +45,8 @@ class Run:
         self.coordinates = coordinates
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
+        if coordinates.pieces.switched.smooth:  # whose pieces nothing keeps a long step from jumping over
+            longest = min(longest or np.inf, self.span / LEAST_STEPS)
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
         interval = float(np.diff(self.trail.t).max())

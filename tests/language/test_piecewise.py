@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 
+from gantrytau import if_else
 from gantrytau.language.piecewise import switched, with_modes
 
 x, y, u = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("u")
@@ -54,3 +55,20 @@ def test_the_shape_of_a_matrix_stays():
     assert same.shape == (2, 2)
     assert ca.is_equal(same[0, 1], y)
     assert ca.is_equal(same[1, 1], u)
+
+
+SMOOTH = if_else(ca.fabs(x) < 1, x**2 / 2, ca.sqrt(x**2 + 1e-9) - 0.5, smooth=True)
+
+
+def test_what_is_said_to_be_smooth_has_a_mode_only_where_that_is_asked_for():
+    both = [SMOOTH + ca.fabs(y), SMOOTH * if_else(y > 1, 1.0, 2.0)]
+    found = switched(both, smooth=False)
+    assert found.smooth
+    assert {leaf.name() for turn in found.switches for leaf in ca.symvar(turn.margin)} == {"y"}
+    assert len(switched(both).switches) == len(found.switches) + 2  # fabs(x), and the condition
+    assert not switched([ca.fabs(y)], smooth=False).smooth
+    rows = ca.vertcat(*both), ca.vertcat(*with_modes(found, found.expressions))
+    slopes = [ca.Function("slopes", [x, y], [row, ca.jacobian(row, x)]) for row in rows]
+    for point in np.random.default_rng(0).normal(size=(200, 2)) * 2:
+        for before, after in zip(slopes[0](*point), slopes[1](*point), strict=True):
+            np.testing.assert_allclose(after, before, rtol=1e-13, atol=1e-15)

@@ -25,6 +25,7 @@ from gantrytau import (
     time,
     translate,
 )
+from gantrytau.simulation.motion import all_coordinates
 from gantrytau_models import FourBar
 
 TOLERANCE = 1e-9
@@ -339,3 +340,28 @@ def test_what_is_huge_is_told():
 
     with pytest.warns(DoubtfulResult, match=r"x is beyond 1e\+100 from t = 0\.77 s on"):
         simulate(Huge(), stop=1.0, points=101)
+
+
+@pytest.mark.parametrize("points", [2, 501])
+def test_what_is_said_to_be_smooth_is_no_event(points):
+    """A force that is linear near the middle and constant outside, whose energy is known; no step jumps over the middle."""
+
+    class Soft(Model):
+        x = Real(start=3.0, fixed=True)
+        v = Real(start=0.0, fixed=True)
+        y = Real(start=3.0)
+
+        def equations(self):
+            side = if_else(self.x > 0, 1.0, -1.0, smooth=True)
+            yield der(self.x) == self.v
+            yield der(self.v) == -if_else(between(-1, self.x, 1), self.x, side, smooth=True)
+            yield (
+                self.y + if_else(self.y > 0, 2 * self.y, self.y, smooth=True) == self.x
+            )  # in a loop of its own
+
+    found = simulate(Soft(), stop=20.0, tolerance=1e-10, points=points)
+    x = found["x"]
+    energy = found["v"] ** 2 / 2 + np.where(np.abs(x) < 1, x**2 / 2, np.abs(x) - 0.5)
+    np.testing.assert_allclose(energy, 2.5, atol=1e-7)
+    np.testing.assert_allclose(found["y"], np.where(x > 0, x / 3, x / 2), atol=1e-12)
+    assert all_coordinates(translate(Soft()), {}).switches.turns == ()

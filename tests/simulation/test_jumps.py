@@ -23,6 +23,7 @@ from gantrytau import (
     reinit,
     sampled,
     simulate,
+    sin,
     sqrt,
     terminate,
     time,
@@ -261,6 +262,22 @@ def test_counters_and_drives_at_instants_of_time():
         assert found.final("x") == pytest.approx(100 * 0.03 + 0.03, abs=1e-12)
         assert found.at(3.02, "on") == 1
         assert found.at(3.0301, "on") == 0
+
+
+def test_instants_of_time_move_with_what_they_depend_on():
+    class Moved(Model):
+        """A level that a sine reaches, raised each time: asin(0.2), asin(0.4), ... of one swing, then none."""
+
+        second = Parameter(1.0, unit="s")
+        level = Discrete(0.2)
+        x = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == 1
+            yield when(sin(time / self.second) > self.level, self.level == pre(self.level) + 0.2)
+
+    found = simulate(Moved(), stop=1.5, points=2)
+    np.testing.assert_allclose(found.time[jumps(found)], np.arcsin([0.2, 0.4, 0.6, 0.8]), atol=1e-14)
 
 
 @pytest.mark.parametrize("points", [2, 3, 11])

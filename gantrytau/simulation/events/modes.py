@@ -51,7 +51,7 @@ def in_modes(dae: Translated, known: Mapping[str, ca.SX]) -> InModes:
     rows = [*residuals.values(), *known.values(), *conditions]
     steady = set(dae.table.independent)
     names = {leaf.name() for leaf in ca.symvar(ca.vertcat(*rows))} - steady if rows else set()
-    found = switched(rows, names)
+    found = switched(rows, names, smooth=False)
     written = iter(found.expressions)
     first = {key: next(written) for key in residuals}
     return InModes(first, {name: next(written) for name in known}, tuple(written), found)

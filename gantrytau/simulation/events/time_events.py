@@ -22,7 +22,10 @@ class TimeEvents:
         self._counts = np.array([switches.turns[i].counts for i in chosen], dtype=bool)
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
         self._function = ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)])
-        self._modes = len(switches)
+        curved = ca.vertcat(
+            *(e for e, linear in zip(margins.elements(), self._linear, strict=True) if not linear)
+        )
+        self._asked = [k for k in range(w.numel()) if curved.numel() and ca.depends_on(curved, w[k])]
         self._zeros: dict[tuple[int, bytes], np.ndarray] = {}
 
     def next(self, t: float, w: np.ndarray) -> float | None:
@@ -44,8 +47,8 @@ class TimeEvents:
         return min((at for at in found if least < at < self.end), default=None)
 
     def _all_zeros(self, i: int, w: np.ndarray) -> np.ndarray:
-        """All times of the run at which a margin passes zero while the modes are these."""
-        key = i, w[w.size - self._modes :].tobytes()
+        """All times of the run at which a margin passes zero while what it depends on stays as it is."""
+        key = i, w[self._asked].tobytes()
         if key not in self._zeros:
             self._zeros[key] = self._search(i, w)
         return self._zeros[key]
