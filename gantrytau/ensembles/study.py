@@ -37,7 +37,8 @@ def study(
     combine: "grid" takes every combination, "zip" the first values of all, then the second ones. seeds: how many, from 0,
     or a list; every combination is run with each, as `simulate(seed=...)`, of a function as its argument `seed`.
     where: "processes" takes all processors of this machine, "dask" starts a local cluster on them, "tcp://host:8786" is the
-    address of a scheduler whose workers have this package (dask worker --nthreads 1). One case is run right here.
+    address of a scheduler whose workers have this package (dask worker --nthreads 1). Cases of a model that are done before
+    processes have begun, some seconds, are simulated right here.
     folder: keeps every finished case, whatever happens to the program; the same call goes on with the rest.
     stop, inputs, outputs and further keywords are those of `simulate`; without outputs= every case keeps all variables.
     The model is translated once. A case that fails is one of `.failures`; one that ends its process is tried again first.
@@ -69,7 +70,7 @@ def _finished(
     try:
         with Progress(0, len(cases), f"{title}: {len(cases)} cases") as progress:
             progress.at(len(found))
-            for outcome in outcomes(task, left, place):
+            for outcome in outcomes(task, left, place, safe=isinstance(task, ModelTask)):
                 if kept is not None:
                     kept.keep(outcome)
                 found[outcome.number] = outcome

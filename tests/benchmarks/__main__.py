@@ -12,10 +12,11 @@ from tests.benchmarks import (
     mechanisms,
     motion,
     procedure,
+    studies,
 )
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
     mechanics = (engine.rows(), mechanisms.rows(), motion.rows(), kinematics.rows(), calibration.rows())
-    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), fmus.rows())
+    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), fmus.rows(), studies.rows())
     sys.exit(print_table("Benchmarks", parts))

@@ -16,8 +16,11 @@ from gantrytau import (
     simulate,
     sin,
     study,
+    terminate,
     time,
     translate,
+    when,
+    white_noise,
 )
 from gantrytau.ensembles.workers import places
 
@@ -78,9 +81,9 @@ def test_processes_and_this_process_agree_bit_by_bit(translated, monkeypatch):
     model = translate(Decay()) if translated else Decay()
     asked = dict(stop=3.0, over={"k": [0.7, 1.3], "x": [1.0, 2.0]}, inputs={"u": lambda t: exp(-t)})
     asked |= dict(parameters={"b": [1.5, 0.0]}, points=101)
-    there = study(model, **asked)
-    monkeypatch.setattr(places, "processors", lambda: 1)
     here = study(model, **asked)
+    monkeypatch.setattr(places, "BEGIN", -1.0)
+    there = study(model, **asked)
     for case, a, b in zip(there.cases, there.values, here.values, strict=True):
         alone = simulate(
             model,
@@ -92,6 +95,76 @@ def test_processes_and_this_process_agree_bit_by_bit(translated, monkeypatch):
         )
         assert same(a, b)
         assert same(a, alone)
+
+
+def test_cases_that_take_long_go_on_in_processes(monkeypatch):
+    here, computed = places.computed, []
+    asked = dict(stop=1.0, over={"k": [0.5, 1.0, 1.5, 2.0]}, inputs={"u": 0.0})
+    for budget, expected in ((float("inf"), 4), (0.0, 1), (-1.0, 0)):
+        with monkeypatch.context() as patch:
+            patch.setattr(places, "BEGIN", budget)
+            patch.setattr(places, "computed", lambda task, case: computed.append(case) or here(task, case))
+            found = study(Decay(), **asked)
+        assert len(computed) == expected
+        computed.clear()
+        assert [value.final("x") for value in found.values] == pytest.approx(
+            np.exp([-0.5, -1.0, -1.5, -2.0]), rel=1e-6
+        )
+
+
+class Held(Model):
+    """A quantity that decays towards what a noise holds: x' = k (u - x)."""
+
+    k = Parameter(2.0, unit="1/s", description="rate")
+    x = Real(unit="1", start=0.0, fixed=True, description="what follows")
+    u = Input(unit="1", description="what is followed")
+
+    def equations(self):
+        yield der(self.x) == self.k * (self.u - self.x)
+
+
+def test_seeds_drive_noise_and_are_those_of_simulate(monkeypatch):
+    period, rate, count = 0.1, 2.0, 12
+    noise = {"u": white_noise(std=1.0, period=period)}
+    asked = dict(stop=5.0, inputs=noise, tolerance=TOLERANCE, points=51)
+    found = study(Held(), **asked, seeds=count)
+    table = found.to_xarray()
+    assert table["x"].dims == ("seed", "time")
+    keep = np.exp(-rate * period)
+    for seed in range(count):
+        result = found.result(seed=seed)
+        held = [result.at(t + period / 2, "u") for t in np.arange(50) * period]
+        exact = 0.0
+        for u in held:  # the exact solution from one instant to the next
+            exact = keep * exact + (1 - keep) * u
+        assert result.final("x") == pytest.approx(exact, abs=ERROR)
+        assert same(result, simulate(Held(), **asked, seed=seed))
+    assert len({value.final("x") for value in found.values}) == count
+    monkeypatch.setattr(places, "BEGIN", -1.0)
+    assert all(
+        same(a, b) for a, b in zip(study(Held(), **asked, seeds=count).values, found.values, strict=True)
+    )
+
+
+class Drained(Model):
+    """A tank that is emptied at a rate, and ends the run when it is empty."""
+
+    rate = Parameter(1.0, unit="m/s", description="fall of the level")
+    h = Real(unit="m", start=1.0, fixed=True, description="level")
+
+    def equations(self):
+        yield der(self.h) == -self.rate
+        yield when(self.h <= 0, terminate("the tank is empty"))
+
+
+def test_runs_that_end_early_are_not_numbers_after_their_end():
+    found = study(Drained(), stop=2.0, over={"rate": [0.25, 1.0, 2.0]}, points=21)
+    assert [value.ended for value in found.values] == ["stop", "the tank is empty", "the tank is empty"]
+    table = found.to_xarray()["h"]
+    exact = 1 - table["rate"] * table["time"]
+    there = exact >= -1e-12
+    assert (table.notnull() == there).all()
+    assert float(abs(table - exact).max()) < 1e-7  # ten times the tolerance of simulate
 
 
 def test_a_result_is_found_by_what_was_chosen():

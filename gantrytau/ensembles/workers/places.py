@@ -1,16 +1,18 @@
 """Where cases are computed: in this process, in processes of this machine, on a Dask cluster."""
 
 from collections.abc import Iterator, Sequence
+from time import perf_counter
 from typing import Any
 
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.workers.cluster import on_cluster
 from gantrytau.ensembles.workers.processes import in_processes
-from gantrytau.ensembles.workers.worker import Outcome, Task, here, processors, within_a_case
+from gantrytau.ensembles.workers.worker import Outcome, Task, computed, here, processors, within_a_case
 from gantrytau.errors import ModelError, did_you_mean
 
 Place = str
 PROCESSES = "processes"
+BEGIN = 3.0  # s, in which a process starts, imports, reads its task and makes what later cases find made
 NAMES = (PROCESSES, "dask")
 
 
@@ -25,11 +27,26 @@ def read_place(where: Any) -> Place:
     )
 
 
-def outcomes(task: Task, cases: Sequence[Case], place: Place) -> Iterator[Outcome]:
-    """Outcomes of cases as they are finished; one case, one processor and a study within a case need no processes."""
+def outcomes(task: Task, cases: Sequence[Case], place: Place, *, safe: bool = False) -> Iterator[Outcome]:
+    """Outcomes of cases as they are finished; one case, one processor and a study within a case need no processes.
+
+    safe: whether a case cannot end its process; then cases that are done before processes have begun are computed here.
+    """
     here_is_enough = place == PROCESSES and (processors() == 1 or len(cases) == 1)
     if within_a_case() or here_is_enough:
         return here(task, cases)
     if place == PROCESSES:
-        return in_processes(task, cases)
+        return _begun_here(task, cases) if safe else in_processes(task, cases)
     return on_cluster(task, cases, place)
+
+
+def _begun_here(task: Task, cases: Sequence[Case]) -> Iterator[Outcome]:
+    """Cases here for as long as processes take to begin, or to the end where that is near; the rest in processes."""
+    begin, last = perf_counter(), 0.0
+    for number, case in enumerate(cases):
+        since = perf_counter()
+        if since - begin > BEGIN and last * (len(cases) - number) > BEGIN:
+            yield from in_processes(task, cases[number:])
+            return
+        yield computed(task, case)
+        last = perf_counter() - since
