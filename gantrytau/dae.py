@@ -10,6 +10,7 @@ import casadi as ca
 from gantrytau.answers.causality import function
 from gantrytau.answers.diagnosis import Diagnosis, diagnose
 from gantrytau.answers.evaluation import evaluate
+from gantrytau.answers.instant_function import instant_function, is_before
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.system import System, assemble
 from gantrytau.compiler.translated import Translated
@@ -56,10 +57,12 @@ class Dae(Translated):
         """A CasADi function from `given` to `find`, by name; the causality follows from the names.
 
         One argument and one result per name, vectors (k,). Derivatives are `der(x)`, `der(der(x))`.
-        Parameters that are not given have their values. Raises StructureError if `given` does not determine
-        `find` or contradicts itself, ModelError for unknown names.
+        Parameters that are not given have their values. Names `pre(x)` among the given make it the function of an instant:
+        from values just before to those behind one round of the whens whose conditions hold there. Raises StructureError
+        if `given` does not determine `find` or contradicts itself, ModelError for unknown names.
         """
-        return function(self, given, find)
+        before = any(map(is_before, names(given)))
+        return instant_function(self, given, find) if before else function(self, given, find)
 
     def evaluate(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """All variables and derivatives at a consistent point that holds `values` exactly.

@@ -14,6 +14,7 @@ from gantrytau import (
     Parameter,
     Real,
     SolveError,
+    StructureError,
     der,
     fmax,
     if_else,
@@ -27,8 +28,10 @@ from gantrytau import (
     sqrt,
     terminate,
     time,
+    translate,
     when,
 )
+from gantrytau_models import FourBar
 
 POINTS = (2, 3, 501)
 G = 9.81
@@ -433,3 +436,28 @@ def test_values_between_output_points_have_the_slope_of_the_motion():
     t = np.linspace(0, 0.4, 17)
     np.testing.assert_allclose(found.at(t, "h"), 1 - G * t**2 / 2, atol=1e-8)
     np.testing.assert_allclose(found.at(t, "v"), -G * t, atol=1e-8)
+
+
+def test_functions_of_an_instant():
+    dae = translate(Ball(), events=True)
+    behind = dae.function(["pre(h)", "pre(v)", "pre(bounces)"], ["v", "bounces", "h"])
+    np.testing.assert_allclose(np.ravel(behind(1.0, -2.0, 3)), [-2, 3, 1])  # the condition does not hold
+    np.testing.assert_allclose(np.ravel(behind(0.0, -2.0, 3)), [1.6, 4, 0])
+    assert float(dae.function(["pre(v)", "h"], ["v"])(5.0, -1e-9)) == -4.0
+    with pytest.raises(ModelError, match=r"found v among the given of an instant.*expected pre\(v\)"):
+        dae.function(["pre(h)", "v"], ["bounces"])
+    with pytest.raises(StructureError, match="Give also bounces"):
+        dae.function(["pre(h)", "pre(v)"], ["bounces"])
+    with pytest.raises(ModelError, match="there is no when in the model"):
+        translate(FourBar()).function(["pre(crank.phi)"], ["rocker.phi"])
+
+
+def test_a_function_of_an_instant_is_what_a_simulation_does():
+    found = simulate(Pairs(), stop=1.0, points=2)
+    (left,) = jumps(found)
+    dae = translate(Pairs(), events=True)
+    names = [f"pairs[{k}].{x}" for k in range(2) for x in ("x", "v", "hits")]
+    behind = dae.function([f"pre({n})" for n in names], names)
+    before = [found[n][left] for n in names]
+    for name, value in zip(names, behind(*before), strict=True):
+        np.testing.assert_allclose(np.ravel(value), np.ravel(found[name][left + 1]), rtol=1e-14)
