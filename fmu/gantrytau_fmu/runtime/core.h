@@ -86,7 +86,7 @@ static void gt_save(const gt_instance *it, void *block);
 static gt_status gt_restore(gt_instance *it, const char *function, const void *block, size_t size);
 
 #if defined __GNUC__
-#define GT_SELDOM __attribute__((cold)) /* compiled for size */
+#define GT_SELDOM __attribute__((cold, noinline)) /* compiled for size, and not into what is not */
 #else
 #define GT_SELDOM
 #endif

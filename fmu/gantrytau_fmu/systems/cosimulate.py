@@ -28,7 +28,7 @@ from gantrytau_fmu.systems.initialize import initialize
 from gantrytau_fmu.systems.isolation import Isolated
 from gantrytau_fmu.systems.master import ORDERS, Grid, Master, Order, RunningComponent, make_grid, paces_of
 from gantrytau_fmu.systems.recorder import Recorder
-from gantrytau_fmu.systems.slave import Slave
+from gantrytau_fmu.systems.slave import RunEnded, Slave
 from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
 from gantrytau_fmu.systems.step_order import sequence_of
 
@@ -75,11 +75,11 @@ def cosimulate(
     steps: component -> its own step, a multiple or a fraction of `step`; what others give it is held in between.
     error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
         error of the result to first order in the step.
-    isolate: components (True: all) that run in processes of their own, where a crash is an error, as is a call that
-        takes longer than `timeout`, s.
+    isolate: components (True: all) in processes of their own, where a crash or a call longer than `timeout`, s, is an error.
     progress: called with the time reached; by default a bar on the terminal when it takes long.
 
-    An input shows the output that drives it at that point. A sample is taken when a step begins, and seen a step later.
+    A component that asks to end the run ends the result (`.ended` says why), there if it is alone, else at the point before.
+    An input shows the output that drives it at that point; a sample is seen a step after it was taken.
     Raises ModelError for a system that does not fit, InitializationError if the components cannot begin, SolveError with
     `.time` and the partial `.result` when a component fails, gives values that are not finite, or on Ctrl-C.
     """
@@ -131,6 +131,8 @@ def _run(
             master.read()
             recorder.begin(master)
             _advance(plan, grid, master, recorder, progress)
+        except RunEnded as ended:
+            recorder.end(master, ended)
         except SolveError as error:
             error.result = recorder.result()
             raise
@@ -299,7 +301,14 @@ def _with_errors(result: Result, half: Result) -> Result:
     words = {name: result.description(name) for name in result.names}
     units |= {f"error({name})": unit for name, unit in units.items()}
     words |= {f"error({name})": f"estimated error of {name}" for name in values}
-    return Result(result.time, {**values, **errors}, units=units, descriptions=words, title=result.title)
+    return Result(
+        result.time,
+        {**values, **errors},
+        units=units,
+        descriptions=words,
+        title=result.title,
+        ended=result.ended,
+    )
 
 
 def check_times(begin: Any, stop: Any, step: Any) -> None:

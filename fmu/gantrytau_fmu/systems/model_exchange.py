@@ -14,6 +14,7 @@ from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem
 from gantrytau_fmu.systems.drives import knots_of
 from gantrytau_fmu.systems.master import Grid
+from gantrytau_fmu.systems.slave import LAST, ended_in_words, hook_log
 
 SAME = 1e-9  # of a time, within which two are one to FMPy (math.isclose)
 
@@ -33,6 +34,7 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
         )
     table = _inputs(component, system, grid)
     pressed: list[bool] = []
+    log: list[str] = []
     reached: list[Any] = []  # FMPy's recorder, once there is one
     simulate: Callable[..., Any] = fmpy.simulate_fmu
     with Progress(grid.begin, grid.stop) as bar, on_interrupt(lambda: pressed.append(True)):
@@ -57,12 +59,16 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
                 output=list(outputs),
                 fmi_type="ModelExchange",
                 step_finished=go_on,
+                logger=lambda *told: log.append((told[-1] or b"").decode("utf-8", "replace")),
             )
         except Exception as error:  # FMPy raises bare exceptions
-            raise _failure(component, outputs, reached, error) from error
-    result = _result(component, outputs, found)
+            raise _failure(component, outputs, reached, error, log) from error
+        finally:
+            hook_log()
     if not pressed:
-        return result
+        early = found["time"][-1] < grid.stop - 1e-6 * grid.step  # FMPy stops where the FMU asks for it
+        return _result(component, outputs, found, ended_in_words(log, component.name) if early else "stop")
+    result = _result(component, outputs, found)
     stopped = SolveError(
         f"{component.file}: the integration was interrupted at t = {result.time[-1]:.4g} s; "
         ".result holds what was computed",
@@ -74,13 +80,14 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
 
 
 def _failure(
-    component: Component, outputs: tuple[str, ...], reached: list[Any], error: Exception
+    component: Component, outputs: tuple[str, ...], reached: list[Any], error: Exception, log: list[str]
 ) -> SolveError:
     partial = _result(component, outputs, reached[0].result()) if reached else None
     time = float(partial.time[-1]) if partial is not None else None
+    said = f"; its log says: {' | '.join(line.strip() for line in log[-LAST:])}" if log else ""
     when = f" after t = {time:.6g} s" if time is not None else ""
     return SolveError(
-        f"{component.file}: the integration failed{when}: {error}; try a smaller tolerance or Co-Simulation",
+        f"{component.file}: the integration failed{when}: {error}{said}; try a smaller tolerance or Co-Simulation",
         time=time,
         result=partial,
     )
@@ -123,11 +130,12 @@ def _check_knots(component: Component, knots: np.ndarray) -> None:
         )
 
 
-def _result(component: Component, outputs: tuple[str, ...], found: Any) -> Result:
+def _result(component: Component, outputs: tuple[str, ...], found: Any, ended: str = "stop") -> Result:
     return Result(
         found["time"],
         {name: found[name].astype(float) for name in outputs},
         units={name: component.scalars[name].unit for name in outputs},
         descriptions={name: component.scalars[name].description for name in outputs},
         title=Path(component.file).stem,
+        ended=ended,
     )

@@ -8,6 +8,7 @@ from gantrytau.results.result import Result
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, Place, SignalLink
 from gantrytau_fmu.systems.drives import Drive
 from gantrytau_fmu.systems.master import Grid, Master
+from gantrytau_fmu.systems.slave import RunEnded
 
 ROWS = 1024  # made room for at first; then always twice as many
 
@@ -23,6 +24,7 @@ class Recorder:
         self.system, self.places, self.grid = system, tuple(places), grid
         self.links: dict[Place, SignalLink] = {link.target: link for link in system.links}
         self.count = 0
+        self.ended, self.last = "stop", grid.stop  # why, and when, s
         self.rows = np.empty((0, 0))
         self.columns: dict[Place, int] = {}
         self.held: dict[Place, float] = {}
@@ -54,13 +56,21 @@ class Recorder:
         self.rows[self.count] = [value for values in master.values.values() for value in values]
         self.count += 1
 
+    def end(self, master: Master, ended: RunEnded) -> None:
+        """A component has ended the run: one more row, at that time, if no other has gone on beyond or stayed behind."""
+        self.ended = ended.words
+        if len(master.values) == 1:
+            master.values[ended.owner] = ended.values
+            self.add(master)
+            self.last = ended.time
+
     def result(self) -> Result | None:
         """What there is, or None before the first row."""
         return self.complete() if self.count else None
 
     def complete(self) -> Result:
         """The result by dotted names."""
-        times = np.array([self.grid.time(k) for k in range(self.count)])
+        times = np.array([min(self.grid.time(k), self.last) for k in range(self.count)])
         values, aliases, units, words = {}, {}, {}, {}
         for place in self.places:
             name, scalar = ".".join(place), self.system.components[place[0]].scalars[place[1]]
@@ -71,7 +81,9 @@ class Recorder:
                 values[name] = self._values(place, link, times)
             units[name], words[name] = scalar.unit, scalar.description
         title = f"co-simulation of {', '.join(self.system.components)}"
-        return Result(times, values, units=units, descriptions=words, title=title, aliases=aliases)
+        return Result(
+            times, values, units=units, descriptions=words, title=title, aliases=aliases, ended=self.ended
+        )
 
     def _values(self, place: Place, link: SignalLink | None, times: np.ndarray) -> np.ndarray:
         if link:

@@ -92,4 +92,5 @@ def _bare(result: Result, name: str) -> Result:
         units={short: result.unit(full) for short, full in names.items()},
         descriptions={short: result.description(full) for short, full in names.items()},
         title=Path(name).stem,
+        ended=result.ended,
     )

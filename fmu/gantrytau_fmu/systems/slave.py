@@ -5,20 +5,35 @@ which time it was, and repeats what the FMU wrote to its log last.
 """
 
 import ctypes
+import re
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import InitializationError, ModelError, SolveError
+from gantrytau.errors import GantryTauError, InitializationError, ModelError, SolveError
 from gantrytau_fmu.systems.component import Component, Scalar
 
 LAST = 12  # messages kept of the log
 ERRORS = ("logStatusError", "logStatusFatal", "logStatusWarning")  # categories that FMI predefines
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
+DISCARD, LAST_TIME, TERMINATED = 2, 2, 3  # statuses and kinds of status in FMI 2
+
 Values = Sequence[float]
+
+
+class RunEnded(GantryTauError):
+    """A component, `owner`, asks to end the run: when, s, in which words, and the values it has then."""
+
+    def __init__(self, owner: str, time: float, words: str, values: Values):
+        super().__init__(f"{owner}: {words}")
+        self.owner, self.time, self.words, self.values = owner, time, words, list(values)
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        return RunEnded, (self.owner, self.time, self.words, self.values)
+
 
 _TYPES_2 = {
     "Real": ctypes.c_double,
@@ -102,14 +117,27 @@ class Slave:
         values: Values,
         wanted: tuple[str, ...],
     ) -> list[float]:
-        """Set inputs, step from `time` over `size`, and get values."""
+        """Set inputs, step from `time` over `size`, and get values. RunEnded where the component ends the run."""
         self.time = time
         self.set(known, values)
-        reply = self._call("step", self.fmu.doStep, time, size)
-        if reply and reply[1]:
-            raise self._failure("step: it asks to terminate the simulation")
-        self.time = time + size
-        return self.get(wanted)
+        ended = self._stepped(time, size)
+        self.time = time + size if ended is None else ended
+        found = self.get(wanted)
+        if ended is not None:
+            name = self.component.name
+            raise RunEnded(name, ended, ended_in_words(self.log, name), found)
+        return found
+
+    def _stepped(self, time: float, size: float) -> float | None:
+        """Take a step; the time at which the component ended the run, s, if it did."""
+        try:
+            reply = self._call("step", self.fmu.doStep, time, size)
+        except SolveError as error:
+            discarded = getattr(error.__cause__, "status", None) == DISCARD and self.component.version == 2
+            if discarded and self._call("fmi2GetBooleanStatus", self.fmu.getBooleanStatus, TERMINATED):
+                return float(self._call("fmi2GetRealStatus", self.fmu.getRealStatus, LAST_TIME))
+            raise
+        return float(reply[3]) if reply and reply[1] else None
 
     def save(self) -> None:
         """Keep the present state, in place of the one kept before."""
@@ -261,6 +289,15 @@ def _access(kind: str, version: int) -> str:
     return kind
 
 
+def ended_in_words(log: Iterable[str], name: str) -> str:
+    """Why a component ended the run: what an FMU of ours says of it in its log, else that it did."""
+    for line in reversed(list(log)):
+        found = re.search(r"ended at time = [^:]* s: (.*)", line)
+        if found:
+            return found[1].strip()
+    return f"{name} asked to end the run"
+
+
 def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
 
@@ -308,6 +345,11 @@ def _callbacks(key: int) -> Any:
 
         addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
+
+
+def hook_log() -> None:
+    """After a run in which FMPy had a logger of its own: its proxy must not call one that is gone."""
+    _callbacks(0)
 
 
 def _heard_2(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:

@@ -100,6 +100,7 @@ def run(
         summary = {
             "file": str(file),
             "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+            "ended": result.ended,
             "final": {name: result.final(name) for name in result.names},
             "files": files,
             "warnings": told,
@@ -172,5 +173,7 @@ def _show(summary: Mapping[str, Any], result: "Result") -> None:
         Console().print(table)
     if len(result.names) > SHOWN:
         typer.echo(f"and {len(result.names) - SHOWN} more; --output saves all")
+    if summary["ended"] != "stop":
+        typer.echo(f"Ended before its stop time: {summary['ended']}")
     for file in summary["files"]:
         typer.echo(f"Written: {file}")
