@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from gantrytau import Discrete, Model, Real, der, logic_and, pre, reinit, time, when
 
 END = 2.0  # s
-LOOKS = 2017.3  # at the margins, at no round times
+LOOKS = 607.3  # at the margins, at no round times
 UNSURE = 1e-4  # of a margin that is nearly zero where something happens
 ZERO = 1e-10  # of a margin that is zero but for rounding
 SLOW = 0.02  # 1/s, at which a margin is hardly crossed
