@@ -39,7 +39,7 @@ from gantrytau.language.declarations import (
     Start,
     StateSelect,
 )
-from gantrytau.language.events import reinit, sampled, stick_slip, terminate, when
+from gantrytau.language.events import Mode, reinit, sampled, stick_slip, terminate, transition, when
 from gantrytau.language.functions import (
     acos,
     asin,
@@ -100,6 +100,7 @@ __all__ = [
     "LinearSystem",
     "Linearization",
     "Mechanism",
+    "Mode",
     "Model",
     "ModelError",
     "Output",
@@ -177,6 +178,7 @@ __all__ = [
     "tanh",
     "terminate",
     "time",
+    "transition",
     "translate",
     "when",
     "white_noise",

@@ -116,7 +116,8 @@ class When:
     reinits: states and their new values; assignments: Discretes and theirs; all in flat symbols, which stand for values
     just before, but those of Discretes for new ones (`FlatModel.before` are the old ones); message: of terminate, "" if the
     run goes on; path, model, number: where it is stated; after: place in `FlatModel.whens` of the one before it in its
-    chain, -1 if it is the first.
+    chain, -1 if it is the first; words: what it is, where its condition does not say it; initially: whether it acts at the
+    start if its condition holds there; failure: words of the error that ends the run where it would act, "" if it acts.
     """
 
     condition: ca.SX
@@ -127,12 +128,17 @@ class When:
     model: str
     number: int
     after: int = -1
+    words: str = ""
+    initially: bool = False
+    failure: str = ""
 
     @property
     def label(self) -> str:
         """Where it is stated, and on what condition."""
         words = str(self.condition)
         place = f"{self.path or 'the model'} ({self.model}), equation {self.number}"
+        if self.words:
+            return f"{place}, {self.words}"
         return f"{place}, when({words if len(words) <= 60 else words[:57] + '...'})"
 
 
@@ -146,7 +152,8 @@ class FlatModel:
     scalars known from outside; absent: declared names that this model has no use for, and why;
     requirements: conditions on parameters; sampled, discretes, frictions: scalars that are set at instants, no unknowns
     either, discretes by `whens`; before: symbols of the values of discretes just before an instant, by their names;
-    ranges: where tables end that are not defined beyond; rods: what a robot says of its links, by name.
+    modes: names of the values 0, 1, ... of a discrete, by its name; ranges: where tables end that are not defined beyond;
+    rods: what a robot says of its links, by name.
     """
 
     name: str
@@ -169,6 +176,7 @@ class FlatModel:
     discretes: tuple[str, ...] = ()
     before: Mapping[str, ca.SX] = field(default_factory=dict)
     ranges: tuple[Range, ...] = ()
+    modes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rods: Rods | None = None
 
     @cached_property

@@ -22,9 +22,10 @@ from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.flattening.instants import Events, expressed, read_events, with_expressions, with_starts
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
+from gantrytau.flattening.transitions import read_transitions
 from gantrytau.flattening.whens import read_whens, refuse_unassigned, when_sides, with_sides
 from gantrytau.language.declarations import Parameter
-from gantrytau.language.events import Sampling, Sticking, WhenChain
+from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
@@ -47,6 +48,8 @@ class _Stated:
     requirements: list[Requirement] = field(default_factory=list)
     events: list[tuple[str, str, int, Sampling | Sticking]] = field(default_factory=list)
     whens: list[tuple[str, str, int, WhenChain]] = field(default_factory=list)
+    transitions: list[tuple[str, str, int, Transition]] = field(default_factory=list)
+    modes: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def _stated(instance: Instance) -> _Stated:
@@ -62,6 +65,8 @@ def _stated(instance: Instance) -> _Stated:
                 found.events.append((path, name, number, statement))
             elif isinstance(statement, WhenChain):
                 found.whens.append((path, name, number, statement))
+            elif isinstance(statement, Transition):
+                found.transitions.append((path, name, number, statement))
             elif isinstance(statement, (Branch, Root)):
                 found.ways.append((path, name, number, statement))
             else:
@@ -70,6 +75,9 @@ def _stated(instance: Instance) -> _Stated:
         for number, statement in _statements(component.initial_equations, path, name):
             found.initial += equality(statement, path, name, number)
         instance.symbols.ranges[:] = ranges  # what is asked at the start alone is not watched
+    samplings, chains, found.modes = read_transitions(found.transitions, instance)
+    found.events += samplings
+    found.whens += chains
     return found
 
 
@@ -79,12 +87,9 @@ def write_out(instance: Instance) -> FlatModel:
         stated = _stated(instance)
         equations, connections = stated.equations, stated.connections
         statements = [way for *_, way in stated.ways]
-        tree = spanning_tree(
-            instance,
-            connections,
-            [way for way in statements if isinstance(way, Branch)],
-            [way for way in statements if isinstance(way, Root)],
-        )
+        branches = [way for way in statements if isinstance(way, Branch)]
+        roots = [way for way in statements if isinstance(way, Root)]
+        tree = spanning_tree(instance, connections, branches, roots)
         equations += _of_the_ways(stated.ways, tree)
         equations += _bindings(instance)
         joined = [c for c in connections if id(c[1]) not in tree.repeated]
@@ -131,6 +136,7 @@ def write_out(instance: Instance) -> FlatModel:
         discretes=discretes,
         before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
         ranges=_ranges(instance.symbols, spread),
+        modes=stated.modes,
         rods=rods_of(instance.root),
     )
 

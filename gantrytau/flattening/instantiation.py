@@ -11,6 +11,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate
+from gantrytau.language.events import CurrentMode, Mode
 from gantrytau.language.model import (
     Connector,
     Declared,
@@ -215,6 +216,11 @@ class _Builder:
         vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
         symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
         instance.__dict__[name] = symbol
+        if isinstance(declaration, Mode):
+            if "start" in attributes:
+                start = attributes["start"]
+                attributes["start"] = replace(start, value=declaration.number(start.value, full))
+            instance.__dict__[name] = CurrentMode(symbol, declaration.names, full)
         chosen = full in self.chosen or re.sub(r"\[\d+\]", "", full) in self.chosen
         self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names, chosen))
 

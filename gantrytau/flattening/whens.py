@@ -16,7 +16,7 @@ import numpy as np
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel, When
 from gantrytau.flattening.instants import declared, sized
-from gantrytau.language.events import Reinit, Terminate, WhenChain
+from gantrytau.language.events import Happening, Reinit, Terminate, WhenChain
 from gantrytau.language.functions import plain_condition
 from gantrytau.language.statements import Equation, equality
 from gantrytau.language.symbols import Symbols, scalars
@@ -31,28 +31,32 @@ def read_whens(
     """The records of chains (path, class, number, chain). ModelError for what cannot be one; held: what is sampled."""
     found: list[When] = []
     for path, model, number, chain in stated:
-        where = path, model, number, f"{path or 'the model'} ({model}), equation {number}"
         after = -1
-        for condition, actions in chain.branches:
-            found.append(_read(condition, actions, symbols, held, where, after))
+        for branch in chain.branches:
+            own = branch.where or (path, model, number)
+            found.append(_read(branch, symbols, held, (*own, place_of(*own)), after))
             after = len(found) - 1
     _refuse_set_twice(found)
     return tuple(found)
 
 
-def _read(
-    condition: Any, actions: Sequence[Any], symbols: Symbols, held: Collection[str], where: Where, after: int
-) -> When:
+def place_of(path: str, model: str, number: int) -> str:
+    """Where a statement stands, in words."""
+    return f"{path or 'the model'} ({model}), equation {number}"
+
+
+def _read(branch: Happening, symbols: Symbols, held: Collection[str], where: Where, after: int) -> When:
     path, model, number, place = where
-    plain = _without_pre(_condition(condition, symbols, held, place), symbols, held, place, discrete=True)
+    condition = condition_of(branch.condition, symbols, held, place)
+    plain = _without_pre(condition, symbols, held, place, discrete=True)
     reinits: list[tuple[str, ca.SX]] = []
     assignments: list[tuple[str, ca.SX]] = []
     words: list[str] = []
-    if not actions:
+    if not branch.actions and not branch.failure:
         raise ModelError(
             f"{place}: found no action in when, expected reinit(...), discrete == ..., or terminate(...)"
         )
-    for action in actions:
+    for action in branch.actions:
         if isinstance(action, Reinit):
             reinits += _reinits(action, symbols, place)
         elif isinstance(action, Terminate):
@@ -69,10 +73,11 @@ def _read(
     def settled(pairs: list[tuple[str, ca.SX]]) -> tuple[tuple[str, ca.SX], ...]:
         return tuple((n, _without_pre(e, symbols, held, place)) for n, e in pairs)
 
-    return When(plain, settled(reinits), settled(assignments), "; ".join(words), path, model, number, after)
+    found = When(plain, settled(reinits), settled(assignments), "; ".join(words), path, model, number, after)
+    return replace(found, words=branch.words, initially=branch.initially, failure=branch.failure)
 
 
-def _condition(value: Any, symbols: Symbols, held: Collection[str], place: str) -> ca.SX:
+def condition_of(value: Any, symbols: Symbols, held: Collection[str], place: str) -> ca.SX:
     """A condition as one scalar expression; ModelError for what is none, or never changes."""
     value = plain_condition(value)
     if isinstance(value, (bool, np.bool_, int, float, np.number, ca.DM)):

@@ -1,13 +1,18 @@
-"""What a model states of instants: values that are sampled and held, what happens when, and friction that sticks.
+"""What a model states of instants: values that are sampled and held, what happens when, modes, and friction that sticks.
 
-`sampled`, `when` and `stick_slip` are yielded by `equations(self)` like equations. A sampled variable, a Discrete and
-the force of such a friction count as known in the equations, as inputs do; what they are is kept beside.
+`sampled`, `when`, `transition` and `stick_slip` are yielded by `equations(self)` like equations. A sampled variable, a
+Discrete and the force of such a friction count as known in the equations, as inputs do; what they are is kept beside.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gantrytau.errors import ModelError
+import casadi as ca
+
+from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.language.declarations import Discrete
+from gantrytau.language.functions import if_else, logic_and, logic_or
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +52,31 @@ class Terminate:
 
 
 @dataclass(frozen=True, eq=False)
-class WhenChain:
-    """`when(condition, action, ...)`, and what is tried after it: (condition, actions) of which one acts at an instant."""
+class Happening:
+    """One branch of a chain: actions where a condition becomes true.
 
-    branches: tuple[tuple[Any, tuple[Any, ...]], ...]
+    words: what it is, where its condition does not say it; initially: whether it acts at the start, too, if its condition
+    holds there; failure: words of the error that it is instead of acting, "" if it is none; where: path, class and number
+    of its statement, if that is not the chain's.
+    """
+
+    condition: Any
+    actions: tuple[Any, ...]
+    words: str = ""
+    initially: bool = False
+    failure: str = ""
+    where: tuple[str, str, int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class WhenChain:
+    """`when(condition, action, ...)`, and what is tried after it: branches of which one acts at an instant."""
+
+    branches: tuple[Happening, ...]
 
     def elsewhen(self, condition: Any, *actions: Any) -> "WhenChain":
         """The same, and further actions where another condition becomes true and none before it does."""
-        return WhenChain((*self.branches, (condition, actions)))
+        return WhenChain((*self.branches, Happening(condition, actions)))
 
 
 def when(condition: Any, *actions: Any) -> WhenChain:
@@ -68,7 +90,7 @@ def when(condition: Any, *actions: Any) -> WhenChain:
     `.elsewhen(condition, action, ...)` continues the chain, of which the first whose condition becomes true acts: a
     variable may be set by one chain only.
     """
-    return WhenChain(((condition, actions),))
+    return WhenChain((Happening(condition, actions),))
 
 
 def reinit(variable: Any, value: Any) -> Reinit:
@@ -103,3 +125,109 @@ def stick_slip(force: Any, speed: Any, *, coulomb: Any, smooth: Any, breakaway: 
     rest it holds the speed at zero, while |force| <= breakaway. coulomb >= 0 and breakaway >= coulomb.
     """
     return Sticking(force, speed, coulomb, smooth, breakaway)
+
+
+class Mode(Discrete):
+    """Which of some named modes a component is in: `mode = Mode("free", "contact", "released")`.
+
+    It begins in the first, or in `start`, and only `transition` changes it. In equations `self.mode.is_in("contact")` is a
+    condition and `self.mode.choose(free=..., contact=..., released=...)` a value for each. Results, FMUs and files have the
+    number of the mode, from 0 in the order of the names, which stand in its description.
+    """
+
+    def __init__(self, *names: str, start: str | None = None, description: str = ""):
+        wrong = next((n for n in names if not isinstance(n, str) or not n.isidentifier()), None)
+        if wrong is not None or len(names) < 2 or len(set(names)) < len(names):
+            raise ModelError(
+                f"Mode: found the names {names!r}, expected at least two different words of letters, digits and _"
+            )
+        numbers = ", ".join(f"{k} {name}" for k, name in enumerate(names))
+        super().__init__(0, unit="1", description=f"{description or 'mode'}: {numbers}")
+        self.names = names
+        self.start = self.number(names[0] if start is None else start)
+
+    def number(self, start: Any, place: str = "Mode") -> Any:
+        """The number of a mode by its name; a number as it is. ModelError for what is neither."""
+        if isinstance(start, str):
+            return _number_of(place, self.names, start)
+        if isinstance(start, (int, float)) and start in range(len(self.names)):
+            return int(start)
+        raise ModelError(
+            f"{place}: found the start {start!r}, expected one of the modes {', '.join(self.names)}"
+        )
+
+
+class CurrentMode:
+    """The mode of a component in its equations: `self.mode`. number: its symbol; names, path: of the declaration."""
+
+    def __init__(self, number: ca.SX, names: tuple[str, ...], path: str):
+        self.number, self.names, self.path = number, names, path
+
+    def is_in(self, *names: str) -> Any:
+        """The condition that it is one of some modes, for `if_else`, `when` and guards."""
+        if not names:
+            raise ModelError(f"{self.path}.is_in: found no name, expected some of {', '.join(self.names)}")
+        return logic_or(*(self._is(_number_of(f"{self.path}.is_in", self.names, name)) for name in names))
+
+    def choose(self, **values: Any) -> Any:
+        """The value that belongs to the mode: one for each, numbers or expressions of one shape."""
+        for name in values:
+            _number_of(f"{self.path}.choose", self.names, name)
+        missing = [name for name in self.names if name not in values]
+        if missing:
+            raise ModelError(
+                f"{self.path}.choose: found no value for {', '.join(missing)}, expected one for each of "
+                f"{', '.join(self.names)}"
+            )
+        found = values[self.names[-1]]
+        for k, name in reversed(list(enumerate(self.names[:-1]))):
+            found = if_else(self.number < k + 0.5, values[name], found)
+        return found
+
+    def _is(self, k: int) -> Any:
+        above, below = self.number > k - 0.5, self.number < k + 0.5
+        return below if k == 0 else above if k == len(self.names) - 1 else logic_and(above, below)
+
+    def __eq__(self, other: object) -> Any:
+        raise ModelError(f"{self.path}: found == on a mode, expected {self.path}.is_in('{self.names[-1]}')")
+
+    __hash__ = object.__hash__
+
+
+def _number_of(place: str, names: Sequence[str], name: Any) -> int:
+    if name in names:
+        return list(names).index(name)
+    raise ModelError(f"{place}: there is no mode {name!r}{did_you_mean(str(name), names)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """`transition(mode, source, target, guard, action, ..., priority=..., period=...)`."""
+
+    mode: Any
+    source: str
+    target: str
+    guard: Any
+    actions: tuple[Any, ...]
+    priority: float | None
+    period: Any
+
+
+def transition(
+    mode: Any,
+    source: str,
+    target: str,
+    guard: Any,
+    *actions: Any,
+    priority: float | None = None,
+    period: Any = None,
+) -> Transition:
+    """State that a mode changes from `source` to `target` where it is in `source` and a guard is true.
+
+    mode: a declared Mode; guard: a condition, as of `when`. It acts when it becomes true, and at once where it is true
+    already as the mode is entered, or at the start. actions: as of `when`. Of several transitions out of one mode whose
+    guards are true at once that with the lowest `priority` acts; without different priorities that is an error of the
+    simulation. period: s, a number or an expression of parameters: the guard is looked at only at t0 + k * period, with the
+    values just before.
+    """
+    return Transition(mode, source, target, guard, actions, priority, period)

@@ -4,13 +4,17 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gantrytau.errors import ModelError
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BAND = 0.45  # height of the bands of a mode, inches
 _FEW = 12  # lines that one figure still shows distinctly
 
 
@@ -21,14 +25,19 @@ def draw(result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | 
     if file is not None:
         check_suffix(file)
     lines = _lines(result, names)
+    modes = [name for name in lines if name in result.modes]
     axes_of_unit: dict[str, list[str]] = {}
     for name in lines:
-        axes_of_unit.setdefault(result.unit(name), []).append(name)
-    height = 1.2 + 2.2 * len(axes_of_unit)
+        if name not in modes:
+            axes_of_unit.setdefault(result.unit(name), []).append(name)
+    heights = [BAND] * len(modes) + [2.2] * len(axes_of_unit)
     figure, axes = plt.subplots(
-        len(axes_of_unit), sharex=True, squeeze=False, figsize=(7.0, height), layout="constrained"
-    )
-    for axis, (unit, members) in zip(axes[:, 0], axes_of_unit.items(), strict=True):
+        len(heights), sharex=True, squeeze=False, figsize=(7.0, 1.2 + sum(heights)), layout="constrained",
+        gridspec_kw=dict(height_ratios=heights),
+    )  # fmt: skip
+    for axis, name in zip(axes[:, 0], modes, strict=False):
+        _bands(axis, result, name)
+    for axis, (unit, members) in zip(axes[len(modes) :, 0], axes_of_unit.items(), strict=True):
         for name in members:
             style = "steps-post" if name in result.held else "default"
             axis.plot(result.time, result[name], label=name, drawstyle=style)
@@ -40,6 +49,26 @@ def draw(result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | 
     if result.title:
         figure.suptitle(result.title)
     return finished(figure, file)
+
+
+def _bands(axis: "Axes", result: Series, name: str) -> None:
+    """A mode over time as bands, each colour with the name of its mode."""
+    import matplotlib.pyplot as plt
+
+    t, numbers, words = result.time, result[name].astype(int), result.modes[name]
+    starts = np.flatnonzero(np.append(True, np.diff(numbers) != 0))
+    ends = np.append(t[starts[1:]], t[-1])
+    colours = plt.get_cmap("tab10")
+    told = set[int]()
+    for start, end in zip(starts, ends, strict=True):
+        k = int(numbers[start])
+        axis.axvspan(
+            t[start], end, color=colours(k % 10), alpha=0.5, lw=0, label=None if k in told else words[k]
+        )
+        told.add(k)
+    axis.set_yticks([])
+    axis.set_ylabel(name, rotation=0, ha="right", va="center")
+    axis.legend(fontsize="small", ncols=len(told), loc="center")
 
 
 def finished(figure: "Figure", file: str | os.PathLike[str] | None) -> "Figure":

@@ -26,6 +26,7 @@ class Series:
     aliases: further name -> the name in `values` that it equals; a minus sign before it says the negative.
     held: names of scalars that hold their values from one time to the next, as what is sampled does.
     ended: why it ends where it does, "stop" where that was asked for.
+    modes: names of the values 0, 1, ... of a scalar, by its name.
 
     Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
     matrix `R`, (times, 3, 3). `time` is a name, too.
@@ -42,6 +43,7 @@ class Series:
         aliases: Mapping[str, str] | None = None,
         held: Iterable[str] = (),
         ended: str = "stop",
+        modes: Mapping[str, Sequence[str]] | None = None,
     ):
         self._time = np.array(time, dtype=float)
         if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
@@ -57,6 +59,7 @@ class Series:
         self._aliases = dict(aliases or {})
         self._held = frozenset(held)
         self._ended = ended
+        self._modes = {name: tuple(words) for name, words in (modes or {}).items()}
         self._names = (*(name for name in values if name != "time"), *self._aliases)
         self._scalars = frozenset(self._names)
         self._arrays = _arrays(self._names)
@@ -89,6 +92,22 @@ class Series:
     def held(self) -> frozenset[str]:
         """Names of scalars that hold their values from one time to the next, and are drawn as steps."""
         return self._held
+
+    @property
+    def modes(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the values 0, 1, ... of scalars that are modes, by the names of these."""
+        return self._modes
+
+    def mode(self, name: str) -> np.ndarray:
+        """The names of a mode at all times, (times,); ModelError for a variable that is none."""
+        if name not in self._modes:
+            self[name]  # an unknown name raises
+            there = ", ".join(self._modes) or "of which there is none"
+            raise ModelError(
+                f"{self._title or 'Result'}: found {name}, which is no mode, expected a mode, {there}; its values are "
+                f"result['{name}']"
+            )
+        return np.array(self._modes[name])[self[name].astype(int)]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,7 +197,8 @@ class Series:
             )  # an unknown name raises
         units = {name: self.unit(name) for name in values}
         words = {name: self.description(name) for name in values}
-        own = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
+        own: dict[str, Any] = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
+        own["modes"] = {name: words for name, words in self._modes.items() if name in values}
         return type(self)(self._time, values, units=units, descriptions=words, **own)
 
     def __repr__(self) -> str:

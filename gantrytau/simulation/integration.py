@@ -74,7 +74,7 @@ class Run:
 
     def go(self) -> None:
         trail = self.trail
-        self.changes.begin()
+        self.done = self.changes.begin()
         with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
             while self.done < trail.last and not self.changes.ended:

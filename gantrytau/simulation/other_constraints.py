@@ -7,6 +7,7 @@ that were kept are still sound, others are chosen there, and it starts anew.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -70,5 +71,5 @@ def joined(parts: Sequence[Result], grid: np.ndarray) -> Result:
     times = np.concatenate([part.time[kept] for part, kept in zip(parts, rows, strict=True)])
     first = parts[0].select(names)
     words = {name: first.description(name) for name in names}
-    own = dict(title=first.title, held=first.held, ended=parts[-1].ended)
+    own: dict[str, Any] = dict(title=first.title, held=first.held, ended=parts[-1].ended, modes=first.modes)
     return Result(times, values, units=first.units, descriptions=words, **own)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
+from gantrytau.flattening.flat_model import When
 from gantrytau.language.symbols import Range
 
 REASONS = {
@@ -159,6 +160,15 @@ def inconsistent(dae: Translated, t: float, labels: Sequence[str], error: SolveE
         "; .result holds the motion up to there: set other states, or values that the mechanism can reach",
         time=t,
         equations=labels,
+    )
+
+
+def undecided(dae: Translated, t: float, one: When) -> SolveError:
+    """What happens at time t is an error in the words of a when."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {one.failure}; .result holds the motion up to there",
+        time=t,
+        equations=[one.label],
     )
 
 

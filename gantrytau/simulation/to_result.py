@@ -1,6 +1,7 @@
 """From states over time to a Result with every variable of the model."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -41,7 +42,9 @@ def result_of(
     units, words = labels(dae)
     events = {*coordinates.held, *coordinates.discretes}
     steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
-    return Result(times, table, units=units, descriptions=words, title=dae.name, held=steps, ended=ended)
+    modes = {n: own for n, own in dae.flat.modes.items() if n in table}
+    own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes)
+    return Result(times, table, units=units, descriptions=words, **own)
 
 
 def _variables(coordinates: Coordinates, outputs: Sequence[str] | None) -> tuple[list[str], ca.Function]:

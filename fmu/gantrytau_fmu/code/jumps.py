@@ -16,7 +16,8 @@ class JumpFormulas:
 
     conditions: 1 where they hold, in modes; rose: symbols, 1 where a condition has become true; acts: which whens act;
     discretes, values: new values of the Discretes and of the states whose places are `states`; labels: where the whens
-    are stated, messages: what they say of the end of the run, "" of those that do not end it.
+    are stated, messages: what they say of the end of the run, "" of those that do not end it; initially: whether they act at
+    the start, too, failures: words of the errors that they are instead of acting, "" of those that act.
     """
 
     conditions: ca.SX
@@ -27,6 +28,8 @@ class JumpFormulas:
     values: ca.SX
     labels: tuple[str, ...]
     messages: tuple[str, ...]
+    initially: tuple[bool, ...]
+    failures: tuple[str, ...]
 
     @property
     def everything(self) -> tuple[ca.SX, ...]:
@@ -53,4 +56,6 @@ def jump_of(found: WithModes, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]
         values=column(to_system(values)),
         labels=tuple(one.label for one in whens),
         messages=tuple(one.message for one in whens),
+        initially=tuple(one.initially for one in whens),
+        failures=tuple(one.failure for one in whens),
     )

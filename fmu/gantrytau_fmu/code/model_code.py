@@ -168,6 +168,8 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _integers("gt_reinit_states", formulas.jump.states),
         _texts("gt_when_names", formulas.jump.labels),
         _texts("gt_when_ends", formulas.jump.messages),
+        _texts("gt_when_fails", formulas.jump.failures),
+        _integers("gt_when_initially", formulas.jump.initially),
         _texts("gt_x_names", formulas.states),
         _texts("gt_z_names", formulas.z_names),
         _texts("gt_root_names", formulas.roots),

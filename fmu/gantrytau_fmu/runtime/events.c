@@ -243,15 +243,17 @@ static gt_status gt_find_conditions(gt_instance *it, int *holds) {
     return GT_OK;
 }
 
-/* What is true at the start has not become true. */
+/* What is true at the start has not become true, but for whens that act initially. */
 static gt_status gt_begin_whens(gt_instance *it) {
-    int changed;
+    int changed, i;
     gt_status status = GT_OK;
     it->now.ended = it->now.events = 0;
     it->now.events_since = it->now.time;
     if (!GT_WHENS) return GT_OK;
     status = gt_agree(it, &changed);
-    return status == GT_OK ? gt_find_conditions(it, it->now.holds) : status;
+    if (status == GT_OK) status = gt_find_conditions(it, it->now.holds);
+    for (i = 0; i < GT_WHENS; i++) it->now.holds[i] &= !gt_when_initially[i];
+    return status;
 }
 
 static gt_status gt_jump_fails(gt_instance *it, const char *name) {
@@ -275,6 +277,9 @@ static gt_status gt_act(gt_instance *it, gt_event_info *info, int *acted) {
     memcpy(it->now.holds, holds, sizeof holds);
     if (!*acted) return GT_OK;
     gt_jump(it->a, found, it->w);
+    for (i = 0; i < GT_WHENS; i++)
+        if (found[i] != 0 && *gt_when_fails[i])
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at time = %.9g s %s", GT_NAME, it->now.time, gt_when_fails[i]);
     for (i = 0; i < GT_DISCRETES; i++)
         if (!isfinite(found[GT_WHENS + i])) return gt_jump_fails(it, gt_held_names[GT_HELD_COUNT + i]);
     for (i = 0; i < GT_REINITS; i++)

@@ -69,14 +69,14 @@ class Changes:
         found = [pieces.asked(turns[int(i)].mode.name(), self.coordinates.dae) for i in switches]
         return list(dict.fromkeys(found))
 
-    def begin(self) -> None:
-        """The first place: what is true there has not become so."""
+    def begin(self) -> int:
+        """The first place: what is true there has not become so, but for whens that act initially. The last place there."""
         trail = self.trail
         trail.x[0], trail.z[0], modes = self.coordinates.start(trail.t[0], trail.inputs(0))
         trail.held[0, trail.held.shape[1] - modes.size :] = modes
-        self._holding[:] = True
+        self._holding[:] = [not one.initially for one in self.coordinates.rounds.whens]
         self.renew(0)
-        self.turn(0)
+        return self.turn(0)
 
     def renew(self, k: int) -> None:
         """Give new values to what is sampled at a place, all from the values just before."""
@@ -145,6 +145,11 @@ class Changes:
             if not rose.any() or self.ended:
                 return k
             made = rounds.made(self.point(k), rose)
+            failing = next(
+                (one for one, acts in zip(rounds.whens, made.acts, strict=True) if acts and one.failure), None
+            )
+            if failing is not None:
+                raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), failing)
             self._refuse_bad(made, k)
             if k == left:
                 trail.repeat(k, written=True)

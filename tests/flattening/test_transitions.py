@@ -1,0 +1,146 @@
+"""What is no mode, and what is no transition of it."""
+
+import pytest
+
+from gantrytau import Mode, Model, ModelError, Parameter, Real, der, flatten, fmax, time, transition
+
+
+class Base(Model):
+    """A model with a mode, of which subclasses state transitions."""
+
+    x = Real(unit="1", start=0.0, fixed=True)
+    k = Parameter(1.0, unit="1/s")
+    mode = Mode("free", "contact", "released")
+
+    def changes(self):
+        yield transition(self.mode, "free", "contact", self.x > 1)
+        yield transition(self.mode, "contact", "released", self.x > 2)
+
+    def equations(self):
+        yield der(self.x) == self.k
+        yield from self.changes()
+
+
+def with_changes(changes):
+    return type("Base", (Base,), {"changes": changes})()
+
+
+def test_transitions_are_one_chain_of_whens():
+    flat = flatten(Base())
+    assert flat.modes == {"mode": ("free", "contact", "released")}
+    assert flat.discretes == ("mode",)
+    assert [one.after for one in flat.whens] == [-1, 0]
+    assert all(one.initially and not one.failure for one in flat.whens)
+    assert flat.whens[0].label == "the model (Base), equation 2, transition of mode from free to contact"
+
+
+def test_pairs_without_order_come_first_in_the_chain():
+    def changes(self):
+        yield transition(self.mode, "free", "contact", self.x > 1, priority=2)
+        yield transition(self.mode, "free", "released", self.x > 2)
+        yield transition(self.mode, "contact", "released", self.x > 2)
+
+    flat = flatten(with_changes(changes))
+    assert [bool(one.failure) for one in flat.whens] == [True, False, False, False]
+
+
+def test_guards_with_a_period_count():
+    def changes(self):
+        yield transition(self.mode, "free", "contact", self.x > 1, period=0.1)
+        yield transition(self.mode, "contact", "released", self.x > 2, period=0.2)
+
+    flat = flatten(with_changes(changes))
+    assert [one.name for one in flat.sampled] == ["mode.due[0]", "mode.due[1]"]
+    assert set(flat.discretes) == {"mode", "mode.seen[0]", "mode.seen[1]"}
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ((), "Mode: found the names (), expected at least two"),
+        (("one",), "expected at least two different words"),
+        (("one", "one"), "expected at least two different words"),
+        (("one", "two words"), "words of letters, digits and _"),
+        (("one", 2), "words of letters"),
+    ],
+)
+def test_what_is_no_mode(names, words):
+    with pytest.raises(ModelError) as caught:
+        Mode(*names)
+    assert words in str(caught.value)
+    with pytest.raises(ModelError, match=r"Mode: there is no mode 'opne'; did you mean 'open'\?"):
+        Mode("shut", "open", start="opne")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            lambda self: [transition(self.mode, "free", "contakt", self.x > 1)],
+            "the model (Base), equation 2: found a transition of mode to 'contakt', expected one of its modes; did you mean "
+            "'contact'?",
+        ),
+        (
+            lambda self: [transition(self.mode, "fre", "contact", self.x > 1)],
+            "from 'fre', expected one of its modes",
+        ),
+        (
+            lambda self: [transition(self.mode, "free", "free", self.x > 1)],
+            "from free to itself, expected two modes",
+        ),
+        (
+            lambda self: [transition(self.x, "free", "contact", self.x > 1)],
+            "expected a declared Mode of this model",
+        ),
+        (lambda self: [transition(self.mode, "free", "contact", True)], "found True as the condition"),
+        (lambda self: [transition(self.mode, "free", "contact", self.x)], "a number, expected a comparison"),
+        (
+            lambda self: [transition(self.mode, "free", "contact", self.x > 1, priority="high")],
+            "found priority='high', expected a number; the lowest acts first",
+        ),
+        (
+            lambda self: [transition(self.mode, "free", "contact", self.x > 1, period=-1.0)],
+            "expected a way to every mode",
+        ),
+        (
+            lambda self: [
+                *Base.changes(self),
+                transition(self.mode, "released", "free", self.x > 1, period=-1.0),
+            ],
+            "found period=-1, expected a finite number above zero, in s",
+        ),
+        (
+            lambda self: [transition(self.mode, "free", "contact", self.x > 1)],
+            "mode: found no transition that leads from free, where it starts, to released, expected a way to every mode",
+        ),
+        (lambda self: [], "mode: found a Mode without transitions, expected some"),
+        (
+            lambda self: [*Base.changes(self), self.mode.is_in("fixed") == 1],
+            "mode.is_in: there is no mode 'fixed'; there is free, contact, released.",
+        ),
+        (
+            lambda self: [self.x == self.mode.choose(free=1.0)],
+            "mode.choose: found no value for contact, released",
+        ),
+        (
+            lambda self: [self.x == self.mode.choose(free=1.0, held=2.0)],
+            "mode.choose: there is no mode 'held'",
+        ),
+        (
+            lambda self: [self.x == self.mode.is_in()],
+            "mode.is_in: found no name, expected some of free, contact, released",
+        ),
+        (lambda self: [self.mode == "free"], "mode: found == on a mode, expected mode.is_in('released')"),
+        (
+            lambda self: [
+                *Base.changes(self),
+                transition(self.mode, "released", "free", fmax(self.x, time) + 1),
+            ],
+            "expected a comparison",
+        ),
+    ],
+)
+def test_what_is_no_transition(changes, words):
+    with pytest.raises(ModelError) as caught:
+        flatten(with_changes(changes))
+    assert words in str(caught.value)
