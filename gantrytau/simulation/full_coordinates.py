@@ -14,6 +14,7 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
+from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
@@ -204,12 +205,17 @@ class Coordinates:
         values = {**dae.start, time.name(): t}
         if self.known:
             values.update(zip(self.known, np.array(at(t, t, w)).ravel().tolist(), strict=True))
-        guess = StartValues(values, dae.asked.started | frozenset(self.known), dae.asked.fixed)
-        found = consistent_start(dae.flat, dae.reduced, dae.indexed, guess)
+        there = t, *(values[n] for n in self.known)
+        found = self.kept(("start", there), lambda: self._consistent(values))
         x = np.array([found[n] for n in self.states])
         modes = self.pieces.numbers({**found, time.name(): t})
         own = np.array([modes[turn.mode.name()] for turn in self.switches.turns])
         return x, np.array([found[n] for n in self.algebraics]), own
+
+    def _consistent(self, values: dict[str, float]) -> dict[str, float]:
+        dae = self.dae
+        guess = StartValues(values, dae.asked.started | frozenset(self.known), dae.asked.fixed)
+        return consistent_start(dae.flat, dae.reduced, dae.indexed, guess)
 
     def not_finite(self, point: Point, step: float) -> list[str]:
         """Names of what has no finite value at a point, or where its rates lead within a time, s."""
@@ -244,7 +250,7 @@ class Coordinates:
             x = self.x[columns]
             jacobian = ca.densify(ca.jacobian(residual, x))
             arguments = [self.x, time, self.t0, self.w]
-            function = ca.Function("level", arguments, [residual, jacobian], {"cse": True})
+            function = ca.Function("level", arguments, [ca.densify(residual), jacobian], {"cse": True})
             found.append((columns, function, self.rows[stage]))
         return found
 
@@ -258,15 +264,15 @@ class Coordinates:
         for columns, level, _ in self._levels:
             worst = np.zeros(len(x))
             for _ in range(STEPS):
-                residual, jacobian = (np.array(m) for m in level(x.T, t[None], t[None], w.T))
-                jacobian = jacobian.reshape(len(residual), len(x), len(columns)).transpose(1, 0, 2)
+                residual, jacobian = at_places(level, x, t[:, None], t[:, None], w)
+                jacobian = jacobian.reshape(len(x), len(columns), -1).transpose(0, 2, 1)
                 size = size or min(1.0, float(np.abs(x[:, columns]).max(initial=0.0))) or 1.0
                 terms = np.maximum(np.abs(x[:, columns]), size * least[columns])
                 scale = np.einsum("kij,kj->ki", np.abs(jacobian), terms)
-                worst = np.max(np.abs(residual.T) / scale, axis=1)
+                worst = np.max(np.abs(residual) / scale, axis=1)
                 if not np.any(worst > LARGEST_DRIFT):
                     break
-                x[:, columns] -= _shortest(jacobian, residual.T)
+                x[:, columns] -= _shortest(jacobian, residual)
             lost = np.flatnonzero(~(worst <= 1e-8))
             if lost.size:
                 when = float(t[lost[0]])
@@ -307,10 +313,10 @@ class Coordinates:
         """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
         before: Any = np.inf
         for _ in range(STEPS if self.algebraics else 0):
-            residual, jacobian = (np.array(m) for m in self._algebra(x.T, z.T, t[None], t[None], w.T))
-            jacobian = jacobian.reshape(len(residual), len(x), z.shape[1]).transpose(1, 0, 2)
+            residual, jacobian = at_places(self._algebra, x, z, t[:, None], t[:, None], w)
+            jacobian = jacobian.reshape(len(x), z.shape[1], -1).transpose(0, 2, 1)
             try:
-                step = np.linalg.solve(jacobian, residual.T[:, :, None])[:, :, 0]
+                step = np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError:
                 return z
             if not np.all(np.isfinite(step)):

@@ -26,6 +26,8 @@ GROWTH = 10  # of a stretch in which nothing has switched
 STEPS_BETWEEN = (
     8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
 )
+OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
+LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 REFINED = 50  # intervals ahead that are divided as well
 
@@ -41,7 +43,7 @@ class Run:
         tolerance: float,
         longest: float | None = None,
     ):
-        """longest: step of the integrator, s."""
+        """tolerance: of one step; longest: step of the integrator, s."""
         self.coordinates = coordinates
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
@@ -50,7 +52,8 @@ class Run:
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
         interval = float(np.diff(self.trail.t).max())
-        self.integrators = Integrators(coordinates, tolerance, longest, interval)
+        exact = max(OFTEN * tolerance, min(LEAST, tolerance)) if coordinates.dae.flat.sampled else tolerance
+        self.integrators = Integrators(coordinates, exact, longest, interval)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -111,7 +114,7 @@ class Run:
         """Go on from sample to sample in explicit steps; whether that led on."""
         here = self.done
         found = self.sampler.over(self.trail, here, self._shorter()) if self.sampler else 0
-        if not found:
+        if self.sampler is None or not found:
             return False
         self.done = here + found
         self._watch(here, self.done)
@@ -119,7 +122,8 @@ class Run:
         if self.trail.twice(self.done):
             self.done = self.changes.behind_inputs(self.done)
             self.changes.renew(self.done)
-        self.done = self.changes.turn(self.done)
+        if self.sampler.leaves_switches:
+            self.done = self.changes.turn(self.done)
         return True
 
     def _shorter(self) -> float | None:
@@ -258,8 +262,11 @@ class Run:
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
         places = places[np.append(np.diff(trail.t[places]) > 0, True)]
-        look = self._look(*self.changes.columns(places))
-        for k in places[:-1][doubtful(trail.t[places], look)]:
+        times = np.arange(trail.t[places[0]], trail.t[last], self.span / LEAST_STEPS)
+        some = places[np.unique(np.append(np.searchsorted(trail.t[places[:-1]], times), places.size - 1))]
+        if 2 * some.size < places.size and not self._doubts(some).any():
+            return
+        for k in places[:-1][self._doubts(places)]:
             if k <= self.seen:
                 continue
             self.done = self.seen = int(k)
@@ -268,8 +275,12 @@ class Run:
                 raise self._singular_pose(found)
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
 
+    def _doubts(self, places: np.ndarray) -> np.ndarray:
+        """Whether a singular pose may lie between successive places."""
+        return doubtful(self.trail.t[places], self._look(*self.changes.columns(places)))
+
     def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
-        return self.coordinates.conditioning.look(x.T, z.T, t[None], t[None], w.T)
+        return self.coordinates.conditioning.look(x, z, t[:, None], t[:, None], w)
 
     def _weakest(self, point: Point) -> list[str]:
         return self.coordinates.weakest(point, self.changes.point(0))

@@ -30,8 +30,6 @@ from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
-OFTEN = 1e-2  # of that, where the integrator starts anew at hundreds of instants, in steps of first order
-LEAST = 1e-13  # of a step: rounding
 ROUNDS = 3  # of a run whose states prove to be smaller than was thought
 
 
@@ -143,12 +141,10 @@ def _sized_run(
     max_step: float | None,
 ) -> tuple[Run, SolveError | KeyboardInterrupt | None]:
     """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
-    margin = MARGIN * (OFTEN if coordinates.dae.flat.sampled else 1.0)
-    exact = max(margin * tolerance, min(LEAST, MARGIN * tolerance))
     coordinates = coordinates.sized(first_sizes(coordinates))
     left = ROUNDS
     while True:
-        run = Run(coordinates, signals, grid, exact, max_step)
+        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step)
         try:
             run.go()
         except (SolveError, KeyboardInterrupt) as error:

@@ -21,6 +21,7 @@ import numpy as np
 
 from gantrytau.compiler.start.balance import balance
 from gantrytau.errors import SolveError
+from gantrytau.simulation.events.at_places import at_places
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
 SOUND = 0.01  # smallest singular value of a scaled matrix that is taken as a measure at least
@@ -80,7 +81,7 @@ class Conditioning:
         self._divisors = len(heads)
         parts = [ca.densify(constraints), *changing]
         everything = ca.vertcat(*heads, *(ca.vec(m) for m in parts))
-        self._function = ca.Function("conditioning", list(arguments), [everything], {"cse": True})
+        self._function = ca.Function("conditioning", list(arguments), [ca.densify(everything)], {"cse": True})
         self._scales: list[tuple[np.ndarray, np.ndarray, float]] = []
 
     def anew(self) -> "Conditioning":
@@ -95,8 +96,8 @@ class Conditioning:
         return self._function.numel_out(0) > 0
 
     def look(self, *points: np.ndarray) -> Look:
-        """What is to be seen at points, given by the arguments with one column per point."""
-        values = np.array(self._function(*points)).reshape(-1, points[0].shape[1] or 1).T
+        """What is to be seen at points, given by the arguments with one row per point."""
+        (values,) = at_places(self._function, *points)
         matrices, place = [], self._divisors
         for rows, columns in self._shapes:
             part = values[:, place : place + rows * columns]

@@ -10,6 +10,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.language.units import dimension, unit_text
 from gantrytau.results.result import Result
+from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
 
 HUGE = 1e100  # no quantity is that large
@@ -29,32 +30,34 @@ def result_of(
     ended: why there are no more of them.
     """
     dae = coordinates.dae
-    names, function = coordinates.kept(
+    names, steps, function = coordinates.kept(
         ("variables", None if outputs is None else tuple(outputs)), lambda: _variables(coordinates, outputs)
     )
-    rows = np.array(function(times[None, :], x.T, z.T, w.T))
-    rows = (
-        rows.reshape(len(names), -1) if rows.shape[1] == times.size else np.repeat(rows, times.size, axis=1)
-    )
-    table = dict(zip(names, rows, strict=True))
+    (rows,) = at_places(function, times[:, None], x, z, w)
+    table = dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
     for parameter in dae.flat.parameters if outputs is None else ():
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
     units, words = labels(dae)
-    events = {*coordinates.held, *coordinates.discretes}
-    steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
     modes = {n: own for n, own in dae.flat.modes.items() if n in table}
     own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes)
     return Result(times, table, units=units, descriptions=words, **own)
 
 
-def _variables(coordinates: Coordinates, outputs: Sequence[str] | None) -> tuple[list[str], ca.Function]:
-    """Names of all variables and derivatives (or only `outputs`), and (t, x, z, w) -> their values."""
+def _variables(
+    coordinates: Coordinates, outputs: Sequence[str] | None
+) -> tuple[list[str], list[str], ca.Function]:
+    """Names of all variables and derivatives (or only `outputs`), of those that hold their values from one time to the next,
+    and (t, x, z, w) -> the values of all.
+    """
     dae = coordinates.dae
     names = _names(dae, outputs)
     expressions = ca.vertcat(*(dae.expression(n) for n in names)) if names else ca.SX(0, 1)
     (found,) = coordinates.inserted([expressions])
     found = ca.densify(ca.substitute(found, coordinates.t0, time))
-    return names, ca.Function("variables", [time, coordinates.x, coordinates.z, coordinates.w], [found])
+    events = {*coordinates.held, *coordinates.discretes}
+    steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
+    arguments = [time, coordinates.x, coordinates.z, coordinates.w]
+    return names, steps, ca.Function("variables", arguments, [found])
 
 
 def doubts(result: Result) -> str:

@@ -12,11 +12,13 @@ from tests.benchmarks import (
     mechanisms,
     motion,
     procedure,
+    sampling,
     studies,
 )
 from tests.benchmarks.table import print_table
 
 if __name__ == "__main__":
     mechanics = (engine.rows(), mechanisms.rows(), motion.rows(), kinematics.rows(), calibration.rows())
-    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), fmus.rows(), studies.rows())
+    timed = (fmus.rows(), sampling.rows(), studies.rows())
+    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed)
     sys.exit(print_table("Benchmarks", parts))

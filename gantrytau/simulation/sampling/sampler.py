@@ -72,6 +72,16 @@ class Sampler:
         self.wait, self.waited = min(max(1, 2 * self.wait), LONGEST_WAIT), 0
         return 0
 
+    @property
+    def leaves_switches(self) -> bool:
+        """Whether anything switches that does not follow what is held: that is not seen to here."""
+        return bool(self._live.any())
+
+    @property
+    def _live(self) -> np.ndarray:
+        turns = len(self.coordinates.switches)
+        return np.array([k not in self.passages.one.by_held for k in range(turns)], dtype=bool)
+
     def _held_to_constraints(self, trail: Trail, first: int, last: int) -> bool:
         """Project the places that results show, and the last; False where that fails: the integrator may come nearer."""
         places = trail.shown(first, last)
@@ -90,8 +100,12 @@ class Sampler:
 
     def _call(self, trail: Trail, here: int, last: int, step: float) -> tuple[int, bool]:
         """Places reached by one call, and whether it ended early because something switches."""
-        t = trail.t[here : min(last, here + self.most) + 1]
-        parts = np.maximum(np.ceil(np.diff(t) / step * (1 - 1e-12)), 1).astype(int)
+        t = trail.t[here : min(last, here + 2 * self.most) + 1]
+        parts = np.ceil(np.diff(t) / step * (1 - 1e-12)).astype(int)
+        parts = np.maximum(
+            parts, np.diff(t) > 0
+        )  # where inputs jump, the step before goes on behind the jump
+        parts[0] = max(parts[0], 1)
         ends = np.cumsum(parts)
         wanted = max(min(int(ends[-1]), self.most), int(parts[0]))
         sizes = [k for k in CALLS if parts[0] <= k <= wanted] or [k for k in CALLS if k >= wanted][:1]
@@ -110,20 +124,23 @@ class Sampler:
         accepted = int(np.searchsorted(ends, good, side="right"))
         turn = self._first_turn(found, told, int(ends[accepted - 1]) if accepted else 0)
         reached = accepted if turn is None else int(np.searchsorted(ends, turn, side="right"))
-        n, there = self.sizes.size, found.after[ends[:reached] - 1]
-        trail.x[places[1 : reached + 1]], trail.held[places[1 : reached + 1]] = there[:, :n], there[:, n:]
+        n, rows, filled = self.sizes.size, ends[:reached] - 1, places[1 : reached + 1]
+        trail.x[filled], trail.held[filled] = found.after[rows, :n], found.after[rows, n:]
+        before = np.append(parts[1:] == 0, False)[:reached]
+        trail.held[filled[before]] = found.before[rows[before], n:]
         self.most = min(size * 8, CALLS[-1]) if reached == count else max(CALLS[0], size // 8)
         return reached, turn is not None
 
     def _told(self, trail: Trail, places: np.ndarray, parts: np.ndarray) -> np.ndarray:
-        """What the passages between places are told, a row each; parts: steps from place to place."""
+        """What the passages between places are told, a row each; parts: steps between these, none where inputs jump."""
         t, half = trail.t[places], 2 * len(self.coordinates.sampled)
         interval = np.repeat(np.arange(parts.size), parts)
         inner = np.arange(interval.size) - np.repeat(np.cumsum(parts) - parts, parts)
-        h, begin = (np.diff(t) / parts)[interval], t[interval]
-        due = trail.due[places[1:]][interval] & (inner == parts[interval] - 1)[:, None]
+        h, begin = (np.diff(t) / np.maximum(parts, 1))[interval], t[interval]
+        behind = interval + 1 + np.append(parts[1:] == 0, False)[interval]
+        due = trail.due[places[behind]] & (inner == parts[interval] - 1)[:, None]
         w = trail.rows(places)[:, :half]
-        return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[interval + 1]])
+        return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[behind]])
 
     def _error(self, found: StepsTaken, h: np.ndarray) -> np.ndarray:
         """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""
@@ -150,7 +167,7 @@ class Sampler:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
         c = self.coordinates
         switches, n, m, half = c.switches, len(c.states), len(c.held), len(c.sampled)
-        live = np.array([k not in self.passages.one.by_held for k in range(len(switches))], dtype=bool)
+        live = self._live
         if not live.any() or not count:
             return None
         t, h, begin = (told[:count, k] for k in range(3))
