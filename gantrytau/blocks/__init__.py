@@ -4,9 +4,9 @@ from gantrytau import StateSpace
 from gantrytau.blocks.arithmetic import Gain, Product, Sum
 from gantrytau.blocks.block import Block, Source
 from gantrytau.blocks.continuous import Derivative, FirstOrder, Integrator, TransferFunction
-from gantrytau.blocks.limiters import DeadZone, Limiter, RateLimiter, Unlimited
+from gantrytau.blocks.limiters import DeadZone, Hysteresis, Limiter, RateLimiter, Unlimited
 from gantrytau.blocks.pid import DiscretePid, Pid
-from gantrytau.blocks.sampled_blocks import DiscreteTransferFunction, SampleHold
+from gantrytau.blocks.sampled_blocks import DiscreteTransferFunction, PulseWidth, SampleHold
 from gantrytau.blocks.sources import Noise, Pulse, Ramp, Sine, Step
 from gantrytau.mechanics.filters import LowPass
 
@@ -18,6 +18,7 @@ __all__ = [
     "DiscreteTransferFunction",
     "FirstOrder",
     "Gain",
+    "Hysteresis",
     "Integrator",
     "Limiter",
     "LowPass",
@@ -25,6 +26,7 @@ __all__ = [
     "Pid",
     "Product",
     "Pulse",
+    "PulseWidth",
     "Ramp",
     "RateLimiter",
     "SampleHold",

@@ -1,6 +1,6 @@
 """Blocks that bound or bend a signal. Where they switch is an event of `simulate`."""
 
-from gantrytau import Output, Parameter, der, limit, require
+from gantrytau import Discrete, Output, Parameter, der, if_else, limit, require, when
 from gantrytau.blocks.block import Block
 
 RISING = "expected upper >= lower; exchange the two"
@@ -49,3 +49,27 @@ class RateLimiter(Block):
 
     def initial_equations(self):
         yield self.y == self.u
+
+
+class Hysteresis(Block):
+    """y is `high` above `upper` and `low` below `lower`; in between it stays what it was, at the start `low`."""
+
+    lower = Parameter(-1.0, description="input below which y is low")
+    upper = Parameter(1.0, description="input above which y is high")
+    low = Parameter(0.0, description="output below")
+    high = Parameter(1.0, description="output above")
+    above = Discrete(0.0, unit="1", description="1 if u was last above, 0 if below")
+
+    def equations(self):
+        yield require(self.upper >= self.lower, RISING)
+        # the last two matter where u is outside from the start on
+        yield (
+            when(self.u >= self.upper, self.above == 1)
+            .elsewhen(self.u <= self.lower, self.above == 0)
+            .elsewhen(self.u <= self.upper, self.above == 1)
+            .elsewhen(self.u >= self.lower, self.above == 0)
+        )
+        between = if_else(self.above > 0, self.high, self.low)
+        yield self.y == if_else(
+            self.u > self.upper, self.high, if_else(self.u < self.lower, self.low, between)
+        )

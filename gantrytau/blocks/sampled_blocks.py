@@ -5,7 +5,7 @@ What is sampled at one instant sees the values before it: a block behind another
 
 from casadi import vertcat
 
-from gantrytau import Parameter, Real, sampled
+from gantrytau import Parameter, Real, if_else, limit, sampled, time
 from gantrytau.blocks.block import Block
 from gantrytau.blocks.rational import Rational
 
@@ -37,3 +37,15 @@ class DiscreteTransferFunction(Rational):
         memory = (bk * self.u - ak * y + x for bk, ak, x in zip(b[1:], a[1:], behind, strict=True))
         yield sampled(self.x, vertcat(*memory), period=self.period)
         yield sampled(self.y, y, period=self.period)
+
+
+class PulseWidth(Block):
+    """y = amplitude in the first part u of each period, else zero: u, within 0 and 1, is taken as the period begins."""
+
+    amplitude = Parameter(1.0, description="height of the pulses")
+    period = Parameter(1e-3, unit="s", min=0.0, description="from pulse to pulse, above zero")
+    end = Real(unit="s", description="end of the pulse", start=0.0)
+
+    def equations(self):
+        yield sampled(self.end, time + limit(self.u, 0, 1) * self.period, period=self.period)
+        yield self.y == if_else(time < self.end, self.amplitude, 0)

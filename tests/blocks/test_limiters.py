@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, connect, simulate, sin, translate
-from gantrytau.blocks import DeadZone, Integrator, Limiter, RateLimiter, Step
+from gantrytau import Fixed, Input, Model, ModelError, connect, simulate, sin, translate
+from gantrytau.blocks import DeadZone, Hysteresis, Integrator, Limiter, RateLimiter, Step
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -97,3 +97,48 @@ def test_wrong_rates():
     ):
         with pytest.raises(ModelError, match=words):
             translate(RateLimiter(**settings))
+
+
+class Relay(Model):
+    """A relay in a loop with an integrator: a triangle between the limits."""
+
+    relay = Hysteresis(lower=-1.0, upper=1.0, low=1.0, high=-1.0)
+    memory = Integrator(y=Fixed(0.0))
+
+    def equations(self):
+        yield connect(self.relay.y, self.memory.u)
+        yield connect(self.memory.y, self.relay.u)
+
+
+@pytest.mark.parametrize("points", [2, 1001])
+def test_a_relay_in_a_loop_makes_a_triangle(points):
+    found = simulate(Relay(), stop=20.3, points=points, tolerance=TOLERANCE)
+    expected = 1 - np.abs((found.time + 1) % 4 - 2)
+    np.testing.assert_allclose(found["memory.y"], expected, atol=NEAR)
+
+
+def test_a_relay_that_begins_outside_is_on_the_right_side_of_it():
+    """From 3 down at rate one to -1, up to 1, ...; from -2 up to 1 first."""
+    above = simulate(Relay(memory=dict(y=Fixed(3.0))), stop=10.0, points=1001, tolerance=TOLERANCE)
+    assert above["relay.y"][0] == -1.0
+    for t, y in ((3.0, 0.0), (4.0, -1.0), (5.0, 0.0), (7.0, 0.0), (9.0, 0.0)):
+        assert above.at(t, "memory.y") == pytest.approx(y, abs=NEAR)
+    below = simulate(Relay(memory=dict(y=Fixed(-2.0))), stop=10.0, points=1001, tolerance=TOLERANCE)
+    for t, y in ((2.0, 0.0), (4.0, 0.0), (6.0, 0.0)):
+        assert below.at(t, "memory.y") == pytest.approx(y, abs=NEAR)
+
+
+def test_a_relay_that_begins_between_its_limits_is_low():
+    found = simulate(
+        Hysteresis(low=-5.0, high=5.0), stop=1.0, inputs={"u": lambda t: 2 * sin(2 * np.pi * t)}, points=2001
+    )
+    t, y = found.time, found["y"]
+    first, second = 1 / 12, 7 / 12  # where 2 sin(2 pi t) is 1 and -1
+    clear = (np.abs(t - first) > 1e-9) & (np.abs(t - second) > 1e-9)
+    expected = np.where((t > first) & (t < second), 5.0, -5.0)
+    np.testing.assert_array_equal(y[clear], expected[clear])
+
+
+def test_limits_of_a_relay_may_not_be_crossed():
+    with pytest.raises(ModelError, match="expected upper >= lower; exchange the two"):
+        translate(Hysteresis(lower=1.0, upper=-1.0), events=True)

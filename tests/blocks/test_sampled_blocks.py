@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gantrytau import Input, Model, ModelError, connect, cos, linearize, simulate, sin, translate, white_noise
+from gantrytau import (
+    Fixed,
+    Input,
+    Model,
+    ModelError,
+    connect,
+    cos,
+    linearize,
+    simulate,
+    sin,
+    translate,
+    white_noise,
+)
 from gantrytau.blocks import (
     DiscretePid,
     DiscreteTransferFunction,
@@ -12,10 +24,12 @@ from gantrytau.blocks import (
     Limiter,
     Noise,
     Pid,
+    PulseWidth,
     SampleHold,
     Sine,
     Step,
 )
+from gantrytau.electrical import Ground, Inductor, Resistor, VoltageSource
 
 PERIOD = 0.02
 ROUNDING = 1e-12
@@ -199,6 +213,32 @@ def test_wrong_noise_and_controllers():
     ):
         with pytest.raises(ModelError, match=words):
             translate(model, events=True)
+
+
+@pytest.mark.parametrize("duty", [0.0, 0.3, 1.0, 1.7])
+def test_pulses_of_a_width_make_the_ripple_of_a_winding(duty):
+    """After the start has died away the current goes between the two values of the periodic solution."""
+
+    class Chopped(Model):
+        duty = Input()
+        pulses, source, ground = PulseWidth(amplitude=10.0, period=1e-3), VoltageSource(), Ground()
+        resistor, inductor = Resistor(R=2.0), Inductor(L=1e-3, i=Fixed(0.0))
+
+        def equations(self):
+            yield connect(self.duty, self.pulses.u)
+            yield connect(self.pulses.y, self.source.v)
+            yield connect(self.source.pin_a, self.resistor.pin_a)
+            yield connect(self.resistor.pin_b, self.inductor.pin_a)
+            yield connect(self.inductor.pin_b, self.source.pin_b)
+            yield connect(self.source.pin_b, self.ground.pin)
+
+    found = simulate(Chopped(), stop=0.02, inputs={"duty": duty}, points=201, tolerance=1e-10)
+    width = min(duty, 1.0)
+    lowest = 5.0 * (np.exp(2 * width) - 1) / (np.exp(2.0) - 1)  # R T / L = 2
+    assert found.final("inductor.i") == pytest.approx(lowest, abs=1e-7)
+    peak = found.at(0.0193, "inductor.i") if width == 0.3 else None
+    if peak is not None:
+        assert peak == pytest.approx(5.0 - (5.0 - lowest) * np.exp(-0.6), abs=1e-7)
 
 
 def test_a_step_at_an_instant_is_seen_at_the_next():

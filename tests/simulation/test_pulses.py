@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp, simulate, tanh, time
+from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp, if_else, simulate, tanh, time
+from gantrytau.simulation.events.pulses import pulses
 
 
 class Pushed(Model):
@@ -59,3 +60,10 @@ def test_the_longest_step_is_a_number_above_zero():
     for wrong in wrongs:
         with pytest.raises(ModelError, match=r"found max_step=.*, expected a number above zero, in s"):
             simulate(Pushed(), stop=5.0, inputs={"f": 1.0}, max_step=wrong)
+
+
+def test_what_jumps_is_no_pulse():
+    """A signal that is switched on asks for no short steps: the integrator starts anew there."""
+    assert not pulses(if_else(time > 2.5, 3.0, 0.0), 0.0, 5.0).spans.size
+    bent = pulses(if_else(time > 2.5, time - 2.5 + 3.0, 0.0), 0.0, 5.0)  # s; what comes behind is one
+    np.testing.assert_allclose(bent.spans, [[2.5, 5.0]], atol=0.011)

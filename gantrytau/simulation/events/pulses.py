@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import time
 
 DENSE = 20_000  # steps of the run in which functions of time are looked at
@@ -39,7 +40,7 @@ def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = N
     if longest is not None:
         fine = max(fine, min(int(np.ceil((end - begin) / longest / COARSE)), MOST // COARSE))
     t = np.linspace(begin, end, fine * COARSE + 1)
-    values = np.array(ca.Function("functions", [time], [ca.vertcat(*moving)]).map(t.size)(t[None]))
+    values = _without_jumps(ca.vertcat(*moving), t)
     whole = np.nanmax(values, axis=1) - np.nanmin(values, axis=1)
     parts = np.stack([values[:, k : k + fine * COARSE : fine] for k in range(fine)] + [values[:, fine::fine]])
     changes = np.nanmax(parts, axis=0) - np.nanmin(parts, axis=0)  # (functions, COARSE)
@@ -55,3 +56,14 @@ def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = N
     busy = np.mean(steps > AT_REST * whole[some][:, None, None], axis=2)  # share of an active part
     narrow = np.any((busy > 0) & (busy < 1 / 2))
     return Pulses(spans, (end - begin) / COARSE / (fine / 2 if narrow else 4))
+
+
+def _without_jumps(functions: ca.SX, t: np.ndarray) -> np.ndarray:
+    """Functions of time at times, (functions, times), less their jumps, at which the integrator starts anew."""
+    found = switched((functions,), {time.name()})
+    modes = ca.vertcat(ca.SX(0, 1), *(switch.mode for switch in found.switches))
+    (there,) = with_modes(found, (modes,))
+    held = np.array(ca.Function("modes", [time], [there]).map(t.size)(t[None]))
+    pieces = ca.Function("pieces", [time, modes], list(found.expressions)).map(t.size - 1)
+    before, behind = (np.array(pieces(at[None], held[:, :-1])) for at in (t[:-1], t[1:]))
+    return np.cumsum(np.hstack([before[:, :1], behind - before]), axis=1)

@@ -22,10 +22,11 @@ class TimeEvents:
         self._counts = np.array([switches.turns[i].counts for i in chosen], dtype=bool)
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
         self._function = ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)])
-        curved = ca.vertcat(
-            *(e for e, linear in zip(margins.elements(), self._linear, strict=True) if not linear)
-        )
-        self._asked = [k for k in range(w.numel()) if curved.numel() and ca.depends_on(curved, w[k])]
+        self._alone = [
+            ca.Function("margin", [time, w], [ca.densify(margin), ca.densify(rate)])
+            for margin, rate in zip(margins.elements(), rates.elements(), strict=True)
+        ]
+        self._of = [np.flatnonzero(ca.which_depends(m, w)) for m in margins.elements()]
         self._zeros: dict[tuple[int, bytes], np.ndarray] = {}
 
     def next(self, t: float, w: np.ndarray) -> float | None:
@@ -48,7 +49,7 @@ class TimeEvents:
 
     def _all_zeros(self, i: int, w: np.ndarray) -> np.ndarray:
         """All times of the run at which a margin passes zero while what it depends on stays as it is."""
-        key = i, w[self._asked].tobytes()
+        key = i, w[self._of[i]].tobytes()
         if key not in self._zeros:
             self._zeros[key] = self._search(i, w)
         return self._zeros[key]
@@ -56,8 +57,8 @@ class TimeEvents:
     def _search(self, i: int, w: np.ndarray) -> np.ndarray:
         def at(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             inputs = np.repeat(w[:, None], times.size, axis=1)
-            values, rates = (np.array(f) for f in self._function.map(times.size)(times[None], inputs))
-            return np.broadcast_to(values[i], times.shape), np.broadcast_to(rates[i], times.shape)
+            values, rates = (np.array(f)[0] for f in self._alone[i].map(times.size)(times[None], inputs))
+            return values, rates
 
         t = np.linspace(self.begin, self.end, DENSE + 1)
         values, rates = at(t)
