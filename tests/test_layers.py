@@ -32,6 +32,7 @@ ORDER = {  # a room imports the rooms before it
 }
 READMES = {  # the page with the map of a folder
     "gantrytau": ROOT / "gantrytau" / "README.md",
+    "gantrytau.ensembles": ROOT / "gantrytau" / "ensembles" / "README.md",
     "gantrytau.kinematics": ROOT / "gantrytau" / "kinematics" / "README.md",
     "gantrytau.mechanics": ROOT / "gantrytau" / "mechanics" / "README.md",
     "gantrytau.blocks": ROOT / "gantrytau" / "blocks" / "README.md",

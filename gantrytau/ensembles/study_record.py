@@ -1,7 +1,7 @@
 """What a study found: the result of every case by what was chosen, those that failed, an array of all, a picture."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,7 +111,7 @@ class Study:
 
     def _case(self, chosen: Mapping[str, Any]) -> Case:
         names = (*self.axes.over, *((SEED,) if self.axes.seeds is not None else ()))
-        left = self.cases
+        left: tuple[Case, ...] = self.cases
         for name, value in chosen.items():
             if name not in names:
                 raise ModelError(
@@ -119,7 +119,7 @@ class Study:
                 )
             left = tuple(c for c in left if equal(c.names[name], value))
             if not left:
-                values = self.axes.seeds if name == SEED else self.axes.over[name]
+                values: Sequence[Any] | None = self.axes.seeds if name == SEED else self.axes.over[name]
                 there = ", ".join(spoken(v) for v in (values or ())[:12])
                 raise ModelError(
                     f"{self.title}: found {name}={spoken(value)}"
@@ -131,4 +131,4 @@ class Study:
             raise ModelError(
                 f"{self.title}: {len(left)} cases have these values; say {', '.join(missing)} too"
             )
-        return left[0]
+        return next(iter(left))

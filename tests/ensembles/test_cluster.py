@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def two_workers():
 
 
 def test_processes_and_cluster_agree_bit_by_bit(two_workers):
-    asked = dict(stop=1.0, over={"m": [1.0, 2.0], "x": [0.2, 0.5]})
+    asked: dict[str, Any] = dict(stop=1.0, over={"m": [1.0, 2.0], "x": [0.2, 0.5]})
     here = study(Pendulum(), **asked)
     there = study(Pendulum(), **asked, where=two_workers.scheduler_address)
     for a, b in zip(here.values, there.values, strict=True):

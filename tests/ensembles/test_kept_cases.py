@@ -7,6 +7,7 @@ import sys
 import textwrap
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path):
 
 
 def test_results_that_were_kept_are_those_that_were_computed(tmp_path):
-    asked = dict(stop=1.0, over={"m": [1.0, -2.0], "x": [0.3, 0.9]}, folder=tmp_path / "kept")
+    asked: dict[str, Any] = dict(stop=1.0, over={"m": [1.0, -2.0], "x": [0.3, 0.9]}, folder=tmp_path / "kept")
     first, second = study(Pendulum(), **asked), study(Pendulum(), **asked)
     for a, b in zip(first.values, second.values, strict=True):
         assert (a is None) == (b is None)
@@ -121,15 +122,16 @@ def test_a_damaged_file_is_computed_again(tmp_path):
 
 
 def test_a_folder_of_another_study_is_refused(tmp_path):
-    asked = dict(stop=1.0, over={"m": [1.0]}, folder=tmp_path)
+    asked: dict[str, Any] = dict(stop=1.0, over={"m": [1.0]}, folder=tmp_path)
     study(Pendulum(), **asked)
-    for other, part in (
+    others: list[tuple[dict[str, Any], str]] = [
         ({"stop": 2.0}, "stop"),
         ({"over": {"m": [1.0 + 1e-15]}}, "over"),
         ({"over": {"L": [1.0]}}, "over"),
         ({"tolerance": 1e-6}, "tolerance"),
         ({"outputs": ["x"]}, "outputs"),
-    ):
+    ]
+    for other, part in others:
         words = rf"study: {tmp_path}: found the cases of another study, which differs in {part}, expected those of this one"
         with pytest.raises(ModelError, match=words):
             study(Pendulum(), **{**asked, **other})
@@ -151,6 +153,7 @@ def test_a_function_is_known_by_its_source_and_what_it_closes_over(tmp_path):
 
 def test_a_place_that_is_no_folder_of_a_study_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
+    no_path: Any = 3
     with pytest.raises(ModelError, match=r"file is a file, expected a folder"):
         study(lambda a: a, over={"a": [1]}, folder=tmp_path / "file")
     with pytest.raises(
@@ -158,7 +161,7 @@ def test_a_place_that_is_no_folder_of_a_study_is_refused(tmp_path):
     ):
         study(lambda a: a, over={"a": [1]}, folder=tmp_path)
     with pytest.raises(ModelError, match=r"found folder=3, expected the path of a folder"):
-        study(lambda a: a, over={"a": [1]}, folder=3)
+        study(lambda a: a, over={"a": [1]}, folder=no_path)
     kept = tmp_path / "kept"
     study(lambda a: a, over={"a": [1]}, folder=kept)
     (kept / "study.json").write_text("{")

@@ -1,6 +1,7 @@
 """Studies of models and functions: exact solutions, one answer wherever it is computed, cases that fail."""
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,7 +80,9 @@ def test_values_that_go_together_have_one_axis():
 @pytest.mark.parametrize("translated", [False, True], ids=["model", "translated"])
 def test_processes_and_this_process_agree_bit_by_bit(translated, monkeypatch):
     model = translate(Decay()) if translated else Decay()
-    asked = dict(stop=3.0, over={"k": [0.7, 1.3], "x": [1.0, 2.0]}, inputs={"u": lambda t: exp(-t)})
+    asked: dict[str, Any] = dict(
+        stop=3.0, over={"k": [0.7, 1.3], "x": [1.0, 2.0]}, inputs={"u": lambda t: exp(-t)}
+    )
     asked |= dict(parameters={"b": [1.5, 0.0]}, points=101)
     here = study(model, **asked)
     monkeypatch.setattr(places, "BEGIN", -1.0)
@@ -99,7 +102,7 @@ def test_processes_and_this_process_agree_bit_by_bit(translated, monkeypatch):
 
 def test_cases_that_take_long_go_on_in_processes(monkeypatch):
     here, computed = places.computed, []
-    asked = dict(stop=1.0, over={"k": [0.5, 1.0, 1.5, 2.0]}, inputs={"u": 0.0})
+    asked: dict[str, Any] = dict(stop=1.0, over={"k": [0.5, 1.0, 1.5, 2.0]}, inputs={"u": 0.0})
     for budget, expected in ((float("inf"), 4), (0.0, 1), (-1.0, 0)):
         with monkeypatch.context() as patch:
             patch.setattr(places, "BEGIN", budget)
@@ -126,7 +129,7 @@ class Held(Model):
 def test_seeds_drive_noise_and_are_those_of_simulate(monkeypatch):
     period, rate, count = 0.1, 2.0, 12
     noise = {"u": white_noise(std=1.0, period=period)}
-    asked = dict(stop=5.0, inputs=noise, tolerance=TOLERANCE, points=51)
+    asked: dict[str, Any] = dict(stop=5.0, inputs=noise, tolerance=TOLERANCE, points=51)
     found = study(Held(), **asked, seeds=count)
     table = found.to_xarray()
     assert table["x"].dims == ("seed", "time")

@@ -1,11 +1,13 @@
 """What a study refuses, and in which words."""
 
+from typing import Any
+
 import pytest
 
 from gantrytau import ModelError, study
 from gantrytau_models import Pendulum
 
-WRONG = {
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown name": (dict(over={"mm": [1.0]}), r"Pendulum has no parameter, variable or input 'mm'; did you mean 'm'"),
     "start in words": (dict(over={"x.start": [1.0]}), r"'x\.start'; write 'x', which varies its start value"),
     "no values": (dict(over={"m": []}), r"over: m: found no values, expected at least one; leave the name out"),

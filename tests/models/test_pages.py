@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
     "page",
     [
         "gantrytau/README.md",
+        "gantrytau/ensembles/README.md",
         "gantrytau/mechanics/README.md",
         "gantrytau/blocks/README.md",
         "gantrytau/electrical/README.md",

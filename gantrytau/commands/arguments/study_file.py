@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gantrytau import did_you_mean, read_toml
 from gantrytau.commands.arguments.choice import Choice
 from gantrytau.commands.arguments.loading import load, similar
@@ -91,14 +93,13 @@ def _values(file: Path, name: str, values: Any) -> Any:
     """A list as it stands, or numbers from one to another."""
     if not isinstance(values, dict):
         return values
-    numbers = [values.get(key) for key in RANGE]
-    good = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in numbers)
-    if set(values) != set(RANGE) or not good or not isinstance(numbers[2], int) or numbers[2] < 2:
+    first, last, count = (values.get(key) for key in RANGE)
+    good = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in (first, last))
+    if set(values) != set(RANGE) or not good or not isinstance(count, int) or count < 2:
         raise CommandError(
             f"{file}: over.{name}: found {values!r}, expected a list, or {{ from = 0.1, to = 0.9, number = 9 }}"
         )
-    first, last, count = numbers
-    return [first + (last - first) * k / (count - 1) for k in range(count)]
+    return np.linspace(float(first or 0), float(last or 0), count).tolist()
 
 
 def _function(file: Path, text: str) -> Any:

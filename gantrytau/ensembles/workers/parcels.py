@@ -4,9 +4,10 @@ CasADi's expressions share their symbols, which would be lost one by one: they a
 process that reads them takes the place of the time that was written.
 """
 
-import importlib.util
+import importlib.machinery
 import io
 import pickle
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
@@ -85,8 +86,6 @@ def _whole(thing: Any) -> Iterator[None]:
 
 def _modules(thing: Any) -> list[ModuleType]:
     """The modules of a function, of the classes of a thing, and of what a record holds."""
-    import sys
-
     parts = [thing, *(vars(thing).values() if hasattr(thing, "__dict__") else ())]
     names = {getattr(part, "__module__", None) for part in parts}
     names |= {cls.__module__ for part in parts for cls in type(part).__mro__}
@@ -99,8 +98,6 @@ def _importable(module: ModuleType) -> bool:
         return True
     before, _, _ = module.__name__.rpartition(".")
     try:
-        import sys
-
         path = getattr(sys.modules[before], "__path__", None) if before else None
         spec = importlib.machinery.PathFinder.find_spec(module.__name__, path)
     except (ImportError, KeyError, AttributeError, ValueError):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gantrytau import Fixed, Input, Model, Parameter, Real, der, simulate, translate
+from gantrytau import Fixed, Input, Model, Parameter, Real, der, simulate, study, translate
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
@@ -89,10 +89,18 @@ def test_covariance_of_the_tanks_by_finite_differences_of_an_integrator(tanks):
     np.testing.assert_allclose(tanks.errors, errors(best), atol=1e-3)
 
 
+def misses(seed: int) -> dict[str, float]:
+    """How far an estimate from noisy data is from the truth, in its own deviations."""
+    fit = estimate(QuadrupleTank, BOTH, tank_experiment(seed), elements=20)
+    return {name: (fit.parameters[name] - value) / fit.deviations[name] for name, value in HOLES.items()}
+
+
 def test_deviations_are_those_of_repeated_experiments():
-    fits = [estimate(QuadrupleTank, BOTH, tank_experiment(seed), elements=20) for seed in range(30)]
-    for name, value in HOLES.items():
-        apart = np.array([(fit.parameters[name] - value) / fit.deviations[name] for fit in fits])
+    found = study(misses, seeds=30)
+    assert not found.failures
+    assert found.result(seed=7) == misses(7)  # in another process, bit by bit
+    for name in HOLES:
+        apart = found.to_xarray()[name].values
         # 99.9 % bands of the mean and of the standard deviation of 30 normal numbers
         assert abs(apart.mean()) < 3.3 / np.sqrt(30)
         low, high = np.sqrt(stats.chi2.ppf([5e-4, 1 - 5e-4], 29) / 29)
