@@ -29,9 +29,11 @@ def c_source(
 
     name: of the C function (its own); given, find: the model's names of arguments and results, for the table in the
     comment that opens the text; jacobian: also `jac_<name>`; forward, reverse: also `fwd<n>_<name>`, `adj<n>_<name>` for
-    so many directions at once; header: lines for that comment. Newton iterations are written out. Each function is
-    called as CasADi calls it, `int name(const double **arg, double **res, long long *iw, double *w, int mem)`. Raises
-    ModelError for a name that C does not allow, wrong numbers of names or directions, and what has no C code.
+    so many directions at once; header: lines for that comment. Newton iterations are written out. What switches follows
+    its condition in every call, with the derivatives of that side; nothing is kept between calls, so that what is sampled
+    or done `when` has no such function, but the C of an FMU (`sources/` in it). Each function is called as CasADi calls it,
+    `int name(const double **arg, double **res, long long *iw, double *w, int mem)`. Raises ModelError for a name that C does
+    not allow, wrong numbers of names or directions, and what has no C code.
     """
     name = name if name is not None else str(function.name())
     if not ca.Function.check_name(name) or name in KEYWORDS.split():

@@ -99,8 +99,9 @@ def refuse_whens(flat: FlatModel) -> None:
     """ModelError naming the first when of a model."""
     for event in flat.whens:
         raise ModelError(
-            f"{event.label}: found a condition at which variables jump, expected continuous equations. simulate acts upon "
-            "it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a continuous equation"
+            f"{event.label}: found a condition at which variables jump, expected continuous equations. simulate and "
+            "FMUs act upon it; optimisation, linearisation and extraction cannot: leave it out there, or write it as a "
+            "continuous equation"
         )
 
 

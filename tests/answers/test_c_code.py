@@ -1,5 +1,6 @@
 """C source against the CasADi function it comes from: compiled, loaded, compared."""
 
+import math
 import os
 import shutil
 import subprocess
@@ -8,7 +9,32 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Real, der, extract_mechanism, sin, translate
+from gantrytau import (
+    Discrete,
+    Input,
+    Model,
+    ModelError,
+    Real,
+    ceil,
+    der,
+    extract_mechanism,
+    fabs,
+    floor,
+    fmax,
+    fmin,
+    if_else,
+    limit,
+    logic_and,
+    logic_not,
+    logic_or,
+    mod,
+    pre,
+    sign,
+    sin,
+    sqrt,
+    translate,
+    when,
+)
 from gantrytau.answers.c_code import c_source
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
@@ -122,6 +148,74 @@ def test_iterations_and_linear_systems_of_the_six_link_robot_compile(tmp_path):
     found, expected = np.array(speeds(*at)), np.array(mechanism.velocity_jacobian(*at))
     # Newton's method stops at 1e-13 on a way of its own
     assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+class Switches(Model):
+    """Everything that switches on its inputs, and a block that switches on its own unknown."""
+
+    a = Input(description="input")
+    b = Input(description="input")
+    y = Real(9, description="results")
+    i = Real(description="current through a diode")
+
+    def equations(self):
+        a, b = self.a, self.b
+        yield self.y[0] == if_else(
+            a < b, sqrt(b - a), a - b
+        )  # a root that is not real where it is not asked for
+        yield self.y[1] == fabs(a) + sign(b)
+        yield self.y[2] == fmin(a, b) - fmax(a, 2 * b)
+        yield self.y[3] == floor(a) + 10 * ceil(b)
+        yield self.y[4] == mod(a, 0.7)
+        yield self.y[5] == limit(a, -1.0, b)
+        yield self.y[6] == if_else(logic_and(a >= 0, b <= 1), a, b)
+        yield self.y[7] == if_else(logic_or(a > 1, logic_not(b > 0)), 1.0, a * b)
+        yield self.y[8] == if_else(a == b, 5.0, 7.0)
+        yield self.i + if_else(self.i > 0, self.i, 10 * self.i) == a - b
+
+
+@compiled_only
+def test_what_switches_does_so_in_c_at_the_border_too(tmp_path):
+    names = [*(f"y[{k}]" for k in range(9)), "i"]
+    function = translate(Switches()).function(["a", "b"], names)
+    value, jacobian = load(
+        c_source(function, name="switches", jacobian=True), tmp_path, "switches", "jac_switches"
+    )
+    points = [-2.1, -1.0, -0.7, 0.0, 0.35, 0.7, 1.0, 1.4, 2.0]
+    for a in points:
+        for b in points:
+            found, expected = (np.array([float(v) for v in f(a, b)]) for f in (value, function))
+            assert np.array_equal(found, expected)  # no product here is rounded
+            drop = a - b
+            own = [
+                math.sqrt(-drop) if a < b else drop,
+                abs(a) + np.sign(b),
+                min(a, b) - max(a, 2 * b),
+                math.floor(a) + 10 * math.ceil(b),
+                a - 0.7 * math.floor(a / 0.7),
+                min(max(a, -1.0), b),
+                a if a >= 0 and b <= 1 else b,
+                1.0 if a > 1 or not b > 0 else a * b,
+                5.0 if a == b else 7.0,
+                drop / 2 if drop > 0 else drop / 11,
+            ]
+            assert found == pytest.approx(np.array(own), abs=1e-15)
+            slopes = jacobian(a, b, *expected)
+            same(slopes, function.jacobian()(a, b, *expected))
+            assert float(slopes[2 * names.index("i")]) == (0.5 if drop > 0 else 1 / 11)
+
+
+def test_what_is_done_when_has_no_c_of_one_function():
+    class Counts(Model):
+        x = Real(start=0.0, fixed=True, description="time")
+        n = Discrete(0.0, description="seconds")
+
+        def equations(self):
+            yield der(self.x) == 1
+            yield when(self.x >= pre(self.n) + 1, self.n == pre(self.n) + 1)
+
+    with pytest.raises(ModelError, match=r"when\(.*simulate and FMUs act upon it"):
+        c_source(translate(Counts()).function(["x"], ["der(x)"]))
 
 
 def test_comment_says_which_argument_is_what(inverse_dynamics, tmp_path, monkeypatch):

@@ -274,7 +274,7 @@ static gt_status gt_act(gt_instance *it, gt_event_info *info, int *acted) {
         *acted |= it->e[i] != 0;
         if (it->e[i] != 0) it->last_event = gt_when_names[i];
     }
-    memcpy(it->now.holds, holds, sizeof holds);
+    memcpy(it->now.holds, holds, GT_WHENS * sizeof(int));
     if (!*acted) return GT_OK;
     gt_jump(it->a, found, it->w);
     for (i = 0; i < GT_WHENS; i++)

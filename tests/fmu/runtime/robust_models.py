@@ -13,7 +13,28 @@ from zipfile import ZipFile
 
 import pytest
 
-from gantrytau import Input, Model, Output, Parameter, Real, connect, der, sampled, sin, time
+from gantrytau import (
+    Discrete,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Real,
+    connect,
+    der,
+    exp,
+    fabs,
+    floor,
+    if_else,
+    mod,
+    pre,
+    reinit,
+    sampled,
+    sin,
+    terminate,
+    time,
+    when,
+)
 from gantrytau.mechanics.translational import Force, Mass, StickSlipFriction
 from gantrytau_fmu import export_fmu
 from gantrytau_models import FourBar, GantryTau, Pendulum, SixLinkGantryTau, prototypes
@@ -42,6 +63,29 @@ class Sledge(Model):
         yield self.s == self.mass.s
         yield self.motor.f == self.push + self.held + self.sway * sin(self.w * time)
         yield sampled(self.held, -self.gain * self.s, period=self.period)
+
+
+class Juggled(Model):
+    """A ball thrown up again wherever it lands: conditions, counts, pulses, a sample, a block that is iterated."""
+
+    e = Parameter(0.7, description="restitution")
+    push = Input(start=0.0, description="acceleration")
+    h = Real(start=0.3, fixed=True, description="height")
+    v = Real(start=0.0, fixed=True, description="speed")
+    drag = Real(start=0.0, description="of the air, which depends on itself")
+    seen = Real(start=0.0, description="sample of the height")
+    n = Discrete(0.0, description="bounces")
+    y = Output(description="steps of 0.1 in height")
+
+    def equations(self):
+        yield der(self.h) == self.v
+        kick = if_else(mod(time, 0.05) < 0.01, 2.0, 0.0)
+        yield der(self.v) == self.push + kick - 9.81 - self.drag + self.y / 10 - self.seen
+        yield self.drag + 0.1 * exp(self.drag) == 0.1 + self.v * fabs(self.v)
+        yield self.y == floor(10 * self.h)
+        yield sampled(self.seen, self.h, period=0.02)
+        yield when(self.h <= 0, reinit(self.v, -self.e * pre(self.v)), self.n == pre(self.n) + 1)
+        yield when(self.n >= 10_000, terminate("many bounces"))
 
 
 class Root(Model):
@@ -77,6 +121,8 @@ MAKERS = {
     "pendulum": lambda: (Pendulum(), {}),
     "sledge": lambda: (Sledge(), {"solver": "rodas4"}),
     "explicit_sledge": lambda: (Sledge(), {}),
+    "juggled": lambda: (Juggled(), {}),
+    "stiffly_juggled": lambda: (Juggled(), {"solver": "rodas4"}),
     "root": lambda: (Root(), {}),
     "lags": lambda: (Lags(), {}),
     # three equal sides and one that fits: a parallelogram, singular where it is flat

@@ -12,7 +12,7 @@ import pytest
 from tests.fmu.runtime.robust_models import MAKERS, SANITIZERS, compiler, driver, has_sanitizers, run
 
 SECONDS = float(os.environ.get("GANTRYTAU_FUZZ_SECONDS", "0"))
-FEW = ("pendulum", "sledge", "parallelogram", "root", "lags")
+FEW = ("pendulum", "sledge", "juggled", "parallelogram", "root", "lags")
 CALLS = 15_000
 
 

@@ -7,7 +7,12 @@ import pytest
 
 from tests.fmu.runtime.robust_models import SANITIZERS, compiler, driver, has_sanitizers, run, unpacked
 
-MODELS = ("parallelogram", "sledge")  # implicit blocks and DOPRI5; events and Rodas4
+MODELS = (
+    "parallelogram",
+    "sledge",
+    "juggled",
+    "stiffly_juggled",
+)  # implicit blocks; friction and samples; whens
 
 
 @pytest.mark.parametrize("model", MODELS)

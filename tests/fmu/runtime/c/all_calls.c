@@ -115,7 +115,7 @@ static void values_2(void *c) {
     BAD(fmi2GetString(c, &output, 1, &text));
     BAD(fmi2SetString(c, &output, 1, &text));
     OK(fmi2GetString(c, NULL, 0, NULL));
-    if (GT_MODES) {
+    if (GT_FRICTIONS) {
         const unsigned friction = first_of(GT_MODE);
         OK(fmi2GetInteger(c, &friction, 1, &whole));
         BAD(fmi2GetReal(c, &friction, 1, one));
