@@ -262,7 +262,7 @@ class Run:
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
         places = places[np.append(np.diff(trail.t[places]) > 0, True)]
-        times = np.arange(trail.t[places[0]], trail.t[last], self.span / LEAST_STEPS)
+        times = np.arange(float(trail.t[places[0]]), float(trail.t[last]), self.span / LEAST_STEPS)
         some = places[np.unique(np.append(np.searchsorted(trail.t[places[:-1]], times), places.size - 1))]
         if 2 * some.size < places.size and not self._doubts(some).any():
             return

@@ -18,8 +18,8 @@ def at_places(function: ca.Function, *arguments: np.ndarray) -> list[np.ndarray]
     memory, go = function.map(places).buffer() if together else function.buffer()
     for here in (slice(None),) if together else range(places):
         for k, array in enumerate(given):
-            memory.set_arg(k, memoryview(array[here]))
+            memory.set_arg(k, array[here].data)
         for k, array in enumerate(found):
-            memory.set_res(k, memoryview(array[here]))
+            memory.set_res(k, array[here].data)
         go()
     return found

@@ -32,9 +32,9 @@ class Buffer:
         self._found = [np.zeros((size, calls.size1_out(k))) for k in range(3)]
         self._memory, self._go = calls.buffer()
         for k, array in enumerate((self._first, self._told)):
-            self._memory.set_arg(k, memoryview(array))
+            self._memory.set_arg(k, array.data)
         for k, array in enumerate(self._found):
-            self._memory.set_res(k, memoryview(array))
+            self._memory.set_res(k, array.data)
 
     def steps(self, first: np.ndarray, told: np.ndarray) -> StepsTaken:
         """Passages from the first states and what is held, one behind the other, told (steps, k) as `Passage` says."""

@@ -1,13 +1,34 @@
 """Models that sample go from place to place in explicit steps: exact solutions, and the integrator as a second route."""
 
+import signal
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from gantrytau import Model, Parameter, Real, Samples, der, fabs, if_else, sampled, simulate, sin, translate
+from gantrytau import (
+    Model,
+    Parameter,
+    Real,
+    Samples,
+    SolveError,
+    der,
+    fabs,
+    if_else,
+    sampled,
+    simulate,
+    sin,
+    translate,
+)
+from gantrytau.simulation.motion import all_coordinates
+from gantrytau.simulation.sampling.buffers import Buffer
+from gantrytau.simulation.sampling.compiled import compiled
+from gantrytau.simulation.sampling.passage import passage
 from gantrytau.simulation.sampling.runge_kutta import one_step
 from gantrytau.simulation.sampling.sampler import Sampler
+from gantrytau_models import prototypes
+from gantrytau_models.control.tracking import ControlledRobot
 from tests.simulation.sampled_models import Held
 
 TOLERANCE = 1e-9
@@ -123,3 +144,72 @@ def test_samples_as_inputs_have_corners_between_instants(monkeypatch, kind):
         inputs={"control.wanted": Samples(t, wanted, kind=kind)},
     )
     assert np.abs(found[0] - found[1]).max() < 50 * NEAR  # the gain
+
+
+def test_the_controlled_robot_tracks_as_with_the_integrator(monkeypatch):
+    robot = ControlledRobot(prototypes.L1)
+    begin = translate(robot, events=True).start
+    t = np.linspace(0.0, 0.1, 11)
+    course = np.array([begin[f"r_ref[{k}]"] + 0.05 * (1 - np.cos(20 * t)) for k in range(3)]).T
+    inputs = {"r_ref": Samples(t, course, kind="linear")}
+    names = [f"{name}[{k}]" for name in ("r", "robot.tool.v", "error") for k in range(3)]
+    quick, slow = both_ways(monkeypatch, robot, names, stop=0.1, points=26, inputs=inputs)
+    assert np.abs(quick - slow).max() < NEAR
+
+
+def test_machine_code_gives_the_same_numbers_bit_by_bit(monkeypatch):
+    coordinates = all_coordinates(translate(ControlledRobot(prototypes.L1), events=True), {})
+    function = passage(coordinates).function
+    quick = compiled(function)
+    if quick is None:
+        pytest.skip("no C compiler")
+    start = coordinates.dae.start
+    held = [start[n] for n in coordinates.held] + [0.0] * len(coordinates.switches)
+    y = np.array([*(start[n] for n in coordinates.states), *held])
+    told = np.array([0.0, 0.004, 0.0, *(1.0 for _ in coordinates.held)])
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        point = y * random.uniform(0.99, 1.01, y.size)
+        for one, other in zip(function(point, told), quick(point, told), strict=True):
+            assert np.array_equal(np.array(one), np.array(other), equal_nan=True)
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    assert compiled(function) is None
+
+
+def test_an_interrupt_between_two_calls_keeps_what_was_computed(monkeypatch):
+    calls, steps = [], Buffer.steps
+
+    def pressed(self, *arguments):
+        calls.append(1)
+        if len(calls) == 5:
+            signal.raise_signal(signal.SIGINT)
+        return steps(self, *arguments)
+
+    monkeypatch.setattr(Buffer, "steps", pressed)
+    with pytest.raises(SolveError, match="simulation interrupted at t = ") as stopped:
+        simulate(Held(), stop=60.0, points=1001)
+    assert len(calls) == 5  # none behind it
+    assert 0 < stopped.value.result.time[-1] < 60.0
+
+
+class Unbounded(Held):
+    """Its controller divides by what vanishes after a second."""
+
+    inverse = Real(description="sampled inverse")
+    clock = Real(description="falls to zero", start=1.0, fixed=True)
+
+    def equations(self):
+        yield from super().equations()
+        yield der(self.clock) == -1
+        yield sampled(self.inverse, 1 / (1e-6 + self.clock) ** 400, period=0.25)
+
+
+def test_a_sampled_value_that_is_not_finite_is_named_at_its_instant():
+    with pytest.raises(SolveError, match=r"inverse.*t = 1 s") as stopped:
+        simulate(Unbounded(), stop=2.0)
+    assert stopped.value.time == 1.0
+
+
+def test_two_points_and_many_show_the_same_end():
+    ends = [simulate(Bounded(), stop=1.0, points=points).final("x") for points in (2, 3, 501, 3001)]
+    assert np.ptp(ends) < 1e-8  # the tolerance
