@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
+from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.singular_poses import Point
 
 ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
@@ -66,21 +67,19 @@ class Switches:
     def look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray, size: np.ndarray) -> Margins:
         """The margins at places: x (places, n), z (places, m), t (places,), w (places, k); size: of states, (n,)."""
         places = len(t)
-        found = [np.array(f) for f in self._look(x.T, z.T, t[None], t[None], w.T, size)]
-        values, rates, terms = (f.reshape(len(self), -1).T for f in found[:3])
-        values, rates, terms = (
-            np.broadcast_to(f, (places, len(self))).copy() for f in (values, rates, terms)
-        )
+        sizes = np.broadcast_to(size, (places, size.size))
+        found = at_places(self._look, x, z, t[:, None], t[:, None], w, sizes)
+        values, rates, terms = found[:3]
         if self._of_algebraics:
             m = z.shape[1]
-            by_z = found[3].reshape(len(self), -1, m).transpose(1, 0, 2)
-            inner = found[4].reshape(m, -1, m).transpose(1, 0, 2)
-            change = found[5].reshape(m, -1).T[:, :, None]
+            by_z = found[3].reshape(places, m, len(self)).transpose(0, 2, 1)
+            inner = found[4].reshape(places, m, m).transpose(0, 2, 1)
+            change = found[5][:, :, None]
             with contextlib.suppress(
                 np.linalg.LinAlgError
             ):  # what a margin loses by this is found in more steps
-                rates -= (by_z @ np.linalg.solve(inner, np.broadcast_to(change, (places, m, 1))))[:, :, 0]
-        rates = np.nan_to_num(rates, posinf=0.0, neginf=0.0)  # not finite: what only the other side may ask
+                rates -= (by_z @ np.linalg.solve(inner, change))[:, :, 0]
+        rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
         return Margins(values, rates, noise)
 

@@ -10,6 +10,7 @@ from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.flattening.flat_model import When
 from gantrytau.flattening.whens import Jump, one_round
+from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.singular_poses import Point
 
@@ -41,13 +42,19 @@ class Rounds:
 
     def holding(self, point: Point) -> np.ndarray:
         """Which conditions hold at a point."""
-        x, z, t, w = point
-        return np.array(self.conditions(x, z, t, t, w)).ravel() != 0
+        return self._at(self.conditions, point)[0] != 0
 
     def made(self, point: Point, rose: np.ndarray) -> Made:
         """A round at a point where some conditions became true."""
+        return Made(*self._at(self.jump, point, rose.astype(float)))
+
+    @staticmethod
+    def _at(function: ca.Function, point: Point, *more: np.ndarray) -> list[np.ndarray]:
         x, z, t, w = point
-        return Made(*(np.array(f).ravel() for f in self.jump(x, z, t, t, w, rose)))
+        now = np.array([[t]])
+        return [
+            f[0] for f in at_places(function, x[None], z[None], now, now, w[None], *(a[None] for a in more))
+        ]
 
 
 def rounds_of(
