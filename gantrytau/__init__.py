@@ -39,7 +39,7 @@ from gantrytau.language.declarations import (
     Start,
     StateSelect,
 )
-from gantrytau.language.events import Mode, reinit, sampled, stick_slip, terminate, transition, when
+from gantrytau.language.events import Mode, delay, reinit, sampled, stick_slip, terminate, transition, when
 from gantrytau.language.functions import (
     acos,
     asin,
@@ -130,6 +130,7 @@ __all__ = [
     "constraint",
     "cos",
     "cross",
+    "delay",
     "der",
     "did_you_mean",
     "dot",

@@ -12,6 +12,7 @@ from typing import Literal
 
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.flattening.flat_checks import refuse_delays
 from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
@@ -74,6 +75,7 @@ def export_fmu(
     targets = chosen(platforms)
     check_target(path)
     dae = _translated(model, given, find, states)
+    refuse_delays(dae.flat)
     outputs, others = _shown(dae, find)
     graph = entered(formulas_of(dae, [*outputs, *others]))
     contents = contents_of(graph, outputs, others)

@@ -24,7 +24,7 @@ from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
-from gantrytau.flattening.flat_checks import refuse_sticking
+from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
@@ -111,6 +111,7 @@ def linearize(
     """
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
+    refuse_delays(dae.flat)
     if period is not None:
         check_period(f"linearize {dae.name}", period)
     if parameters:

@@ -173,9 +173,9 @@ def _wanted_derivatives(flat: FlatModel, find: Sequence[str]) -> tuple[str, ...]
 
 def _sampled_derivatives(flat: FlatModel) -> list[str]:
     """Derivatives of variables that only what is set at instants depends on."""
-    if not (flat.sampled or flat.frictions or flat.whens):
+    if not (flat.sampled or flat.frictions or flat.whens or flat.delays):
         return []
-    used = [s.expression for s in flat.sampled]
+    used = [s.expression for s in (*flat.sampled, *flat.delays)]
     used += [
         e for one in flat.whens for e in (one.condition, *(v for _, v in (*one.reinits, *one.assignments)))
     ]
@@ -201,5 +201,6 @@ def _refuse_differentiated(
     for name, order, place in where:
         if name in events and order:
             what = "friction that sticks" if any(f.force == name for f in flat.frictions) else "a Discrete"
+            what = "delayed" if any(d.name == name for d in flat.delays) else what
             what = "sampled" if any(s.name == name for s in flat.sampled) else what
             raise differentiated(name, what, place)

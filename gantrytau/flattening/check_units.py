@@ -14,7 +14,7 @@ import casadi as ca
 
 from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.flattening.instants import unit_equations
+from gantrytau.flattening.instants import delay_equations, unit_equations
 from gantrytau.flattening.whens import when_units
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
@@ -85,7 +85,7 @@ def check_units(flat: FlatModel) -> None:
         ),
     ]
     symbols += [*flat.derivatives.values(), *flat.before.values()]
-    events = [*unit_equations(flat), *when_units(flat)]
+    events = [*unit_equations(flat), *when_units(flat), *delay_equations(flat)]
     for equations in (flat.equations, flat.initial_equations, events, _attributes(flat)):
         sides = [side for e in equations for side in (e.left, e.right)]
         terms = _terms(symbols, units, sides)

@@ -87,11 +87,22 @@ def refuse_events(flat: FlatModel) -> None:
     """ModelError naming the first component whose values or equations change at instants."""
     refuse_sticking(flat)
     refuse_whens(flat)
+    refuse_delays(flat)
     for event in flat.sampled:
         raise ModelError(
             f"{event.label}: found a value that jumps at instants, expected continuous equations. simulate, "
             "linearize and FMUs sample it; optimisation and extraction cannot: leave it out there, or write it as a "
             "continuous equation. translate(..., events=True) takes it as known"
+        )
+
+
+def refuse_delays(flat: FlatModel) -> None:
+    """ModelError naming the first delay of a model."""
+    for one in flat.delays:
+        raise ModelError(
+            f"{one.name}: found a value of the past, expected equations of one time. simulate remembers it; functions, "
+            "linear systems, optimisation and FMUs cannot: leave it out there, or write a chain of first-order lags, "
+            "T / n * der(y) == x - y, n times; translate(..., events=True) takes it as known"
         )
 
 

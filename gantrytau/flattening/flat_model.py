@@ -143,6 +143,18 @@ class When:
 
 
 @dataclass(frozen=True, eq=False)
+class Delay:
+    """A scalar that is what an expression was a time ago, and before that what it is at the start.
+
+    name: of the variable; expression: of flat symbols; time: s, of parameters.
+    """
+
+    name: str
+    expression: ca.SX
+    time: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
 class FlatModel:
     """A model written out: variables, parameters and scalar equations between their symbols.
 
@@ -152,7 +164,8 @@ class FlatModel:
     scalars known from outside; absent: declared names that this model has no use for, and why;
     requirements: conditions on parameters; sampled, discretes, frictions: scalars that are set at instants, no unknowns
     either, discretes by `whens`; before: symbols of the values of discretes just before an instant, by their names;
-    modes: names of the values 0, 1, ... of a discrete, by its name; ranges: where tables end that are not defined beyond;
+    modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from
+    the past; ranges: where tables end that are not defined beyond;
     rods: what a robot says of its links, by name.
     """
 
@@ -175,6 +188,7 @@ class FlatModel:
     whens: tuple[When, ...] = ()
     discretes: tuple[str, ...] = ()
     before: Mapping[str, ca.SX] = field(default_factory=dict)
+    delays: tuple[Delay, ...] = ()
     ranges: tuple[Range, ...] = ()
     modes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rods: Rods | None = None
@@ -218,5 +232,6 @@ class FlatModel:
 
     @property
     def event_names(self) -> tuple[str, ...]:
-        """Scalars that are set at instants: sampled variables, Discretes, then forces of friction that sticks."""
-        return (*(s.name for s in self.sampled), *self.discretes, *(f.force for f in self.frictions))
+        """Scalars that are set at instants: sampled variables, Discretes, forces of friction that sticks, delayed ones."""
+        instants = (*(s.name for s in self.sampled), *self.discretes, *(f.force for f in self.frictions))
+        return (*instants, *(d.name for d in self.delays))

@@ -19,7 +19,14 @@ from gantrytau.flattening.flat_checks import (
 )
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip, When
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.instants import Events, expressed, read_events, with_expressions, with_starts
+from gantrytau.flattening.instants import (
+    Events,
+    expressed,
+    read_delays,
+    read_events,
+    with_expressions,
+    with_starts,
+)
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
@@ -90,15 +97,13 @@ def write_out(instance: Instance) -> FlatModel:
         branches = [way for way in statements if isinstance(way, Branch)]
         roots = [way for way in statements if isinstance(way, Root)]
         tree = spanning_tree(instance, connections, branches, roots)
-        equations += _of_the_ways(stated.ways, tree)
-        equations += _bindings(instance)
+        equations += [*_of_the_ways(stated.ways, tree), *_bindings(instance)]
         joined = [c for c in connections if id(c[1]) not in tree.repeated]
         closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
         equations += connection_equations(instance, joined, closures)
         equations += [e for closure in closures for e in closure.equations]
         spread = Spread(instance, tree)
-        written = spread.substituted(equations)
-        written_initial = spread.substituted(stated.initial)
+        written, written_initial = spread.substituted(equations), spread.substituted(stated.initial)
         events, sampled, frictions, whens, sides = _events(stated, instance, spread)
         refuse_before((*written, *written_initial))
         everything = (*written, *written_initial, *sides)
@@ -109,16 +114,17 @@ def write_out(instance: Instance) -> FlatModel:
         refuse_absent(everything, absent)
         refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
-        kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
+        kinds = _kinds(placed)
         parameters = tuple(flat_parameter(p) for p in placed if kinds[p.name] == "parameter")
         moving = (flat_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated"))
         variables = with_starts(tuple(moving), events)
+        delays, past, positive = read_delays(instance.symbols, spread, variables)
         discretes = _discretes(variables, whens, written)
         passed = tuple(flat_variable(p) for p in placed if kinds[p.name] == "propagated")
     return FlatModel(
         name=type(instance.root).__name__,
         time=time,
-        variables=(*variables, *(v for closure in closures for v in closure.variables)),
+        variables=(*variables, *past, *(v for closure in closures for v in closure.variables)),
         parameters=parameters,
         equations=written,
         initial_equations=written_initial,
@@ -129,16 +135,21 @@ def write_out(instance: Instance) -> FlatModel:
         loops=tuple(loop for _, loop in tree.closing),
         inputs=_free_inputs(instance, equations),
         absent=absent,
-        requirements=(*stated.requirements, *events.requirements),
+        requirements=(*stated.requirements, *events.requirements, *positive),
         sampled=sampled,
         frictions=frictions,
         whens=whens,
         discretes=discretes,
         before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
+        delays=delays,
         ranges=_ranges(instance.symbols, spread),
         modes=stated.modes,
         rods=rods_of(instance.root),
     )
+
+
+def _kinds(placed: Sequence[Placed]) -> dict[str, str]:
+    return {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
 
 
 def _ranges(symbols: Symbols, spread: Spread) -> tuple[Range, ...]:

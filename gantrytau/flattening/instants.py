@@ -7,7 +7,8 @@ from typing import Any
 import casadi as ca
 
 from gantrytau.errors import ModelError
-from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip
+from gantrytau.flattening.flat_model import Delay, FlatModel, FlatVariable, Sampled, StickSlip
+from gantrytau.flattening.propagation import Spread
 from gantrytau.flattening.shapes import joined
 from gantrytau.language.events import Sampling, Sticking
 from gantrytau.language.statements import Equation, Requirement
@@ -192,3 +193,47 @@ def unit_equations(flat: FlatModel) -> list[Equation]:
         Equation(s.period, flat.time, s.path, s.model, 0, label=f"{s.label}, period") for s in flat.sampled
     ]
     return _right_sides(flat.sampled, flat.frictions, symbols) + periods
+
+
+def read_delays(
+    symbols: Symbols, spread: Spread, variables: Sequence[FlatVariable]
+) -> tuple[tuple[Delay, ...], tuple[FlatVariable, ...], list[Requirement]]:
+    """The delays, their variables, and what their times must satisfy; ModelError for a time that varies."""
+    stated = list(symbols.delays.values())
+    requirements = []
+    for one in stated:
+        for leaf in ca.symvar(one.time):
+            symbol = symbols.find(leaf)
+            if symbol is None or symbol.kind != "parameter":
+                raise ModelError(
+                    f"{one.name}: found {leaf.name()} in the time of a delay, expected a number or an expression of "
+                    "parameters"
+                )
+        if not one.time.is_constant():
+            words = f"expected a time above zero, in s, in {one.name}"
+            requirements.append(Requirement(one.time > 0, words))
+    whole = [Equation(one.symbol, one.expression, "", "", 0, label=one.name) for one in stated]
+    written = spread.substituted(whole)
+    delays = tuple(Delay(one.name, e.right, one.time) for one, e in zip(stated, written, strict=True))
+    units = {name: v.unit for v in variables for name in v.elements}
+    described = {name: v.description for v in variables for name in v.elements}
+    found = [
+        FlatVariable(
+            name=one.name,
+            kind="real",
+            shape=(),
+            elements=(one.name,),
+            symbol=one.symbol,
+            unit=units.get(str(one.expression)),
+            description=f"{described.get(str(one.expression)) or one.expression}, {one.time} s ago"[:120],
+        )
+        for one in stated
+    ]
+    return delays, tuple(found), requirements
+
+
+def delay_equations(flat: FlatModel) -> list[Equation]:
+    """Equations whose units agree if those of the delays do."""
+    symbols = {v.name: v.symbol for v in flat.variables}
+    found = [Equation(symbols[d.name], d.expression, "", "", 0, label=d.name) for d in flat.delays]
+    return found + [Equation(d.time, flat.time, "", "", 0, label=f"{d.name}, time") for d in flat.delays]

@@ -1,4 +1,4 @@
-"""What a model states of instants: values that are sampled and held, what happens when, modes, and friction that sticks.
+"""What a model states of instants: what is sampled and held, what happens when, modes, stick-slip friction, and delays.
 
 `sampled`, `when`, `transition` and `stick_slip` are yielded by `equations(self)` like equations. A sampled variable, a
 Discrete and the force of such a friction count as known in the equations, as inputs do; what they are is kept beside.
@@ -13,6 +13,7 @@ import casadi as ca
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import Discrete
 from gantrytau.language.functions import if_else, logic_and, logic_or
+from gantrytau.language.symbols import delayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +116,23 @@ def sampled(variable: Any, expression: Any, *, period: Any, start: Any = None) -
     each other's new values.
     """
     return Sampling(variable, expression, period, start)
+
+
+def delay(x: Any, T: Any) -> ca.SX:
+    """What an expression was a time T ago, for use in equations(self); a vector element by element.
+
+    x: an expression of variables, scalar or vector; T: s, a number or an expression of parameters, above zero. Before the
+    start it was what it is there. What jumps or bends does so again T later. The order of its interpolation is that of the
+    integrator. `simulate` has it; linear systems, functions and optimisation refuse it, where a Pade approximation or a
+    chain of first-order lags can stand for it. Raises ModelError for a T that is not above zero.
+    """
+    expression = ca.densify(ca.SX(x))
+    time = ca.SX(T)
+    if time.numel() != 1 or (time.is_constant() and not 0 < float(time) < float("inf")):
+        raise ModelError(
+            f"delay: found T={T}, expected a finite time above zero, in s; what has no delay stands in the equation as it is"
+        )
+    return ca.reshape(ca.vertcat(*delayed(expression.elements(), time)), *expression.shape)
 
 
 def stick_slip(force: Any, speed: Any, *, coulomb: Any, smooth: Any, breakaway: Any) -> Sticking:

@@ -60,12 +60,27 @@ class Range:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Delayed:
+    """A scalar expression as it was some time ago: its symbol, and that time, s."""
+
+    symbol: ca.SX
+    expression: ca.SX
+    time: ca.SX
+
+    @property
+    def name(self) -> str:
+        """`delay(x, T)`."""
+        return self.symbol.name()
+
+
 class Symbols:
     """All scalar symbols of one model, found by name or by the CasADi node that stands for them; ranges: noted so far."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, Symbol] = {}
         self.ranges: list[Range] = []
+        self.delays: dict[str, Delayed] = {}
         self._by_node: dict[int, Symbol] = {}
 
     def add(self, name: str, kind: str, base: str | None = None, order: int = 0) -> Symbol:
@@ -108,6 +123,11 @@ class Symbols:
 
 def _refuse_jump(symbol: Symbol) -> None:
     """ModelError for what jumps at instants and has no derivative there."""
+    if symbol.kind == "delayed":
+        raise ModelError(
+            f"der(): found {symbol.name}, whose derivative is none of its own, expected a variable; delay the derivative "
+            "instead: delay(der(x), T)"
+        )
     if symbol.kind in ("discrete", "pre"):
         raise ModelError(
             f"der(): found {symbol.name}, which jumps at instants and is constant between them, expected what has a "
@@ -161,6 +181,21 @@ def note_range(expression: ca.SX, low: float, high: float) -> None:
     symbols = _current.get()
     if symbols is not None and not expression.is_constant():
         symbols.ranges.append(Range(expression, low, high))
+
+
+def delayed(expressions: Iterable[ca.SX], time: ca.SX) -> list[ca.SX]:
+    """The symbols of scalar expressions as they were some time ago; ModelError outside of the equations of a model."""
+    symbols = _current.get()
+    if symbols is None:
+        raise ModelError("delay() was called outside of equations(self), where there are no symbols yet")
+    found = []
+    for one in expressions:
+        text = str(one)
+        name = f"delay({text if len(text) < LONG else f'expression {len(symbols.delays) + 1}'}, {time})"
+        if name not in symbols.delays:
+            symbols.delays[name] = Delayed(symbols.add(name, "delayed").sx, one, time)
+        found.append(symbols.delays[name].symbol)
+    return found
 
 
 def der(expression: Any, order: int = 1) -> ca.SX:

@@ -18,6 +18,8 @@ from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
+from gantrytau.simulation.memory.hermite import ORDER
+from gantrytau.simulation.memory.rates_along import RatesAlong
 from gantrytau.simulation.singular_poses import Conditioning, Point
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
@@ -80,7 +82,18 @@ class Coordinates:
     @property
     def stepwise(self) -> bool:
         """Whether there are signals that are known interval by interval."""
-        return bool(self.sampled or self.held or self.discretes or len(self.switches))
+        return bool(self.sampled or self.held or self.discretes or self.dae.flat.delays or len(self.switches))
+
+    @property
+    def delay_columns(self) -> slice:
+        """Where the coefficients of delayed values, six of each, stand in what is held."""
+        first = len(self.held) + len(self.discretes)
+        return slice(first, first + (ORDER + 1) * len(self.dae.flat.delays))
+
+    @cached_property
+    def delayed(self) -> RatesAlong:
+        """What is delayed, and its rates."""
+        return RatesAlong(self.rounds.past, [self.x, self.z, time, self.t0, self.w], self.ode, self.algebraic)
 
     def integrator(
         self,
@@ -198,7 +211,7 @@ class Coordinates:
         return ca.substitute(found, inputs, 0 * inputs)
 
     def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Consistent states, algebraics and modes at the start, with the inputs as they are then."""
+        """Consistent states and algebraics at the start, with the inputs as they are then; delays, and modes."""
         dae = self.dae
         known = ca.vertcat(*self.known.values())
         at = self.kept("known", lambda: ca.Function("known", [time, self.t0, self.w], [known]))
@@ -209,7 +222,8 @@ class Coordinates:
         found = self.kept(("start", there), lambda: self._consistent(values))
         x = np.array([found[n] for n in self.states])
         modes = self.pieces.numbers({**found, time.name(): t})
-        own = np.array([modes[turn.mode.name()] for turn in self.switches.turns])
+        past = [c for d in dae.flat.delays for c in (found[d.name], *np.zeros(ORDER))]
+        own = np.array([*past, *(modes[turn.mode.name()] for turn in self.switches.turns)])
         return x, np.array([found[n] for n in self.algebraics]), own
 
     def _consistent(self, values: dict[str, float]) -> dict[str, float]:

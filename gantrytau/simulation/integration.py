@@ -14,6 +14,7 @@ from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
+from gantrytau.simulation.memory.history import History
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
@@ -52,12 +53,14 @@ class Run:
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
         interval = float(np.diff(self.trail.t).max())
-        exact = max(OFTEN * tolerance, min(LEAST, tolerance)) if coordinates.dae.flat.sampled else tolerance
+        often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
+        exact = max(OFTEN * tolerance, min(LEAST, tolerance)) if often else tolerance
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
         sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
+        self.history = History(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
         self.sampler = sampler if sampler.suits else None
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -78,6 +81,8 @@ class Run:
     def go(self) -> None:
         trail = self.trail
         self.done = self.changes.begin()
+        if self.history:
+            self.history.begin()
         with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
             size = most = self._longest()
             while self.done < trail.last and not self.changes.ended:
@@ -86,6 +91,8 @@ class Run:
                     raise KeyboardInterrupt
                 if self._sampled():
                     continue
+                if self.history:
+                    self.done = self.history.enter(self.done, self.changes)
                 before, count = self.done, min(size, trail.stretch(self.done))
                 try:
                     turned = self._advance(count)
@@ -142,7 +149,7 @@ class Run:
     def _longest(self) -> int:
         """The most intervals that are integrated at once."""
         coordinates, last = self.coordinates, self.trail.last
-        if coordinates.constrained or coordinates.sampled or coordinates.held:
+        if coordinates.constrained or coordinates.sampled or coordinates.held or self.history:
             return min(CHUNK, last)
         if len(coordinates.switches):
             return CHUNK * GROWTH
@@ -179,7 +186,10 @@ class Run:
     def _advance(self, count: int) -> bool:
         """Integrate some intervals, or up to where something switches; whether it does."""
         trail, here = self.trail, self.done
-        trail.held[here + 1 : here + count + 1] = trail.held[here]
+        if self.history:
+            count = self.history.ahead(here, count)
+        else:
+            trail.held[here + 1 : here + count + 1] = trail.held[here]
         ahead = np.arange(here, here + count + 1)
         courses = self._courses(here, count) if self.coordinates.stepwise else None
         self.integrators.shorter = self._shorter()
@@ -193,6 +203,8 @@ class Run:
         except SolveError as error:  # perhaps only for want of shorter stretches
             raise RuntimeError("the constraints cannot be met any more") from error
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
+        if self.history and self.history.too_wide(here, count):
+            return False
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place
         self._watch(here, self.done)
@@ -201,7 +213,8 @@ class Run:
 
     def _too_wide(self, count: int) -> bool:
         """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
-        parts = (self.integrators.steps - STARTING) // (STEPS_BETWEEN * count)
+        starts = count if self.history else 1  # of the integrator
+        parts = (self.integrators.steps - STARTING * starts) // (STEPS_BETWEEN * count)
         if parts < 2 or not len(self.coordinates.switches):
             return False
         trail, here, last = self.trail, self.done, self.trail.last
@@ -216,7 +229,9 @@ class Run:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
         trail = self.trail
         h = np.diff(trail.t[here : here + count + 1])
-        if not trail.courses and np.ptp(h) <= 1e-9 * h[0]:  # nothing changes, so that nothing starts anew
+        if (
+            not (trail.courses or self.history) and np.ptp(h) <= 1e-9 * h[0]
+        ):  # nothing changes, so that nothing starts anew
             length = (trail.t[here + count] - trail.t[here]) / count
             return np.repeat(np.array([[trail.t[here], length, 0, *trail.held[here]]]).T, count, axis=1)
         inputs = trail.rows(np.arange(here, here + count)).T

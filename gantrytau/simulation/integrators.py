@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.singular_poses import Point
 
 MOST_STEPS = 100_000  # of the integrator between two ends
@@ -44,10 +45,10 @@ class Integrators:
     def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
         """The point a step later, in s; RuntimeError or SolveError where there is none."""
         x, z, t, inputs = point
-        stepwise, half = self.coordinates.stepwise, len(self.coordinates.sampled)
+        stepwise = self.coordinates.stepwise
         p, u = ([], [t, step, 0, *inputs]) if stepwise else ([t, step], [])
         near, far = self._integrate(1, most, x, z, p, u)
-        there = np.concatenate([inputs[:half] + step * inputs[half : 2 * half], inputs[half:]])
+        there = _later(self.coordinates, inputs, step)
         when, w = np.array([t + step]), there[None]
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
@@ -102,3 +103,12 @@ class Integrators:
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")
         return reached, np.array(found["zf"]).T.reshape(count, -1)
+
+
+def _later(coordinates: Coordinates, w: np.ndarray, step: float) -> np.ndarray:
+    """What is sampled, held and delayed, (k,), a step later, in s."""
+    half, own = len(coordinates.sampled), coordinates.delay_columns
+    there = np.concatenate([w[:half] + step * w[half : 2 * half], w[half:]])
+    past = slice(2 * half + own.start, 2 * half + own.stop)
+    there[past] = shifted(w[past].reshape(-1, ORDER + 1), step).ravel()
+    return there

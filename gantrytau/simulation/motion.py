@@ -17,6 +17,7 @@ from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.events.rounds import rounds_of
 from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.memory.hermite import ORDER
 from gantrytau.simulation.signals import SampledCourse, Signal
 from gantrytau.simulation.singular_poses import Conditioning
 
@@ -27,7 +28,8 @@ def all_coordinates(
     """The model in all its coordinates, with inputs as signals say; ModelError for one that is not known well enough."""
     sampled = tuple(n for n in dae.known if isinstance(signals.get(n), SampledCourse))
     held = tuple(s.name for s in dae.flat.sampled)
-    w, t0 = ca.SX.sym("w", 2 * len(sampled) + len(held) + len(dae.flat.discretes)), ca.SX.sym("t0")
+    width = 2 * len(sampled) + len(held) + len(dae.flat.discretes) + (ORDER + 1) * len(dae.flat.delays)
+    w, t0 = ca.SX.sym("w", width), ca.SX.sym("t0")
     chains, given = dae.reduced.chains, dependents(dae)
     states = _states(dae, {name for _, name in given})
     rates = column([chains.rate(n) for n in states])
@@ -199,5 +201,10 @@ def _known_symbols(
             known[derivative_name(name, order)] = signal
             signal = ca.densify(ca.jacobian(signal, time))
     held = (*(s.name for s in dae.flat.sampled), *dae.flat.discretes)
-    known.update(zip(held, w[2 * len(sampled) :].elements(), strict=True))
+    own, *past = ca.vertsplit(
+        w[2 * len(sampled) :], [0, *range(len(held), w.numel() - 2 * len(sampled) + 1, ORDER + 1)]
+    )
+    known.update(zip(held, own.elements(), strict=True))
+    for one, coefficients in zip(dae.flat.delays, past, strict=True):
+        known[one.name] = ca.polyval(coefficients[::-1], time - t0)
     return known

@@ -108,7 +108,7 @@ def _all_runs(
         run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
         ended = run.ended if error is None else str(error) or "interrupted"
         parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))
-        found = other_constraints(run) if isinstance(error, SolveError) else None
+        found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
         if found is None:
             break
         left, dae = found

@@ -6,6 +6,7 @@ import numpy as np
 
 from gantrytau.simulation.events.instants_on_mesh import instants, on_mesh
 from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.signals import SampledCourse, Signal
 
 LEAST_STEPS = (
@@ -32,7 +33,8 @@ class Trail:
         parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
         fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
         fine[::parts] = grid
-        watched = coordinates.conditioning.needed or len(coordinates.switches) or len(spans)
+        self._past, past = coordinates.delay_columns, len(coordinates.dae.flat.delays) > 0
+        watched = coordinates.conditioning.needed or len(coordinates.switches) or len(spans) or past
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
         periods = np.array([table.number(s.period) for s in events])
@@ -52,9 +54,11 @@ class Trail:
         self.x = np.full((size, len(coordinates.states)), np.nan)
         self.z = np.full((size, len(coordinates.algebraics)), np.nan)
         names = (*coordinates.held, *coordinates.discretes)
-        self.held = np.full((size, len(names) + len(coordinates.switches)), np.nan)
+        past = (ORDER + 1) * len(coordinates.dae.flat.delays)
+        self.held = np.full((size, len(names) + past + len(coordinates.switches)), np.nan)
         self.held[0] = [
             *(coordinates.dae.start[n] for n in names),
+            *(0.0 for _ in range(past)),
             *(0.0 for _ in coordinates.switches.turns),
         ]
 
@@ -114,7 +118,7 @@ class Trail:
 
     def insert(self, k: int, times: np.ndarray, *, stop: bool = False) -> None:
         """Add places behind place k; nothing is known of them yet but what is held from k on."""
-        at = np.full(len(times), k + 1)
+        at, before = np.full(len(times), k + 1), self.t[k]
         self.t = np.insert(self.t, at, times)
         self.stops = np.insert(self.stops, at, stop)
         self.due = np.insert(self.due, at, False, axis=0)
@@ -122,7 +126,10 @@ class Trail:
         self.driven = np.insert(self.driven, at, driven, axis=0)
         self.x = np.insert(self.x, at, np.nan, axis=0)
         self.z = np.insert(self.z, at, np.nan, axis=0)
-        self.held = np.insert(self.held, at, self.held[k], axis=0)
+        held = np.repeat(self.held[k][None], len(times), axis=0)
+        past = held[:, self._past].reshape(len(times), -1, ORDER + 1)
+        held[:, self._past] = shifted(past, (times - before)[:, None]).reshape(len(times), -1)
+        self.held = np.insert(self.held, at, held, axis=0)
         self.kept[self.kept > k] += len(times)
 
     def repeat(self, k: int, *, written: bool) -> None:

@@ -1,6 +1,7 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 
@@ -12,6 +13,9 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel
 
+ROUNDS = 200  # in which delayed values are made those of the start
+SAME = 1e-13  # relative, between two rounds
+
 
 def consistent_start(
     flat: FlatModel,
@@ -21,7 +25,37 @@ def consistent_start(
     held: frozenset[str] = frozenset(),
     free: tuple[str, ...] = (),
 ) -> dict[str, float]:
-    """Consistent numbers of all symbols; `held` must not move, `free` are inputs that may (last level)."""
+    """Consistent numbers of all symbols; `held` must not move, `free` are inputs that may (last level).
+
+    What is delayed is what it is at the start. InitializationError where that leads to no numbers.
+    """
+    for _ in range(ROUNDS if flat.delays else 0):
+        found = _consistent_start(flat, reduced, indexed, guess, held, free)
+        values = {**guess.values, **found}
+        delays = reduced.to_reduced(ca.vertcat(*(d.expression for d in flat.delays)))
+        now = dict(
+            zip((d.name for d in flat.delays), values_at(delays, values).ravel().tolist(), strict=True)
+        )
+        if all(abs(now[n] - guess.values[n]) <= SAME * max(1e-300, abs(now[n])) for n in now):
+            return found
+        guess = replace(guess, values={**guess.values, **now})
+    if flat.delays:
+        names = ", ".join(d.name for d in flat.delays)
+        raise InitializationError(
+            f"{flat.name}: found no value for {names} that is what is delayed at the start, expected one, as "
+            "before the start everything was as it is there; change start values or the equations"
+        )
+    return _consistent_start(flat, reduced, indexed, guess, held, free)
+
+
+def _consistent_start(
+    flat: FlatModel,
+    reduced: Reduced,
+    indexed: Indexed,
+    guess: StartValues,
+    held: frozenset[str],
+    free: tuple[str, ...],
+) -> dict[str, float]:
     stages = list(indexed.levels)
     if free:
         last = stages[-1]

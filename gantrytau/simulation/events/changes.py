@@ -72,8 +72,8 @@ class Changes:
     def begin(self) -> int:
         """The first place: what is true there has not become so, but for whens that act initially. The last place there."""
         trail = self.trail
-        trail.x[0], trail.z[0], modes = self.coordinates.start(trail.t[0], trail.inputs(0))
-        trail.held[0, trail.held.shape[1] - modes.size :] = modes
+        trail.x[0], trail.z[0], own = self.coordinates.start(trail.t[0], trail.inputs(0))
+        trail.held[0, trail.held.shape[1] - own.size :] = own
         self._holding[:] = [not one.initially for one in self.coordinates.rounds.whens]
         self.renew(0)
         return self.turn(0)

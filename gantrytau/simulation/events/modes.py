@@ -18,7 +18,7 @@ from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
 @dataclass(frozen=True, eq=False)
 class InModes:
     """Residuals by (equation, times differentiated), expressions of known symbols by name, conditions of whens,
-    then of ranges that are left, and what switches in them.
+    then of ranges that are left, then what is delayed, and what switches in them.
     """
 
     residuals: Mapping[Key, ca.SX]
@@ -47,7 +47,8 @@ def in_modes(dae: Translated, known: Mapping[str, ca.SX]) -> InModes:
     """The equations of a model, its known symbols (their expressions in time) and its conditions with modes."""
     residuals = dae.indexed.residuals
     left = [1 - (r.expression >= r.low) + (r.expression > r.high) for r in dae.flat.ranges]
-    conditions = dae.to_reduced(column([*(one.condition for one in dae.flat.whens), *left])).elements()
+    whens, past = [one.condition for one in dae.flat.whens], [one.expression for one in dae.flat.delays]
+    conditions = dae.to_reduced(column([*whens, *left, *past])).elements()
     rows = [*residuals.values(), *known.values(), *conditions]
     steady = set(dae.table.independent)
     names = {leaf.name() for leaf in ca.symvar(ca.vertcat(*rows))} - steady if rows else set()

@@ -30,7 +30,7 @@ class Made:
 class Rounds:
     """The whens of a model. places: of the states that they set, in x; of: of the switches in each condition.
 
-    left: which of its ranges are left.
+    left: which of its ranges are left; past: what is delayed, in the arguments of the functions.
     """
 
     whens: tuple[When, ...]
@@ -38,6 +38,7 @@ class Rounds:
     of: tuple[tuple[int, ...], ...]
     conditions: ca.Function
     left: ca.Function
+    past: ca.SX
     jump: ca.Function
 
     def holding(self, point: Point) -> np.ndarray:
@@ -67,8 +68,8 @@ def rounds_of(
 ) -> Rounds:
     """The whens in the symbols of a simulation.
 
-    conditions: of whens, then of ranges that are left, with modes; substitutions: one after another, from
-    reduced symbols to the arguments, x, z, time, t0, w.
+    conditions: of whens, then of ranges that are left, then what is delayed, with modes; substitutions: one
+    after another, from reduced symbols to the arguments, x, z, time, t0, w.
     """
     jump = one_round(dae.flat)
     names, values = [n for n, _ in jump.states], _of_roots(dae, jump)
@@ -79,13 +80,16 @@ def rounds_of(
     roots = [dae.reduced.aliases[n] for n in names]
     rose = [jump.rose] if dae.flat.whens else [ca.SX.sym("rose", 0)]
     made = [ca.densify(e) for e in (acts, discretes, new)]
-    conditions, left = ca.vertsplit(conditions, [0, len(dae.flat.whens), conditions.numel()])
+    first = len(dae.flat.whens)
+    parts = [0, first, first + len(dae.flat.ranges), conditions.numel()]
+    conditions, left, past = ca.vertsplit(conditions, parts)
     return Rounds(
         dae.flat.whens,
         np.array([states.index(a.symbol) for a in roots], dtype=int),
         _switches_of(conditions, switches),
         ca.Function("conditions", list(arguments), [ca.densify(conditions)], {"cse": True}),
         ca.Function("left", list(arguments), [ca.densify(left)], {"cse": True}),
+        past,
         ca.Function("jump", [*arguments, *rose], made, {"cse": True}),
     )
 

@@ -39,7 +39,7 @@ class Sampler:
     def suits(self) -> bool:
         """Whether the model is of a kind that can go this way: what it samples, without algebraic unknowns and whens."""
         c = self.coordinates
-        if not c.held or c.algebraics or not c.states or c.rounds.whens:
+        if not c.held or c.algebraics or not c.states or c.rounds.whens or c.dae.flat.delays:
             return False
         switches, half = c.switches, 2 * len(c.sampled)
         timed = ca.vertcat(

@@ -1,0 +1,1 @@
+"""What a simulation remembers of its motion, for delays."""
