@@ -1,5 +1,6 @@
 """What transfer functions in s and in z have in common: two polynomials."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from gantrytau import Parameter, Real, require
@@ -26,5 +27,5 @@ class Rational(Block):
             )
         return [0.0] * (len(a) - len(b)) + b, a
 
-    def equations(self):
+    def equations(self) -> Iterator[Any]:
         yield require(self.denominator[0] != 0, "expected a denominator that does not begin with zero")

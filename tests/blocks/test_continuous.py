@@ -1,12 +1,15 @@
 """Integrators, lags and transfer functions against closed forms and SciPy, in time and in frequency."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy import signal
+import scipy.signal
 
 from gantrytau import Fixed, Input, Model, ModelError, connect, cos, linearize, simulate
 from gantrytau.blocks import Derivative, FirstOrder, Integrator, TransferFunction
 
+signal: Any = scipy.signal  # most of it is made at run time, out of sight of type checkers
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
 

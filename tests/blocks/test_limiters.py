@@ -1,5 +1,7 @@
 """What bounds or bends a signal, against the integral in closed form of what comes out."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -49,7 +51,7 @@ def test_limits_may_be_equal_and_may_not_be_crossed():
 
 
 def test_what_a_dead_zone_and_a_limiter_pass_is_the_signal_together():
-    limits = dict(lower=-0.3, upper=0.7)
+    limits: dict[str, Any] = dict(lower=-0.3, upper=0.7)
     zone, limiter = translate(DeadZone(**limits)), translate(Limiter(**limits))
     for u in (-2.0, -0.3, 0.0, 0.7, 0.9):
         passed = [one.evaluate({"u": u})["y"] for one in (zone, limiter)]
@@ -90,11 +92,12 @@ def test_a_rate_limiter_begins_at_its_input_and_lags_behind_slow_ones():
 
 
 def test_wrong_rates():
-    for settings, words in (
+    wrongs: list[tuple[dict[str, Any], str]] = [
         (dict(T=0.0), "expected a time constant T above zero"),
         (dict(falling=1.0), r"falling: value is 1, expected at most 0"),
         (dict(rising=-1.0, falling=-1.0), r"rising: value is -1, expected at least 0"),
-    ):
+    ]
+    for settings, words in wrongs:
         with pytest.raises(ModelError, match=words):
             translate(RateLimiter(**settings))
 

@@ -1,8 +1,10 @@
 """Sampled blocks are those of scipy.signal at every instant, and hold in between."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy import signal
+import scipy.signal
 
 from gantrytau import (
     Fixed,
@@ -31,6 +33,7 @@ from gantrytau.blocks import (
 )
 from gantrytau.electrical import Ground, Inductor, Resistor, VoltageSource
 
+signal: Any = scipy.signal  # most of it is made at run time, out of sight of type checkers
 PERIOD = 0.02
 ROUNDING = 1e-12
 
