@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Input, Model, Parameter, Real, Result, Samples, der, sampled, simulate, translate
-from gantrytau.dae import Dae
+from gantrytau import Input, Model, Parameter, Real, Samples, der, sampled, simulate, translate
 from gantrytau_fmu import export_fmu
 from gantrytau_models import prototypes
 from gantrytau_models.control.tracking import ControlledRobot
@@ -56,6 +55,7 @@ def _beside_fmu(
 ) -> Iterator[Row]:
     dae = translate(model, events=True)
     start = [dae.start[name] for name in inputs]
+    given = courses(inputs, start)
     with tempfile.TemporaryDirectory() as folder:
         stepped = Stepped(
             export_fmu(model, Path(folder) / "model.fmu", tolerance=TOLERANCE), inputs, outputs, start
@@ -63,7 +63,7 @@ def _beside_fmu(
         ends: dict[str, Any] = {}
 
         def simulated() -> None:
-            ends["simulate"] = courses(dae, inputs, start, outputs)
+            ends["simulate"] = simulate(dae, stop=STOP, inputs=given, tolerance=TOLERANCE, outputs=outputs)
 
         def by_fmu() -> None:
             ends["fmu"] = stepped.run()
@@ -78,16 +78,15 @@ def _beside_fmu(
     yield at_most(f"{title}, the ends of the two apart, in tolerances", apart / TOLERANCE, 100.0)
 
 
-def courses(dae: Dae, inputs: list[str], start: list[float], outputs: list[str] | None = None) -> Result:
-    """The model with its inputs on sines of 1, 2 and 3 rad/s from rest, held from sample to sample as those of an FMU."""
+def courses(inputs: list[str], start: list[float]) -> dict[str, Samples]:
+    """The inputs, held from sample to sample as those of an FMU."""
     t = np.arange(SAMPLES + 1) * PERIOD
     values = np.array([wanted(start, at) for at in t])
-    given = {n: Samples(t, values[:, k], kind="constant") for k, n in enumerate(inputs)}
-    return simulate(dae, stop=STOP, inputs=given, tolerance=TOLERANCE, outputs=outputs)
+    return {n: Samples(t, values[:, k], kind="constant") for k, n in enumerate(inputs)}
 
 
 def wanted(start: list[float], t: float) -> list[float]:
-    """Inputs at a time in s."""
+    """Inputs at a time in s, on sines of 1, 2 and 3 rad/s from rest."""
     return [first + 0.03 * (1 - np.cos((k + 1) * t)) for k, first in enumerate(start)]
 
 

@@ -1,6 +1,7 @@
 """Hundreds of passages in one call, from and to memory of NumPy."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,8 @@ from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.compiled import compiled
 from gantrytau.simulation.sampling.passage import Passage, passage
 
-CALLS = (1, 8, 64, 512)  # passages in one call
+CALLS = (1, 8, 64, 512, 4096)  # passages in one call
+LONGEST_CALL = 40_000_000  # instructions: some tenths of a second, for which Ctrl-C has to wait
 WORTH = 10_000  # passages of a model: for so many a compiler is asked, which takes as long as these
 
 
@@ -59,6 +61,11 @@ class Passages:
     def one(self) -> Passage:
         """A single one."""
         return self.coordinates.kept("passage", lambda: passage(self.coordinates))
+
+    @cached_property
+    def calls(self) -> tuple[int, ...]:
+        """How many there may be in one call."""
+        return tuple(k for k in CALLS if k == 1 or k * self.one.instructions <= LONGEST_CALL)
 
     def steps(self, first: np.ndarray, told: np.ndarray, size: int, expected: float) -> StepsTaken:
         """As of `Buffer`, in a call of `size`; expected: how many are left of the run."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import casadi as ca
 
-FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")  # no sum is rounded otherwise than by CasADi
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")  # no sum is rounded otherwise than by CasADi
 MOST = 60.0  # s, for the compiler
 
 

@@ -7,7 +7,7 @@ import casadi as ca
 
 from gantrytau.language.symbols import time
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.sampling.runge_kutta import one_step
+from gantrytau.simulation.sampling.runge_kutta import TIMES, one_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,10 +17,11 @@ class Passage:
     y: states, what is held, modes; u: time and step, s, the start of the interval in which the step lies, which held
     variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
     estimates of the error of the states, divided by the step.
-    by_held: modes that follow from what is held, so that they change at instants only.
+    instructions: of the rates of its stages; by_held: modes that follow from what is held, which change at instants only.
     """
 
     function: ca.Function
+    instructions: int
     by_held: tuple[int, ...]
 
 
@@ -40,7 +41,8 @@ def passage(coordinates: Coordinates) -> Passage:
     renewal = _renewal(coordinates, by_held)(far, t + h, ca.vertcat(later, own), due)
     y = ca.vertcat(x, own)
     u = ca.vertcat(t, h, begin, due, inputs, later)
-    return Passage(ca.Function("passage", [y, u], [ca.vertcat(far, renewal), e3, e5]), by_held)
+    function = ca.Function("passage", [y, u], [ca.vertcat(far, renewal), e3, e5])
+    return Passage(function, len(TIMES) * rates.n_instructions(), by_held)
 
 
 def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:

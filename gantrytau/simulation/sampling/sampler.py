@@ -10,11 +10,12 @@ from gantrytau.errors import SolveError
 from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.sampling.buffers import CALLS, Passages, StepsTaken
+from gantrytau.simulation.sampling.buffers import Passages, StepsTaken
 from gantrytau.simulation.sampling.runge_kutta import ORDER
 from gantrytau.simulation.trail import Trail
 
 MOST = 256  # steps from place to place: with more, an implicit method is quicker, though it starts anew
+FIRST = 8  # passages in a first call, and times more in the next
 SAFETY = 0.9  # of the step that the last error suggests
 SHRINK, GROW = 0.2, 5.0  # of a step, at once
 TRIALS = 12  # of one step
@@ -31,7 +32,7 @@ class Sampler:
         self.coordinates, self.tolerance, self.sizes = coordinates, tolerance, sizes
         self.longest = np.inf if longest is None else longest
         self.step = np.inf  # s, that the last errors allow
-        self.most = CALLS[1]  # passages in the next call
+        self.most = FIRST  # passages in the next call
         self.wait = self.waited = 0  # asked in vain, times, before and since the last trial
         self.passages = Passages(coordinates)
 
@@ -68,7 +69,7 @@ class Sampler:
                 return reached
             if trail.t[here + 1] - trail.t[here] > MOST * min(self.step, longest):
                 break
-        self.step, self.most = np.inf, CALLS[1]
+        self.step, self.most = np.inf, FIRST
         self.wait, self.waited = min(max(1, 2 * self.wait), LONGEST_WAIT), 0
         return 0
 
@@ -108,7 +109,8 @@ class Sampler:
         parts[0] = max(parts[0], 1)
         ends = np.cumsum(parts)
         wanted = max(min(int(ends[-1]), self.most), int(parts[0]))
-        sizes = [k for k in CALLS if parts[0] <= k <= wanted] or [k for k in CALLS if k >= wanted][:1]
+        calls = self.passages.calls
+        sizes = [k for k in calls if parts[0] <= k <= wanted] or [k for k in calls if k >= wanted][:1]
         if not sizes:
             return 0, False
         size = sizes[-1]
@@ -128,7 +130,7 @@ class Sampler:
         trail.x[filled], trail.held[filled] = found.after[rows, :n], found.after[rows, n:]
         before = np.append(parts[1:] == 0, False)[:reached]
         trail.held[filled[before]] = found.before[rows[before], n:]
-        self.most = min(size * 8, CALLS[-1]) if reached == count else max(CALLS[0], size // 8)
+        self.most = min(size * FIRST, calls[-1]) if reached == count else max(1, size // FIRST)
         return reached, turn is not None
 
     def _told(self, trail: Trail, places: np.ndarray, parts: np.ndarray) -> np.ndarray:
