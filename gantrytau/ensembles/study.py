@@ -1,6 +1,7 @@
 """`study`: a model or a function for many values and seeds, on all processors or on a cluster."""
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, Unpack
@@ -71,9 +72,9 @@ def _finished(
         with Progress(0, len(cases), f"{title}: {len(cases)} cases") as progress:
             progress.at(len(found))
             for outcome in outcomes(task, left, place, safe=isinstance(task, ModelTask)):
+                found[outcome.number] = outcome
                 if kept is not None:
                     kept.keep(outcome)
-                found[outcome.number] = outcome
                 progress.at(len(found))
     except KeyboardInterrupt as error:
         rest = "; the same call goes on with the rest" if kept else "; with folder= they would be kept"
@@ -81,4 +82,7 @@ def _finished(
             f"{title}: study interrupted, {len(found)} of {len(cases)} cases are finished, which .result holds{rest}",
             result=Study(title, axes, cases, found),
         ) from error
+    for number, outcome in sorted(found.items()):
+        for category, words in outcome.told:
+            warnings.warn(f"{cases[number]}: {words}", category, stacklevel=3)
     return Study(title, axes, cases, found)

@@ -128,7 +128,6 @@ class Study:
                 )
         if len(left) > 1:
             missing = [n for n in names if n not in chosen]
-            raise ModelError(
-                f"{self.title}: {len(left)} cases have these values; say {', '.join(missing)} too"
-            )
+            more = f"say {', '.join(missing)} too" if missing else "they are in .cases and .values"
+            raise ModelError(f"{self.title}: {len(left)} cases have these values; {more}")
         return next(iter(left))

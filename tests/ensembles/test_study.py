@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import (
+    DoubtfulResult,
     Input,
     Model,
     ModelError,
@@ -246,3 +247,30 @@ def test_workers_have_one_thread_and_a_study_within_a_case_starts_no_others():
         assert process != os.getpid()
         assert threads == "1"
         assert values == ((process, a), (process, 2 * a))
+
+
+class Rooted(Model):
+    """The root of a level that falls below zero."""
+
+    h = Real(unit="1", start=1.0, fixed=True, description="level")
+    root = Real(unit="1", description="root of the level")
+    rate = Parameter(1.0, unit="1/s", description="fall of the level")
+
+    def equations(self):
+        yield der(self.h) == -self.rate
+        yield self.root == self.h**0.5
+
+
+@pytest.mark.parametrize("begin", [-1.0, 3.0], ids=["processes", "here"])
+def test_what_is_doubtful_is_told_wherever_it_was_computed(begin, monkeypatch):
+    monkeypatch.setattr(places, "BEGIN", begin)
+    with pytest.warns(DoubtfulResult, match=r"^rate=2: Rooted: root is not finite from t = 0\.5"):
+        found = study(Rooted(), stop=0.9, over={"rate": [1.0, 2.0]})
+    assert not found.failures
+
+
+def test_values_that_are_given_twice_are_told_apart_by_their_place():
+    found = study(lambda a: a, over={"a": [1, 1]})
+    assert found.values == (1, 1)
+    with pytest.raises(ModelError, match=r"2 cases have these values; they are in \.cases and \.values"):
+        found.result(a=1)

@@ -27,24 +27,34 @@ PATIENCE = 20.0  # s, in which a scheduler answers, and has workers
 def on_cluster(task: Task, cases: Sequence[Case], where: str) -> Iterator[Outcome]:
     """Outcomes of cases as they are finished; where: "dask" or the address of a scheduler."""
     with _client(where) as client:
-        from dask.distributed import KilledWorker, as_completed
-
         parcel = Parcel.of(task)
-        sent = client.submit(_passed_on, parcel, pure=False)
-        futures = {client.submit(_case, sent, pack(case), pure=False): case for case in cases}
-        try:
-            for future in as_completed(list(futures), raise_errors=False):
-                case = futures.pop(future)
-                try:
-                    yield unpack(future.result())
-                except KilledWorker:
-                    words = (
-                        "the workers that had it died, one after the other: killed, out of memory, or crashed"
-                    )
-                    yield Outcome(case.number, error=words, kind=LOST)
-                future.release()
-        finally:
-            client.cancel(list(futures))
+        sent, doubtful = client.submit(_passed_on, parcel, pure=False), list[Case]()
+        yield from _gathered(client, sent, cases, doubtful)
+        for case in doubtful:  # their workers died, but it may have been for another case
+            lost: list[Case] = []
+            yield from _gathered(client, sent, [case], lost)
+            if lost:
+                words = "the workers that had it died, one after the other: killed, out of memory, or crashed"
+                yield Outcome(case.number, error=words, kind=LOST)
+
+
+def _gathered(client: Any, sent: Any, cases: Sequence[Case], lost: list[Case]) -> Iterator[Outcome]:
+    """Outcomes as they come; cases that are given up are added to `lost`."""
+    from dask.distributed import KilledWorker, as_completed
+
+    futures = {client.submit(_case, sent, pack(case), pure=False): case for case in cases}
+    try:
+        for future in as_completed(list(futures), raise_errors=False):
+            case = futures.pop(future)
+            try:
+                outcome = unpack(future.result())
+            except KilledWorker:
+                lost.append(case)
+                continue
+            future.release()
+            yield outcome
+    finally:
+        client.cancel(list(futures))
 
 
 def _passed_on(parcel: Parcel) -> Parcel:

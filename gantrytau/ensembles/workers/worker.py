@@ -7,17 +7,20 @@ study that is called within a case itself, so that processes do not multiply.
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.digests import digest
 from gantrytau.ensembles.workers.parcels import pack, unpack
+from gantrytau.errors import DoubtfulResult
 from gantrytau.progress import silent
 
 Task = Callable[[Case], Any]
+Told = tuple[type[Warning], str]  # a warning
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 LOST = "WorkerDied"  # the kind of failure of a case that ends its process
 
@@ -29,12 +32,13 @@ _turn = threading.Lock()  # CasADi builds expressions in one thread of a process
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of a case: its value, or the words and the class of its error."""
+    """What came of a case: its value, or the words and the class of its error; and warnings on the way."""
 
     number: int
     value: Any = None
     error: str = ""
     kind: str = ""
+    told: tuple[Told, ...] = ()
 
     @property
     def good(self) -> bool:
@@ -74,13 +78,17 @@ def within_a_case() -> bool:
 
 def computed(task: Task, case: Case) -> Outcome:
     """The outcome of one case in this process; an error is an outcome, Ctrl-C is not."""
-    try:
-        with silent():
-            return Outcome(case.number, task(case))
-    except Exception as error:
-        if getattr(error, "interrupted", False):
-            raise KeyboardInterrupt from error
-        return Outcome(case.number, error=str(error) or type(error).__name__, kind=type(error).__name__)
+    with silent(), warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always", DoubtfulResult)
+        try:
+            found = Outcome(case.number, task(case))
+        except Exception as error:
+            if getattr(error, "interrupted", False):
+                raise KeyboardInterrupt from error
+            words = str(error) or type(error).__name__
+            found = Outcome(case.number, error=words, kind=type(error).__name__)
+    told = dict.fromkeys((warning.category, str(warning.message)) for warning in heard)
+    return replace(found, told=tuple(told))
 
 
 def receive(parcel: Parcel) -> None:

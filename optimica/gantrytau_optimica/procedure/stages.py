@@ -4,48 +4,26 @@ A stage is a frozen record; it is written whole or not at all, with a digest of 
 another digest, or not readable, it is made anew.
 """
 
-import hashlib
 import json
 import zipfile
-from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from gantrytau.ensembles import digests
 from gantrytau.whole_files import replacing
 
 Record = TypeVar("Record")
-VERSION = "3"  # of what the stages compute; another one makes all anew
+VERSION = "4"  # of what the stages compute; another one makes all anew
 Progress = Callable[[str, int, int], None]
 
 
 def digest(*things: Any) -> str:
     """One number for arrays, records, numbers and words, alike for alike ones on every run."""
-    found = hashlib.sha256()
-    _feed(found, (VERSION, things))
-    return found.hexdigest()
-
-
-def _feed(found: Any, thing: Any) -> None:
-    if isinstance(thing, np.ndarray) and thing.dtype != object:
-        found.update(f"array {thing.dtype.str} {thing.shape};".encode())
-        found.update(np.ascontiguousarray(thing).tobytes())
-    elif isinstance(thing, (list, tuple, np.ndarray)):
-        found.update(f"sequence {len(thing)};".encode())
-        for each in thing:
-            _feed(found, each)
-    elif isinstance(thing, Mapping):
-        _feed(found, [[name, thing[name]] for name in sorted(thing)])
-    elif is_dataclass(thing) and not isinstance(thing, type):
-        found.update(f"{type(thing).__qualname__};".encode())
-        _feed(found, [[field.name, getattr(thing, field.name)] for field in fields(thing)])
-    elif hasattr(thing, "__dict__") and not isinstance(thing, type):  # an obstacle of the user's own
-        found.update(f"{type(thing).__qualname__};".encode())
-        _feed(found, vars(thing))
-    else:
-        found.update(f"{type(thing).__name__} {thing!r};".encode())
+    return digests.digest(VERSION, things)
 
 
 class Stages:
