@@ -121,5 +121,6 @@ def refuse_sticking(flat: FlatModel) -> None:
     for event in flat.frictions:
         raise ModelError(
             f"{event.label}: found friction that sticks, whose equations change at instants, expected equations that "
-            "stay. Export the model as an FMU (gantrytau_fmu.export_fmu), or take a smooth friction, TanhFriction"
+            "stay. simulate and FMUs let it stick; optimisation, linearisation and extraction cannot: take a smooth "
+            "friction there, TanhFriction. translate(..., events=True) takes its force as known"
         )

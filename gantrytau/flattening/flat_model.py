@@ -163,9 +163,10 @@ class FlatModel:
     them; rates: time derivatives of some of them; loops: of rigid parts and joints; inputs: names of the
     scalars known from outside; absent: declared names that this model has no use for, and why;
     requirements: conditions on parameters; sampled, discretes, frictions: scalars that are set at instants, no unknowns
-    either, discretes by `whens`; before: symbols of the values of discretes just before an instant, by their names;
-    modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from
-    the past; ranges: where tables end that are not defined beyond;
+    either, discretes by `whens`; slips: frictions whose forces are unknowns and whose modes are the last of the discretes,
+    as simulations have them; before: symbols of the values of discretes just before an instant, by their names;
+    modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from the past;
+    ranges: where tables end that are not defined beyond;
     rods: what a robot says of its links, by name.
     """
 
@@ -185,6 +186,7 @@ class FlatModel:
     requirements: tuple[Requirement, ...]
     sampled: tuple[Sampled, ...] = ()
     frictions: tuple[StickSlip, ...] = ()
+    slips: tuple[StickSlip, ...] = ()
     whens: tuple[When, ...] = ()
     discretes: tuple[str, ...] = ()
     before: Mapping[str, ca.SX] = field(default_factory=dict)

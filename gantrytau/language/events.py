@@ -136,7 +136,7 @@ def delay(x: Any, T: Any) -> ca.SX:
 
 
 def stick_slip(force: Any, speed: Any, *, coulomb: Any, smooth: Any, breakaway: Any) -> Sticking:
-    """State friction that sticks exactly; only an FMU runs it, as its equations change at instants.
+    """State friction that sticks exactly, in `simulate` and FMUs: its equations change at instants, which they locate.
 
     force: a declared Real for which there is no other equation, positive against positive speed; speed: a
     declared variable. In motion force == coulomb + smooth, or -coulomb + smooth where the speed is negative; at

@@ -243,7 +243,7 @@ class DahlFriction(Friction):
 
 
 class StickSlipFriction(Friction):
-    """Coulomb and viscous friction that sticks exactly, up to a breakaway torque; for FMUs, which have events."""
+    """Coulomb and viscous friction that sticks exactly, up to a breakaway torque, in `simulate` and FMUs."""
 
     tau_c = Parameter(0.0, unit="N.m", min=0.0, description="Coulomb friction")
     tau_v = Parameter(0.0, unit="N.m.s/rad", min=0.0, description="viscous friction")

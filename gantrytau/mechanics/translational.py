@@ -221,7 +221,7 @@ class DahlFriction(Friction):
 
 
 class StickSlipFriction(Friction):
-    """Coulomb and viscous friction that sticks exactly, up to a breakaway force; for FMUs, which have events."""
+    """Coulomb and viscous friction that sticks exactly, up to a breakaway force, in `simulate` and FMUs."""
 
     f_c = Parameter(0.0, unit="N", min=0.0, description="Coulomb friction")
     f_v = Parameter(0.0, unit="kg/s", min=0.0, description="viscous friction")

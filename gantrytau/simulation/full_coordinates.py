@@ -18,9 +18,10 @@ from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
+from gantrytau.simulation.events.sticking import Slips, slips_of
 from gantrytau.simulation.memory.hermite import ORDER
 from gantrytau.simulation.memory.rates_along import RatesAlong
-from gantrytau.simulation.singular_poses import Conditioning, Point
+from gantrytau.simulation.singular_poses import Conditioning, Point, depending
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
@@ -29,7 +30,6 @@ STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink ar
 ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
 OPEN = 1e-6  # of the size of a loop, by which a constraint that was left out may be violated
-LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +247,18 @@ class Coordinates:
         return []
 
     @property
+    def slips(self) -> Slips:
+        """The frictions that may stick."""
+        return self.kept("slips", self._made_slips)
+
+    def _made_slips(self) -> Slips:
+        constraints = self.invariants[-1] if self.invariants else ca.SX(0, 1)
+        arguments = [self.x, self.z, time, self.t0, self.w]
+        return slips_of(
+            self.dae, self.inserted, arguments, constraints, 2 * len(self.sampled) + len(self.held)
+        )
+
+    @property
     def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
         return self.kept("levels", self._made_levels)
 
@@ -269,7 +281,8 @@ class Coordinates:
         return found
 
     def project(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The nearest points that satisfy all constraints, (points, n); SolveError where there is none near.
+        """The nearest points that satisfy all constraints, (points, n), with what sticks at rest; SolveError where there is
+        none near.
 
         x: (points, n); t: (points,); w: (points, m).
         """
@@ -293,7 +306,7 @@ class Coordinates:
                 raise SolveError(
                     f"{self.dae.name}: the constraints cannot be met at t = {when:.6g} s", time=when
                 )
-        return x
+        return self.slips.held(x, t, w) if self.dae.flat.slips else x
 
     def followed(self, x: np.ndarray, t: float, w: np.ndarray) -> np.ndarray:
         """A point, (n,), at which the states of the model are those of x, and what follows from them by constraints is such
@@ -360,14 +373,14 @@ class Coordinates:
         """
         for _, level, names in self._levels:
             here, before = (np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start))
-            found = _dependent(here, before, names)
+            found = depending(here, before, names)
             if found:
                 return found
         if self.pivots.numel() == 0:
             return []
         function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
-        return _dependent(here, before, [e.name for e in self.dae.reduced.equations])
+        return depending(here, before, [e.name for e in self.dae.reduced.equations])
 
 
 def _shortest(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -379,16 +392,3 @@ def _shortest(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     except np.linalg.LinAlgError:
         pairs = zip(jacobian, residual, strict=True)
         return np.array([np.linalg.lstsq(j, r, rcond=1e-12)[0] for j, r in pairs])
-
-
-def _dependent(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> list[str]:
-    """Rows of a matrix that nearly depend on each other here, while before they did not."""
-    if not (here.size and np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
-        return []
-    rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
-    columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
-    left, values, _ = np.linalg.svd(here / rows / columns)
-    if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
-        return []
-    shares = np.abs(left[:, len(values) - 1])
-    return [names[int(i)] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]

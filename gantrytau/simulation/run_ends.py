@@ -92,7 +92,7 @@ def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveErr
     return SolveError(
         f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} {turn} back and forth without end: what holds on either "
         "side leads back to the other. Smooth it, as tanh(x / small) for sign(x), or let it keep its side within a band; "
-        "friction that sticks is stick_slip, in an FMU; .result holds the motion up to there",
+        "friction that sticks is stick_slip; .result holds the motion up to there",
         time=t,
         equations=[],
     )
@@ -114,7 +114,7 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
     return SolveError(
         f"{dae.name}: at t = {t:.6g} s no side of {' and '.join(conditions)} agrees with what follows from it: the "
         "equations have no solution there, or the motion would slide along the switch. Smooth it, as tanh(x / small) "
-        "for sign(x), or change what jumps; friction that sticks is stick_slip, in an FMU; .result holds the motion up to "
+        "for sign(x), or change what jumps; friction that sticks is stick_slip; .result holds the motion up to "
         "there",
         time=t,
         equations=[],

@@ -17,10 +17,10 @@ from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import DoubtfulResult, ModelError, SolveError
-from gantrytau.flattening.flat_checks import refuse_sticking
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
+from gantrytau.simulation.events.sticking import with_modes
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
@@ -70,8 +70,7 @@ def simulate(
     that are not finite although the states are.
     """
     _check(start, stop, tolerance, points, max_step)
-    dae = model if isinstance(model, Translated) else translate_model(model)
-    refuse_sticking(dae.flat)
+    dae = with_modes(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
     wanted = names(outputs or ())

@@ -24,6 +24,7 @@ from gantrytau.errors import SolveError
 from gantrytau.simulation.events.at_places import at_places
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
+LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
 SOUND = 0.01  # smallest singular value of a scaled matrix that is taken as a measure at least
 LEAST = 1e-6  # the same of the equations of accelerations and forces
 FORESIGHT = 1.5  # intervals over which a fall of the distance is led on: it may become steeper
@@ -203,3 +204,16 @@ def approach(
         point, distance, fall, size = there, distance + change, -change / size, 2 * size
     wait = distance / fall if fall > 0 else np.inf
     return Approach(point, distance, point[2] + (wait if wait < length else 0.0), arrived, met)
+
+
+def depending(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> list[str]:
+    """Rows of a matrix that nearly depend on each other here, while before they did not."""
+    if not (here.size and np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
+        return []
+    rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
+    columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
+    left, values, _ = np.linalg.svd(here / rows / columns)
+    if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
+        return []
+    shares = np.abs(left[:, len(values) - 1])
+    return [names[int(i)] for i in np.argsort(-shares)[:6] if shares[i] > 0.1 * np.max(shares)]

@@ -14,6 +14,7 @@ from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import JUST_BEHIND
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.rounds import MOST, Made
+from gantrytau.simulation.events.sticking import HOLDS, WHENS
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.singular_poses import Point
@@ -75,8 +76,20 @@ class Changes:
         trail.x[0], trail.z[0], own = self.coordinates.start(trail.t[0], trail.inputs(0))
         trail.held[0, trail.held.shape[1] - own.size :] = own
         self._holding[:] = [not one.initially for one in self.coordinates.rounds.whens]
+        if self.coordinates.dae.flat.slips:
+            self._begin_sliding()
         self.renew(0)
         return self.turn(0)
+
+    def _begin_sliding(self) -> None:
+        """Let frictions slide where there is a speed at the start, and break away where they cannot hold."""
+        slips, trail = self.coordinates.slips, self.trail
+        own = self._slip_modes(0)
+        self._holding[slips.first :] = False  # what is sampled at the start may push more
+        trail.held[0, own] = slips.sliding(trail.x[0], float(trail.t[0]), trail.inputs(0), self.sizes)
+        self._break_away(0, trail.held[0, own] == 0, trail.held[0, own].copy())
+        trail.x[0] = slips.held(trail.x[:1], trail.t[:1], trail.inputs(0)[None])[0]
+        trail.z[0] = self._settled(0)
 
     def renew(self, k: int) -> None:
         """Give new values to what is sampled at a place, all from the values just before."""
@@ -144,6 +157,9 @@ class Changes:
             rose, self._holding = now & ~self._holding, now
             if not rose.any() or self.ended:
                 return k
+            if self.coordinates.dae.flat.slips:
+                waits = self.coordinates.slips.postponed(rose, self.point(k))
+                rose, self._holding = rose & ~waits, now & ~waits
             made = rounds.made(self.point(k), rose)
             failing = next(
                 (one for one, acts in zip(rounds.whens, made.acts, strict=True) if acts and one.failure), None
@@ -166,6 +182,7 @@ class Changes:
         coordinates, trail = self.coordinates, self.trail
         t, held = float(trail.t[k]), len(coordinates.held)
         before = self.margins(np.array([k])) if len(coordinates.switches) else None
+        first = trail.held[k].copy()
         trail.held[k, held : held + len(coordinates.discretes)] = made.discretes
         if coordinates.rounds.places.size:
             trail.x[k, coordinates.rounds.places] = made.states
@@ -173,10 +190,13 @@ class Changes:
                 trail.x[k] = coordinates.followed(trail.x[k], t, trail.inputs(k))
             except SolveError as error:
                 raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
+        if coordinates.dae.flat.slips:
+            self._lock(k, first)
         trail.z[k] = self._settled(k)
         if before is not None:
             after = self.margins(np.array([k]))
-            self._watch_hops(made.acts != 0, t, before, after)
+            own = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
+            self._watch_hops((made.acts != 0) & own, t, before, after)
             errors = _location_errors(before, after, t, coordinates.switches.whole(before.values))
             modes = coordinates.switches.following(after.blurred(errors))
             if not np.array_equal(modes, self.modes(k)):
@@ -186,6 +206,33 @@ class Changes:
             for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
             if acts and one.message
         )
+
+    def _lock(self, k: int, first: np.ndarray) -> None:
+        """Hold what has come to rest, but what breaks away again at once: that turns back; first: what was held before."""
+        slips, trail, own = self.coordinates.slips, self.trail, self._slip_modes(k)
+        self._break_away(k, (first[own] != 0) & (trail.held[k, own] == 0), first[own])
+        trail.x[k] = slips.held(trail.x[[k]], trail.t[[k]], trail.inputs(k)[None])[0]
+
+    def _break_away(self, k: int, stuck: np.ndarray, before: np.ndarray) -> None:
+        """Let those of some frictions slide that cannot hold, the worst first; before: their modes, if they have slid."""
+        trail, own = self.trail, self._slip_modes(k)
+        while stuck.any():
+            trail.z[k] = self._settled(k)
+            loads = self.coordinates.slips.loaded(self.point(k))
+            size = np.where(np.isfinite(loads), np.abs(loads), np.inf) * stuck
+            worst = int(np.argmax(size))
+            if not size[worst] > HOLDS:
+                return
+            stuck[worst] = False
+            # where no force of it stops the motion, that goes on as it came
+            ways = np.where(np.isfinite(loads), np.sign(loads), -before)
+            trail.held[k, own.start + worst] = ways[worst]
+
+    def _slip_modes(self, k: int) -> slice:
+        """Where the modes of frictions stand in what is held at a place."""
+        slips = self.coordinates.slips
+        ahead = self.trail.held.shape[1] - self.trail.inputs(k).size
+        return slice(slips.modes.start + ahead, slips.modes.stop + ahead)
 
     def _labels(self, chosen: np.ndarray) -> list[str]:
         return [one.label for one, some in zip(self.coordinates.rounds.whens, chosen, strict=True) if some]

@@ -1,0 +1,77 @@
+"""Stick-slip motions pieced together from solutions of the linear equations, and the models they are of."""
+
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from gantrytau import Fixed, Model, Parameter, connect, sin, time
+from gantrytau.mechanics import translational
+from gantrytau.mechanics.translational import StickSlipFriction
+
+M, C, COULOMB, BREAKAWAY = 2.0, 800.0, 6.0, 9.0
+
+
+class OnSpring(Model):
+    """A mass on a spring and on a floor, let go at 0.05 m."""
+
+    mass = translational.Mass(m=M, s=Fixed(0.05), v=Fixed(0.0))
+    spring = translational.Spring(c=C)
+    wall = translational.Fixed()
+    floor = StickSlipFriction(f_c=COULOMB, f_s=BREAKAWAY)
+
+    def equations(self):
+        yield connect(self.mass.flange, self.spring.flange_b)
+        yield connect(self.mass.flange, self.floor.flange)
+        yield connect(self.wall.flange, self.spring.flange_a)
+
+
+class Shaken(Model):
+    """A mass on a floor, pushed to and fro."""
+
+    amplitude = Parameter(10.0, unit="N", description="of the push")
+    w = Parameter(8.0, unit="rad/s", description="angular frequency of the push")
+    mass = translational.Mass(m=M, s=Fixed(0.0), v=Fixed(0.0))
+    push = translational.Force()
+    floor = StickSlipFriction(f_c=COULOMB, f_s=BREAKAWAY)
+
+    def equations(self):
+        yield connect(self.mass.flange, self.push.flange)
+        yield connect(self.mass.flange, self.floor.flange)
+        yield self.push.f == self.amplitude * sin(self.w * time)
+
+
+def on_spring(t: np.ndarray) -> np.ndarray:
+    """Half a period takes twice the friction over the stiffness off the amplitude, until the spring cannot pull it loose."""
+    turns, sign, half = [0.05], 1, np.pi / np.sqrt(C / M)
+    while C * abs(turns[-1]) > BREAKAWAY:
+        turns.append(2 * sign * COULOMB / C - turns[-1])
+        sign = -sign
+    found = np.full(t.shape, turns[-1])
+    for k, turn in enumerate(turns[:-1]):
+        inside = (t >= k * half) & (t < (k + 1) * half)
+        centre = (-1) ** k * COULOMB / C
+        found[inside] = centre + (turn - centre) * np.cos(np.pi * (t[inside] / half - k))
+    return found
+
+
+def shaken(t: np.ndarray, amplitude: float = 10.0, w: float = 8.0) -> np.ndarray:
+    """Sticks until the push breaks away, slides until the speed is zero, and so on to the other side."""
+    away, half = np.arcsin(BREAKAWAY / amplitude) / w, np.pi / w
+
+    def speed(now):
+        return (amplitude / w * (np.cos(w * away) - np.cos(w * now)) - COULOMB * (now - away)) / M
+
+    def way(now):
+        gone = now - away
+        swing = (np.sin(w * now) - np.sin(w * away)) / w
+        return (amplitude / w * (np.cos(w * away) * gone - swing) - COULOMB * gone**2 / 2) / M
+
+    rest: Any = brentq(speed, half / 2, half + away, xtol=1e-15)
+    assert rest < half + away  # it rests before it is pushed back
+    side, found, start = 1, np.zeros(t.shape), 0.0
+    for k in range(int(t[-1] / half) + 1):
+        gone = np.clip(t - k * half, away, rest)
+        found = np.where(t >= k * half + away, start + side * way(gone), found)
+        start, side = start + side * way(rest), -side
+    return found
