@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 LINES = 40  # of one axis, which are still seen one by one
 LABELS = 8  # of lines, that a legend still tells apart
-BANDS = ((5.0, 95.0), (25.0, 75.0))  # %
+BANDS = ((5.0, 95.0, 0.2), (25.0, 75.0, 0.4))  # %, and how dark they are
 
 
 def draw_fan(
@@ -77,9 +77,9 @@ def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
     """The median of all cases, and bands that hold half and nine tenths of those that have not ended."""
     times = common_times([result for _, result in cases])
     table = np.array([on_times(result, name, times) for _, result in cases])
-    for low, high in BANDS:
+    for low, high, alpha in BANDS:
         below, above = np.nanpercentile(table, (low, high), axis=0)
         axis.fill_between(
-            times, below, above, color="C0", alpha=0.25, linewidth=0, label=f"{high - low:.0f} %"
+            times, below, above, color="C0", alpha=alpha, linewidth=0, label=f"{high - low:.0f} %"
         )
     axis.plot(times, np.nanmedian(table, axis=0), color="C0", label="median")

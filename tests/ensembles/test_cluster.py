@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from typing import Any
@@ -92,3 +94,13 @@ def test_nobody_and_nobody_to_work_are_told(monkeypatch):
         words = rf"the scheduler at {empty.scheduler_address} has no workers; start some by `dask worker"
         with pytest.raises(ModelError, match=words):
             study(lambda x: x, over={"x": [1, 2]}, where=empty.scheduler_address)
+
+
+def test_a_script_that_its_workers_would_repeat_is_told_what_to_write(tmp_path):
+    script = tmp_path / "unguarded.py"
+    script.write_text("from gantrytau import study\nstudy(lambda a: a, over={'a': [1, 2]}, where='dask')\n")
+    found = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=240)
+    assert found.returncode != 0
+    assert found.stderr.splitlines()[-1].startswith(
+        "gantrytau.errors.GantryTauError: study: where='dask': found workers"
+    )

@@ -76,9 +76,15 @@ def _client(where: str) -> Iterator[Any]:
             "dask: not installed, but where='dask' and addresses need it; pip install 'gantrytau[cluster]'"
         ) from error
     if where == "dask":
-        local = LocalCluster(
-            n_workers=processors(), threads_per_worker=1, processes=True, dashboard_address=":0"
-        )
+        options = dict(threads_per_worker=1, processes=True, dashboard_address=":0")
+        try:
+            local = LocalCluster(n_workers=processors(), **options)
+        except RuntimeError as error:
+            raise GantryTauError(
+                "study: where='dask': found workers that did not start, expected a call that they do not repeat as they "
+                "import the script; write it under `if __name__ == '__main__':`, or take where='processes', which needs no "
+                "such line"
+            ) from error
         with local, Client(local) as client:
             yield client
         return
