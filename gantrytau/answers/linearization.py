@@ -24,7 +24,7 @@ from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
 from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
-from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking
+from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking, refuse_whens
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
@@ -106,12 +106,13 @@ def linearize(
     samples has one of its own, after which all its rates come together; its states are those just before an instant,
     of what moves and of what is held, its outputs those just after it.
     States that cannot be states at the point are replaced by others. Raises InitializationError if there is
-    no such point, StructureError if the equations are singular there, ModelError for unknown names and a period that
-    does not fit.
+    no such point, StructureError if the equations are singular there, ModelError for unknown names, a period that
+    does not fit, and a model with whens.
     """
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
     refuse_delays(dae.flat)
+    refuse_whens(dae.flat)
     if period is not None:
         check_period(f"linearize {dae.name}", period)
     if parameters:

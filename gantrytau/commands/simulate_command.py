@@ -109,6 +109,7 @@ def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> 
         "model": chosen.name,
         "prototype": chosen.prototype,
         "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},
+        "ended": result.ended,
         "states": dae.states,
         "final": {name: result.final(name) for name in result.names},
         "files": files,
@@ -125,7 +126,7 @@ def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
     time = summary["time"]
     typer.echo(
         f"{summary['model']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
-        f"{len(result.names)} variables"
+        f"{len(result.names)} variables" + ("" if result.ended == "stop" else f", ended: {result.ended}")
     )
     states = [name for name in dae.states if name in result]
     if states:

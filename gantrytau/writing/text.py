@@ -81,6 +81,15 @@ def event_lines(dae: Translated) -> list[str]:
             f"friction: {force} = {law}; at rest as {speed} = 0 needs, up to {breakaway}    # from {place}"
         )
         lines += where
+    for one in dae.flat.whens:
+        place, names = one.path or "the model", [n for n, _ in (*one.reinits, *one.assignments)]
+        values = [e for _, e in (*one.reinits, *one.assignments)]
+        (condition, *texts), where = _written_out(one.label, [one.condition, *values])
+        done = [f"{n} := {value}" for n, value in zip(names, texts, strict=True)]
+        done += [f"terminate: {one.message}"] if one.message else []
+        word = "when" if one.after < 0 else "elsewhen"
+        holds = condition.removeprefix("if ").removesuffix(" then 1 else 0")  # as a number it is written
+        lines += [f"{word} {holds}: {', '.join(done)}    # from {place}", *where]
     return lines
 
 
