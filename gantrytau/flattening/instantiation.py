@@ -11,7 +11,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate
-from gantrytau.language.events import CurrentMode, Mode
+from gantrytau.language.events import CurrentMode, Mode, mode_number
 from gantrytau.language.model import (
     Connector,
     Declared,
@@ -219,7 +219,12 @@ class _Builder:
         if isinstance(declaration, Mode):
             if "start" in attributes:
                 start = attributes["start"]
-                attributes["start"] = replace(start, value=declaration.number(start.value, full))
+                attributes["start"] = replace(start, value=mode_number(full, declaration.names, start.value))
+            if "value" in attributes:
+                raise ModelError(
+                    f"{full}: found the value {attributes['value'].value!r} for a Mode, which transitions change, expected "
+                    f"a start; write {name}=Start('{declaration.names[-1]}')"
+                )
             instance.__dict__[name] = CurrentMode(symbol, declaration.names, full)
         chosen = full in self.chosen or re.sub(r"\[\d+\]", "", full) in self.chosen
         self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names, chosen))

@@ -109,7 +109,7 @@ class Samples:
         if not fits(self.shape, shape):
             words = f"found {self.values.shape[1]} columns, expected {int(np.prod(shape))}"
             if len(shape) == 2:
-                words += f": samples of shape {self.shape} for a matrix {shape}; give values of shape (n, rows, columns)"
+                words = f"found samples of shape {self.shape}, expected {shape}; give values of shape (n, rows, columns)"
             raise ModelError(f"{place}: {words}")
 
     def check_cover(self, what: str, start: float, final: float) -> None:

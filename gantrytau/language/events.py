@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import Discrete
@@ -162,17 +163,16 @@ class Mode(Discrete):
         numbers = ", ".join(f"{k} {name}" for k, name in enumerate(names))
         super().__init__(0, unit="1", description=f"{description or 'mode'}: {numbers}")
         self.names = names
-        self.start = self.number(names[0] if start is None else start)
+        self.start = 0 if start is None else mode_number("Mode", names, start)
 
-    def number(self, start: Any, place: str = "Mode") -> Any:
-        """The number of a mode by its name; a number as it is. ModelError for what is neither."""
-        if isinstance(start, str):
-            return _number_of(place, self.names, start)
-        if isinstance(start, (int, float)) and start in range(len(self.names)):
-            return int(start)
-        raise ModelError(
-            f"{place}: found the start {start!r}, expected one of the modes {', '.join(self.names)}"
-        )
+
+def mode_number(place: str, names: Sequence[str], start: Any) -> int:
+    """The number of a mode by its name or as it is; ModelError for what is neither."""
+    if isinstance(start, str):
+        return _number_of(place, names, start)
+    if isinstance(start, (int, float, np.number)) and start in range(len(names)):
+        return int(start)
+    raise ModelError(f"{place}: found the start {start!r}, expected one of the modes {', '.join(names)}")
 
 
 class CurrentMode:

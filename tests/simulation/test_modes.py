@@ -22,6 +22,7 @@ from gantrytau import (
     simulate,
     time,
     transition,
+    translate,
 )
 
 TOLERANCE = 1e-10
@@ -112,6 +113,15 @@ def test_a_start_by_name_and_by_number():
     ):
         with pytest.raises(ModelError, match=words):
             simulate(Thermostat(mode=Start(wrong)), stop=10.0)
+        with pytest.raises(ModelError, match=f"starts: mode: .*{words}"):
+            simulate(Thermostat(), stop=10.0, starts={"mode": wrong})
+    dae = translate(Thermostat(), events=True)
+    found = simulate(dae, stop=10.0, starts={"mode": "on"}, tolerance=TOLERANCE)
+    np.testing.assert_allclose(found["T"], 303 - 8 * np.exp(-found.time / 100), atol=NEAR)
+    with pytest.raises(
+        ModelError, match=r"mode: found the value 'on' for a Mode, .* write mode=Start\('on'\)"
+    ):
+        simulate(Thermostat(mode="on"), stop=10.0)
 
 
 @pytest.mark.parametrize("d", [0.0, 10.0])

@@ -99,7 +99,8 @@ def test_another_shape_is_refused_everywhere(name, value, words):
 
 def test_another_shape_of_samples_parameters_and_starts_is_refused():
     with pytest.raises(
-        ModelError, match=r"input U: samples have shapes \(2,\) and \(2, 6\), expected \(2,\) and \(2, 2, 3\)"
+        ModelError,
+        match=r"input U: found samples of shape \(6,\), expected \(2, 3\); give values of shape \(n, rows, columns\)",
     ):
         final(inputs={"U": ([0.0, 1.0], [WIDE.ravel(), WIDE.ravel()])})
     with pytest.raises(

@@ -9,12 +9,13 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.flattening.shapes import elements_of
+from gantrytau.language.events import mode_number
 
 SAME = 1e-9  # relative, below which two starts of one symbol agree
 
 
 def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
-    """The same translation from other start values, name -> number or array; what is not named moves before them.
+    """The same translation from other starts, name -> number, array, or name of a mode; what is not named moves before them.
 
     A start that is fixed in the model stays fixed, at its new value. Equations and states are those that the old start
     chose. Raises ModelError for names that are no variables and for wrong shapes, InitializationError where no
@@ -25,6 +26,8 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
     values, given = dict(dae.start), dict[str, str]()
     for name, value in starts.items():
         elements = _variables(dae, name)
+        if name in dae.flat.modes:
+            value = mode_number(f"starts: {name}", dae.flat.modes[name], value)
         numbers = elements_of(f"starts: {name}", value, dae.flat.shape(name))
         for element, number in zip(elements, numbers, strict=True):
             symbol, start = _symbol(dae, element, number)

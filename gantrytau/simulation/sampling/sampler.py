@@ -38,9 +38,11 @@ class Sampler:
 
     @property
     def suits(self) -> bool:
-        """Whether the model is of a kind that can go this way: what it samples, without algebraic unknowns and whens."""
+        """Whether the model can go this way: it samples, or is given samples, and has no algebraic unknowns and whens."""
         c = self.coordinates
-        if not c.held or c.algebraics or not c.states or c.rounds.whens or c.dae.flat.delays:
+        if not (c.held or c.sampled) or not c.states:
+            return False
+        if c.algebraics or c.rounds.whens or c.dae.flat.delays:
             return False
         switches, half = c.switches, 2 * len(c.sampled)
         timed = ca.vertcat(

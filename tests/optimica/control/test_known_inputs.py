@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp
+from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp, multisine, prbs, steps, white_noise
 from gantrytau_optimica import Free, Optimization, Samples, final, link, optimize, sum_of_squares
 
 
@@ -60,6 +60,9 @@ LINES = Samples([0.0, 0.8, 2.0], [1.0, 3.0, 0.0])
         (STEPS, 0.7 + 1.2 + 0.45),
         (LINES, 1.6 + 1.8),
         (([0.0, 0.8, 2.0], [1.0, 3.0, 0.0]), 3.4),
+        (steps([0.0, 0.7, 1.1], [1.0, 3.0, 0.5]), 2.35),
+        (multisine([0.5, 1.5], [1.0, 2.0], phases=[0.0, 0.3]), 0.0),
+        (prbs(3, 0.2, 2.0, seed=5), 0.2 * np.sum(prbs(3, 0.2, 2.0, seed=5).values(0.2 * np.arange(10)))),
     ],
 )
 def test_a_known_input(course, whole):
@@ -167,6 +170,17 @@ def test_the_same_course_in_other_phases_has_its_own_time():
         (
             {"inputs": {"model.u": ([0.0, 2.0, 1.0], [1.0, 2.0, 3.0])}},
             "input model.u: Samples: the time falls from 2 s in row 1 to 1 s",
+        ),
+        (
+            {"inputs": {"model.u": white_noise(1.0, 0.1)}},
+            "input model.u: white_noise(std=1.0, period=0.1, seed=None) has no seed",
+        ),
+        (
+            {
+                "inputs": {"model.u": prbs(5, 0.1, seed=1)},
+                "final_time": Free(2.0, unit="s", min=1.0, max=2.0),
+            },
+            "model.u is held from time to time, which needs fixed times; give start_time and final_time as numbers",
         ),
         (
             {"inputs": {"model.u": Samples([0.0, 1.5], [1.0, 2.0])}},

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gantrytau import Fixed, Input, Model, Parameter, Real, der, simulate, study, translate
+from gantrytau import Fixed, Input, Model, Parameter, Real, der, prbs, simulate, study, translate
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
@@ -52,6 +52,17 @@ class Stepped(Model):
         yield self.y == self.x + self.u
 
 
+class Driven(Model):
+    """A decay that is driven."""
+
+    k = Parameter(0.5, unit="1/s", description="rate")
+    u = Input(unit="1/s", description="drive")
+    x = Real(unit="1", description="state", start=0.0, fixed=True)
+
+    def equations(self):
+        yield der(self.x) == self.u - self.k * self.x
+
+
 def test_what_holds_after_a_step_counts_at_its_instant():
     t = np.linspace(0.0, 2.0, 9)
     u = (t >= 1.0) * 1.0
@@ -62,6 +73,14 @@ def test_what_holds_after_a_step_counts_at_its_instant():
     assert fit.parameters["k"] == pytest.approx(0.7, abs=1e-6)  # the collocation on 8 elements
     np.testing.assert_allclose(fit.residuals["experiment_1", "y"], 0.0, atol=1e-9)
     assert abs(fit.optimum.playback.objective_error) < 1e-4  # of 4e5 for an error of 1
+
+
+def test_a_binary_sequence_as_input_is_that_of_the_simulation():
+    inputs = {"u": prbs(5, 0.1, 2.0, seed=3)}
+    measured = simulate(Driven(k=0.7), stop=2.0, inputs=inputs, points=81, tolerance=1e-10)
+    t = np.linspace(0.0, 2.0, 81)
+    fit = estimate(Driven, {"k": Free(0.5)}, Experiment({"x": (t, measured.at(t, "x"))}, inputs))
+    assert fit.parameters["k"] == pytest.approx(0.7, abs=1e-6)
 
 
 def test_holes_of_the_quadruple_tank(tanks):
