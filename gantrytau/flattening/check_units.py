@@ -167,6 +167,8 @@ def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
     condition, piece = operator in RELATIONS, False
     if operator == ca.OP_SUB:  # the numbers of a table take the unit that is asked for
         piece = bool(plain) and all(term.condition or term.piece for term in plain)
+    elif operator == ca.OP_AND:  # as `smoothly` writes it
+        piece = any(term.piece for term in operands)
     if operator == ca.OP_IF_ELSE_ZERO and operands[0].piece:
         unit = ANY
     clock = (

@@ -104,15 +104,14 @@ class _Walk:
     smooth: list[ca.SX] | None
     switches: list[Turn] = field(default_factory=list)
     steps: dict[int, tuple[ca.SX, dict[float, ca.SX]]] = field(default_factory=dict)
-    _names: set[str] = field(default_factory=set)
+    _places: dict[str, int] = field(default_factory=dict)  # of modes by name
     _modes: dict[tuple[int | bool, ...], ca.SX] = field(default_factory=dict)
 
     def operation(self, operator: int, operands: list[_Value]) -> _Value:
         a = operands[0][0]
         b = operands[1][0] if len(operands) > 1 else a
         if self.smooth is not None and _said_smooth(operator, a, b):
-            (plain,) = with_modes(Switched((), tuple(self.switches)), [b])
-            self.smooth.append(smoothly(plain))
+            self.smooth.append(smoothly(self._plain(b)))
             return self.smooth[-1], True
         asked = operands[:1] if operator == ca.OP_IF_ELSE_ZERO else operands
         if any(moves for _, moves in asked):
@@ -121,6 +120,16 @@ class _Walk:
                 return found, True
         apply = ca.SX.unary if len(operands) == 1 else ca.SX.binary
         return apply(operator, *(e for e, _ in operands)), any(moves for _, moves in operands)
+
+    def _plain(self, expression: ca.SX) -> ca.SX:
+        """An expression with the values of its modes."""
+        own, left = set[int](), [expression]
+        while left:
+            names = (leaf.name() for leaf in ca.symvar(left.pop()))
+            new = {self._places[n] for n in names if n in self._places} - own
+            own |= new
+            left += [self.switches[k].margin for k in new]
+        return with_modes(Switched((), tuple(self.switches[k] for k in sorted(own))), [expression])[0]
 
     def _switching(self, operator: int, a: ca.SX, b: ca.SX) -> ca.SX | None:
         """What an operator is, written with modes; None for one that does not switch."""
@@ -164,7 +173,7 @@ class _Walk:
 
     def _of_modes(self, condition: ca.SX) -> bool:
         """Whether a condition is made of modes, which jump where they are noted already."""
-        return all(leaf.name() in self._names for leaf in ca.symvar(condition))
+        return all(leaf.name() in self._places for leaf in ca.symvar(condition))
 
     def _mode(self, margin: ca.SX, *, closed: bool = False, counts: bool = False) -> ca.SX:
         if margin.is_constant():
@@ -175,7 +184,7 @@ class _Walk:
             new = Turn(ca.SX.sym(f"(mode {len(self.switches)})"), margin, closed, counts)
             self.switches.append(new)
             self._modes[key] = new.mode
-            self._names.add(new.mode.name())
+            self._places[new.mode.name()] = len(self.switches) - 1
         return self._modes[key]
 
     def counted(self, expressions: Sequence[ca.SX]) -> tuple[list[ca.SX], tuple[Turn, ...]]:

@@ -7,8 +7,10 @@ kinks with 12,000 loses digits with the number of points.
 """
 
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import pairwise
 from math import factorial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,32 +22,39 @@ LINEAR, CUBIC = 1, 3
 class Polynomials:
     """Functions of one argument, each a polynomial between edges (pieces - 1,), in the argument less origins (pieces,).
 
-    coefficients: (order + 1, pieces, functions), the highest power first; ends: whether the first and last piece lie
-    beyond the table, where it holds or is not defined.
+    coefficients: (order + 1, pieces, functions), the highest power first; low, high: the ends; slopes: behind them,
+    (2, functions); smooth: whether the functions are smooth at the edges, but not at the ends.
     """
 
     edges: np.ndarray
     origins: np.ndarray
     coefficients: np.ndarray
-    ends: bool
+    low: float
+    high: float
+    slopes: np.ndarray
+    smooth: bool
 
     def at(self, x: ca.SX) -> tuple[list[ca.SX], ca.SX]:
         """The functions of a scalar expression, and 1 beyond the ends, else 0."""
-        last = len(self.edges) - 1
-        reached = [
-            x > edge if self.ends and k == last else x >= edge for k, edge in enumerate(self.edges.tolist())
-        ]
-        sides = [ca.SX(1), *reached]
+        onwards = not self.smooth and bool(np.any(self.slopes))  # straight lines go on as they are
+        below, above = x < self.low, x > self.high
+        within = x if onwards else ca.if_else(below, self.low, ca.if_else(above, self.high, x))
+        sides = [ca.SX(1), *(within >= edge for edge in self.edges.tolist())]
         inside = [before - after for before, after in pairwise(sides)]
-        inside.append(1 - (1 - reached[-1]))  # a difference, too: so units know a number of a table
-        local = x - _chosen(inside, self.origins)
+        inside.append(1 - (1 - sides[-1]))  # a difference, too: so units know a number of a table
+        inside = [ca.logic_and(1, piece) for piece in inside] if self.smooth else inside  # as `smoothly`
+        local = within - _chosen(inside, self.origins)
+        beyond = ca.if_else(below, x - self.low, 0), ca.if_else(above, x - self.high, 0)
         values = []
-        for function in np.moveaxis(self.coefficients, -1, 0):
+        for function, ends in zip(np.moveaxis(self.coefficients, -1, 0), self.slopes.T.tolist(), strict=True):
             value = _chosen(inside, function[0])
             for numbers in function[1:]:
                 value = value * local + _chosen(inside, numbers)
+            if self.smooth and any(ends):  # beyond the ends, where the first and the last piece hold
+                for here, slope, rest in zip((inside[0], inside[-1]), ends, beyond, strict=True):
+                    value += ca.SX.binary(ca.OP_IF_ELSE_ZERO, here, slope * rest)
             values.append(value)
-        return values, inside[0] + inside[-1] if self.ends else ca.SX(0)
+        return values, below + above
 
 
 def _chosen(inside: list[ca.SX], numbers: np.ndarray) -> ca.SX:
@@ -56,45 +65,28 @@ def _chosen(inside: list[ca.SX], numbers: np.ndarray) -> ca.SX:
     return value
 
 
-def splines(x: np.ndarray, kind: str) -> tuple[np.ndarray, int]:
-    """Knots and order of the splines through points x (n,), rising: cubic ones are not-a-knot (de Boor 1978, IV)."""
-    from scipy.interpolate import make_interp_spline
-
-    order = LINEAR if kind == "linear" else min(CUBIC, x.size - 1)
-    return make_interp_spline(x, np.zeros(x.size), order).t, order
+def _spline(x: np.ndarray, values: np.ndarray, kind: str) -> Any:
+    """Through values (n, ...) at x (n,), rising: straight lines, or the cubic one that is not-a-knot (de Boor 1978, IV)."""
+    interpolate = import_module("scipy.interpolate")
+    return interpolate.make_interp_spline(x, values, LINEAR if kind == "linear" else min(CUBIC, x.size - 1))
 
 
 def interpolating(x: np.ndarray, values: np.ndarray, kind: str) -> np.ndarray:
     """Coefficients (n, ...) of the B-splines that have values (n, ...) at x (n,)."""
-    from scipy.interpolate import make_interp_spline
-
-    return make_interp_spline(x, values, LINEAR if kind == "linear" else min(CUBIC, x.size - 1)).c
+    return _spline(x, values, kind).c
 
 
 def polynomials(x: np.ndarray, weights: np.ndarray, kind: str, outside: str) -> Polynomials:
     """Sums of B-splines over points x (n,), weights (n, functions), as polynomials; outside: how they go on."""
-    from scipy.interpolate import BSpline
-
-    knots, order = splines(x, kind)
-    breaks = knots[order : knots.size - order]
+    bare = _spline(x, weights, kind)
+    spline = type(bare)(bare.t, weights, bare.k)
+    breaks = bare.t[bare.k : bare.t.size - bare.k]
     edges, origins = breaks[1:-1], breaks[:-1]
-    spline = BSpline(knots, weights, order)
-    coefficients = np.array([spline(origins, k) / factorial(k) for k in range(order, -1, -1)])
-    if outside == "linear" and order == LINEAR:
-        if edges.size:
-            return Polynomials(edges, origins, coefficients, ends=False)
-        both = np.repeat(coefficients, 2, axis=1)  # its numbers are known by their choice
-        return Polynomials(breaks.mean(keepdims=True), np.repeat(origins, 2), both, ends=False)
-    beyond = np.zeros((order + 1, 2, weights.shape[1]))
-    last = breaks[-1] - breaks[-2]
-    powers = last ** np.arange(order, -1, -1)
-    beyond[-1] = [coefficients[-1, 0], np.einsum("k,kf->f", powers, coefficients[:, -1])]
-    if outside == "linear":
-        slopes = np.arange(order, 0, -1) * powers[1:]
-        beyond[-2] = [coefficients[-2, 0], np.einsum("k,kf->f", slopes, coefficients[:-1, -1])]
+    coefficients = np.array([spline(origins, k) / factorial(k) for k in range(bare.k, -1, -1)])
+    slopes = np.array([coefficients[-2, 0], spline(breaks[-1], 1)]) * (outside == "linear")
+    if not edges.size:  # numbers of a table are known by their choice
+        edges, origins = breaks.mean(keepdims=True), np.repeat(origins, 2)
+        coefficients = np.repeat(coefficients, 2, axis=1)
     return Polynomials(
-        breaks,
-        np.concatenate([breaks[:1], origins, breaks[-1:]]),
-        np.concatenate([beyond[:, :1], coefficients, beyond[:, 1:]], axis=1),
-        ends=True,
+        edges, origins, coefficients, float(breaks[0]), float(breaks[-1]), slopes, kind == "spline"
     )

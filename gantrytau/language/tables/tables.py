@@ -1,6 +1,6 @@
 """`table`: numbers over one or two arguments as an expression."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Literal
 
@@ -42,7 +42,7 @@ def table(
                 argument=word,
             )
     two = isinstance(x, (tuple, list)) and len(x) == 2
-    arguments = x if two else (x,)
+    arguments: tuple[Any, ...] = tuple(x) if two else (x,)
     if any(isinstance(one, Formula) for one in arguments):
         later = partial(_later, xs=xs, ys=ys, kind=kind, outside=outside)
         return Formula(later, *arguments)
@@ -69,7 +69,7 @@ def _later(*arguments: Any, xs: Any, ys: Any, kind: Any, outside: Any) -> Any:
 
 
 def _value(
-    at: tuple[ca.SX, ...], axes: tuple[np.ndarray, ...], values: np.ndarray, kind: str, outside: str
+    at: Sequence[ca.SX], axes: tuple[np.ndarray, ...], values: np.ndarray, kind: str, outside: str
 ) -> ca.SX:
     """The table at scalar arguments."""
     weights = interpolating(axes[0], values, kind)

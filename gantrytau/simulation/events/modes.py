@@ -46,7 +46,7 @@ class InModes:
 def in_modes(dae: Translated, known: Mapping[str, ca.SX]) -> InModes:
     """The equations of a model, its known symbols (their expressions in time) and its conditions with modes."""
     residuals = dae.indexed.residuals
-    left = [1 - (r.expression >= r.low) + (r.expression > r.high) for r in dae.flat.ranges]
+    left = [(r.expression < r.low) + (r.expression > r.high) for r in dae.flat.ranges]
     whens, past = [one.condition for one in dae.flat.whens], [one.expression for one in dae.flat.delays]
     conditions = dae.to_reduced(column([*whens, *left, *past])).elements()
     rows = [*residuals.values(), *known.values(), *conditions]

@@ -125,15 +125,22 @@ def test_the_code_of_a_table_grows_with_its_points_only():
 
 def test_many_kinks_are_one_switch_that_counts():
     xs, ys = points(1000)
-    found = switched([table(x, xs, ys), table(x, xs + 0.05, ys)])
+    found = switched([table(x, xs, ys, outside="linear"), table(x, xs + 0.05, ys, outside="linear")])
     assert [turn.counts for turn in found.switches] == [True]
     place = ca.Function("place", [x], [found.switches[0].value, found.switches[0].margin])
     at = np.linspace(xs[0] - 1e3, xs[-1] + 1e3, 5001)
     counted, margins = (np.array(f).ravel() for f in place(at[None]))
-    assert np.array_equal(
-        counted, np.searchsorted(np.sort(np.concatenate([xs, xs + 0.05])), at, side="right")
-    )
+    kinks = np.sort(np.concatenate([xs[1:-1], xs[1:-1] + 0.05]))
+    assert np.array_equal(counted, np.searchsorted(kinks, at, side="right"))
     assert np.all(np.diff(margins) > 0)
+
+
+def test_a_spline_switches_at_its_ends_only():
+    xs, ys = points(40)
+    for way in ("hold", "linear", "error"):
+        found = switched([table(x, xs, ys, kind="spline", outside=way)], smooth=False)
+        ends = [ca.Function("end", [x], [turn.margin]) for turn in found.switches]
+        assert [abs(float(end(at))) for end, at in zip(ends, xs[[0, -1]], strict=True)] == [0, 0]
 
 
 class Spring(Model):
