@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from gantrytau import Fixed, Model, Parameter, connect, sin, time
+from gantrytau import Array, Fixed, Model, Parameter, connect, sin, time
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.translational import StickSlipFriction
 
@@ -39,6 +39,27 @@ class Shaken(Model):
         yield connect(self.mass.flange, self.push.flange)
         yield connect(self.mass.flange, self.floor.flange)
         yield self.push.f == self.amplitude * sin(self.w * time)
+
+
+class Chain(Model):
+    """Three masses in a row on a floor, joined by springs, the first pushed to and fro."""
+
+    amplitude = Parameter(20.0, unit="N", description="of the push")
+    masses = Array(translational.Mass, 3, m=1.0)
+    floors = Array(
+        StickSlipFriction, [dict(f_c=3.0, f_s=4.0), dict(f_c=2.0, f_s=5.0), dict(f_c=1.0, f_s=1.5)]
+    )
+    springs = Array(translational.Spring, 2, c=200.0)
+    push = translational.Force()
+
+    def equations(self):
+        for mass, floor in zip(self.masses, self.floors, strict=True):
+            yield connect(mass.flange, floor.flange)
+        for k in range(2):
+            yield connect(self.masses[k].flange, self.springs[k].flange_a)
+            yield connect(self.springs[k].flange_b, self.masses[k + 1].flange)
+        yield connect(self.push.flange, self.masses[0].flange)
+        yield self.push.f == self.amplitude * sin(9 * time)
 
 
 def on_spring(t: np.ndarray) -> np.ndarray:

@@ -14,17 +14,22 @@ from gantrytau import (
     StructureError,
     connect,
     der,
+    if_else,
     linearize,
+    pre,
+    reinit,
     sampled,
     simulate,
     sin,
     stick_slip,
+    time,
     translate,
+    when,
 )
 from gantrytau.mechanics import gears, multibody, rotational, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import FourBar, GantryTau, prototypes
-from tests.references.sticking import M, OnSpring, Shaken, on_spring, shaken
+from tests.references.sticking import Chain, M, OnSpring, Shaken, on_spring, shaken
 
 TOLERANCE = 1e-10
 NEAR = 1e2 * TOLERANCE  # errors of steps add up, and what an event takes over from them
@@ -176,26 +181,6 @@ def test_a_sliding_block_stops_where_its_energy_ends(size):
     assert back.final("mass.s") == pytest.approx(-0.25 * size, rel=NEAR)
 
 
-class Chain(Model):
-    """Three masses in a row on a floor, joined by springs, the first pushed to and fro."""
-
-    amplitude = Parameter(20.0, unit="N", description="of the push")
-    masses = Array(translational.Mass, 3, m=1.0)
-    floors = Array(
-        StickSlipFriction, [dict(f_c=3.0, f_s=4.0), dict(f_c=2.0, f_s=5.0), dict(f_c=1.0, f_s=1.5)]
-    )
-    springs = Array(translational.Spring, 2, c=200.0)
-    push = translational.Force()
-
-    def equations(self):
-        for mass, floor in zip(self.masses, self.floors, strict=True):
-            yield connect(mass.flange, floor.flange)
-        for k in range(2):
-            yield connect(self.masses[k].flange, self.springs[k].flange_a)
-            yield connect(self.springs[k].flange_b, self.masses[k + 1].flange)
-        yield connect(self.push.flange, self.masses[0].flange)
-
-
 def lawful(run, friction, speed, coulomb, breakaway):
     """Whether a friction keeps its law at all points of a motion."""
     mode, f, v = run[f"{friction}.mode"], run[f"{friction}.f"], run[speed]
@@ -226,7 +211,6 @@ def test_several_stick_and_slip_and_energy_balances(amplitude):
         Balanced(masses=rest, amplitude=amplitude),
         stop=3.0,
         tolerance=TOLERANCE,
-        inputs={"push.f": lambda t: amplitude * sin(9 * t)},
     )
     kinetic = sum(run[f"masses[{k}].v"] ** 2 for k in range(3)) / 2
     elastic = sum(200.0 * run[f"springs[{k}].s_rel"] ** 2 for k in range(2)) / 2
@@ -390,6 +374,40 @@ def test_a_sampled_force_pushes_it_loose_at_the_start():
 
     run = simulate(Controlled(), stop=1.0, tolerance=TOLERANCE)
     np.testing.assert_allclose(run["mass.s"], 2.5 * run.time**2, atol=NEAR)
+
+
+def test_a_kick_sets_it_in_motion_either_way():
+    class Kicked(Model):
+        """A block that gets a speed at 0.1 s, and the opposite one at 0.2 s, while it slides."""
+
+        mass = translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.0))
+        floor = StickSlipFriction(f_c=6.0, f_s=9.0)
+
+        def equations(self):
+            yield connect(self.mass.flange, self.floor.flange)
+            kick = when(time > 0.1, reinit(self.mass.v, 1.0))
+            yield kick.elsewhen(time > 0.2, reinit(self.mass.v, -pre(self.mass.v)))
+
+    run = simulate(Kicked(), stop=1.0, tolerance=TOLERANCE)
+    way = 0.1 - 3.0 * 0.1**2 / 2
+    assert run.at(0.2, "mass.s") == pytest.approx(way, abs=NEAR)
+    assert run.final("mass.s") == pytest.approx(way - 0.7**2 / 2 / 3.0, abs=NEAR)
+    assert run.final("mass.v") == 0.0
+
+
+def test_a_belt_that_is_changed_over_slips():
+    class Switched(Belt):
+        """The belt goes at another speed from 0.1 s on."""
+
+        def equations(self):
+            yield self.w == der(self.s)
+            yield self.m * der(self.w) == -self.f
+            yield self.slip == self.w - if_else(time < 0.1, self.belt, 2 * self.belt)
+            yield stick_slip(self.f, self.slip, coulomb=self.f_c, smooth=0.0, breakaway=self.f_s)
+
+    run = simulate(Switched(), stop=0.3, tolerance=TOLERANCE)
+    # no speed jumps: friction of 6 N takes 0.02 s to bring 2 kg from 0.06 to 0.12 m/s
+    np.testing.assert_allclose(run["w"], 0.06 + 3.0 * np.clip(run.time - 0.1, 0.0, 0.02), atol=NEAR)
 
 
 def test_two_frictions_that_share_one_motion_are_named():

@@ -152,6 +152,7 @@ class Changes:
         rounds, trail = self.coordinates.rounds, self.trail
         if not self._holding.size:
             return k
+        rose = self._holding
         for _ in range(MOST):
             now = rounds.holding(self.point(k))
             rose, self._holding = now & ~self._holding, now
@@ -191,6 +192,12 @@ class Changes:
             except SolveError as error:
                 raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
         if coordinates.dae.flat.slips:
+            kicked = [
+                bool(acts and one.reinits)
+                for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
+            ]
+            if any(kicked):
+                self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
             self._lock(k, first)
         trail.z[k] = self._settled(k)
         if before is not None:
@@ -212,6 +219,12 @@ class Changes:
         slips, trail, own = self.coordinates.slips, self.trail, self._slip_modes(k)
         self._break_away(k, (first[own] != 0) & (trail.held[k, own] == 0), first[own])
         trail.x[k] = slips.held(trail.x[[k]], trail.t[[k]], trail.inputs(k)[None])[0]
+
+    def _slide_on(self, k: int, which: np.ndarray) -> None:
+        """Let some frictions slide whose speeds have jumped."""
+        trail, own = self.trail, self._slip_modes(k)
+        sliding = self.coordinates.slips.sliding(trail.x[k], float(trail.t[k]), trail.inputs(k), self.sizes)
+        trail.held[k, own] = np.where(which & (sliding != 0), sliding, trail.held[k, own])
 
     def _break_away(self, k: int, stuck: np.ndarray, before: np.ndarray) -> None:
         """Let those of some frictions slide that cannot hold, the worst first; before: their modes, if they have slid."""
@@ -251,7 +264,7 @@ class Changes:
 
     def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
-        for i in np.flatnonzero(acts):
+        for i in np.flatnonzero(acts).tolist():
             own = list(self.coordinates.rounds.of[i])
             if i in self._acted and own:
                 last, rates = self._acted[i]
@@ -261,7 +274,7 @@ class Changes:
                     raise run_ends.accumulating(
                         self.coordinates.dae, t, self.coordinates.rounds.whens[i].label
                     )
-            self._acted[int(i)] = t, after.rates[0].copy()
+            self._acted[i] = t, after.rates[0].copy()
 
     def _settled(self, k: int) -> np.ndarray:
         """The algebraics of a place."""
@@ -295,6 +308,8 @@ class Changes:
         """The modes that belong to the margins of a place that has these modes."""
         trail, places = self.trail, slice(k, k + 1)
         self.modes(k)[:] = modes
+        if self.coordinates.dae.flat.slips:
+            self._slide_on(k, trail.held[k, self._slip_modes(k)] == 0)
         trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
         trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))

@@ -5,7 +5,7 @@ zero. A sliding one locks where its speed comes to zero, a locked one breaks awa
 what sticks are held at zero by projection, as constraints are.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -14,7 +14,7 @@ import numpy as np
 from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
-from gantrytau.flattening.flat_model import FlatModel, FlatVariable, StickSlip, When
+from gantrytau.flattening.flat_model import FlatModel, FlatVariable, When
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name
 from gantrytau.simulation.singular_poses import Point
@@ -95,11 +95,12 @@ def with_modes(dae: Translated) -> Translated:
     return dae.made[key]
 
 
-def mode_name(friction: StickSlip, taken: Collection[str]) -> str:
-    """The Discrete of a friction, 1 forward, -1 backward, 0 where it sticks; named as in an FMU, if that is free."""
-    owner = friction.force.rpartition(".")[0]
-    name = f"{owner}.mode" if owner else "mode"
-    return f"mode({friction.force})" if name in taken else name
+def mode_names(flat: FlatModel) -> list[str]:
+    """The Discretes of frictions, 1 forward, -1 backward, 0 where they stick; named as in an FMU where that is free."""
+    owners = [f.force.rpartition(".")[0] for f in flat.frictions]
+    plain = [f"{owner}.mode" if owner else "mode" for owner in owners]
+    taken = {*flat.scalars, *(name for name in plain if plain.count(name) > 1)}
+    return [f"mode({f.force})" if n in taken else n for f, n in zip(flat.frictions, plain, strict=True)]
 
 
 def _written(flat: FlatModel) -> FlatModel:
@@ -108,11 +109,9 @@ def _written(flat: FlatModel) -> FlatModel:
     forces = {f.force for f in flat.frictions}
     variables = [replace(v, undetermined=SHARED) if forces & {*v.elements} else v for v in flat.variables]
     equations, whens = list(flat.equations), list(flat.whens)
-    derivatives, modes = dict(flat.derivatives), list[str]()
-    for friction in flat.frictions:
-        name = mode_name(friction, {*flat.scalars, *modes})
+    derivatives, modes = dict(flat.derivatives), mode_names(flat)
+    for friction, name in zip(flat.frictions, modes, strict=True):
         rate = derivative_name(friction.speed, 1)
-        modes.append(name)
         mode, force = ca.SX.sym(name), symbols[friction.force]
         speed, gain = symbols[friction.speed], derivatives.setdefault(rate, ca.SX.sym(rate))
         words = f"whether {friction.force} slides forward (1), backward (-1) or sticks (0)"

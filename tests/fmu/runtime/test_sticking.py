@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from gantrytau import Model, Parameter, Real, der, stick_slip
+from gantrytau import Fixed, Model, Parameter, Real, der, simulate, stick_slip
 from gantrytau_fmu import cosimulate, export_fmu
 from tests.fmu.exported import Exported, export
-from tests.references.sticking import C, M, OnSpring, Shaken, on_spring, shaken
+from tests.references.sticking import C, Chain, M, OnSpring, Shaken, on_spring, shaken
 
 STEP = 0.004
 
@@ -140,3 +140,23 @@ def test_a_speed_against_a_belt_sticks_to_the_speed_of_the_belt(tmp_path, model)
     found = cosimulate({"m": path}, stop=2.0, step=0.01)
     exact = [carried(t) for t in found.time]
     assert found["m.s"] == pytest.approx(np.array(exact), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "names"),
+    [
+        (Chain(masses=[dict(s=Fixed(0.0), v=Fixed(0.0))] * 3), [f"masses[{k}].s" for k in range(3)]),
+        (OnBelt(), ["s"]),
+    ],
+    ids=["chain", "belt"],
+)
+def test_it_is_the_motion_of_simulate(tmp_path, model, names):
+    path = export_fmu(model, tmp_path / "model.fmu", tolerance=1e-11)
+    found = cosimulate({"m": path}, stop=2.0, step=0.01)
+    expected = simulate(model, stop=2.0, tolerance=1e-11, points=201)
+    times, places = np.unique(expected.time, return_index=True)
+    for name in names:
+        shown = np.interp(found.time, times, expected[name][places])
+        # an FMU locks where the speed has come 1e-8 m/s beyond zero
+        assert found[f"m.{name}"] == pytest.approx(shown, abs=5e-9)
+        assert np.ptp(shown) > 0.01
