@@ -37,6 +37,10 @@ class ModelTask:
     places: Mapping[str, str]
     policy: Mapping[str, Any]
 
+    def __getstate__(self) -> dict[str, Any]:
+        plain = Translated(**{f.name: getattr(self.dae, f.name) for f in fields(Translated)})
+        return {**self.__dict__, "dae": plain}
+
     def __call__(self, case: Case) -> Result:
         """The result of one case."""
         policy = dict(self.policy)
@@ -66,7 +70,6 @@ def model_task(
         if name not in known:
             raise ModelError(f"study: there is no keyword '{name}'{did_you_mean(name, known)}", argument=name)
     dae = model if isinstance(model, Translated) else translate_model(model)
-    plain = Translated(**{f.name: getattr(dae, f.name) for f in fields(Translated)})
     places = {name: _place(dae, name) for name in axes.over}
     for name in (n for n, place in places.items() if place == "parameters"):
         for value in axes.over[name]:
@@ -74,7 +77,7 @@ def model_task(
     for name in names(outputs or ()):
         dae.expand(name)
     fixed = {"stop": stop, "inputs": inputs, "outputs": outputs, **policy}
-    return ModelTask(plain, places, fixed)
+    return ModelTask(dae, places, fixed)
 
 
 def labels(task: ModelTask) -> dict[str, str]:

@@ -41,12 +41,17 @@ def outcomes(task: Task, cases: Sequence[Case], place: Place, *, safe: bool = Fa
 
 
 def _begun_here(task: Task, cases: Sequence[Case]) -> Iterator[Outcome]:
-    """Cases here for as long as processes take to begin, or to the end where that is near; the rest in processes."""
-    begin, last = perf_counter(), 0.0
+    """Cases here for as long as processes take to begin, and to the end where these would gain less; the rest in processes.
+
+    What the first case took longer than the last one was spent on what later ones find made, in every process anew.
+    """
+    begin, first, last = perf_counter(), 0.0, 0.0
     for number, case in enumerate(cases):
         since = perf_counter()
-        if since - begin > BEGIN and last * (len(cases) - number) > BEGIN:
+        gain = last * (len(cases) - number) * (1 - 1 / processors())
+        if since - begin > BEGIN and gain > BEGIN + max(first - last, 0.0):
             yield from in_processes(task, cases[number:])
             return
         yield computed(task, case)
         last = perf_counter() - since
+        first = first or last
