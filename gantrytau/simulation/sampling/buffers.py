@@ -17,12 +17,15 @@ WORTH = 10_000  # passages of a model: for so many a compiler is asked, which ta
 
 @dataclass(frozen=True)
 class StepsTaken:
-    """States and what is held before and behind each step, and the two estimates of its error, a row each."""
+    """States and what is held before and behind each step, the two estimates of its error, and the algebraics just before
+    what is due behind it, a row each.
+    """
 
     before: np.ndarray
     after: np.ndarray
     third: np.ndarray
     fifth: np.ndarray
+    algebraics: np.ndarray
 
 
 class Buffer:
@@ -31,7 +34,7 @@ class Buffer:
     def __init__(self, calls: ca.Function, size: int):
         self._first = np.zeros(calls.size1_in(0))
         self._told = np.zeros((size, calls.size1_in(1)))
-        self._found = [np.zeros((size, calls.size1_out(k))) for k in range(3)]
+        self._found = [np.zeros((size, calls.size1_out(k))) for k in range(calls.n_out())]
         self._memory, self._go = calls.buffer()
         for k, array in enumerate((self._first, self._told)):
             self._memory.set_arg(k, array.data)
@@ -46,8 +49,9 @@ class Buffer:
         self._told[count:] = told[-1]
         self._told[count:, 1] = 0.0  # what is left of the call stands still
         self._go()
-        after, third, fifth = (array[:count] for array in self._found)
-        return StepsTaken(np.vstack([first[None], after[:-1]]), after, third, fifth)
+        after, third, fifth, *rest = (array[:count] for array in self._found)
+        algebraics = rest[0] if rest else np.zeros((count, 0))
+        return StepsTaken(np.vstack([first[None], after[:-1]]), after, third, fifth, algebraics)
 
 
 class Passages:

@@ -12,7 +12,7 @@ from gantrytau.simulation.sampling.runge_kutta import TIMES, one_step
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """The function of a passage: (y, u) -> (y behind it, e3, e5).
+    """The function of a passage: (y, u) -> (y behind it, e3, e5), and the algebraics just before what is due, if any.
 
     y: states, what is held, modes; u: time and step, s, the start of the interval in which the step lies, which held
     variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
@@ -26,27 +26,61 @@ class Passage:
 
 
 def passage(coordinates: Coordinates) -> Passage:
-    """The passage of a model without algebraic unknowns."""
+    """The passage of a model whose algebraic unknowns, if any, follow from linear equations."""
     sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
     x = ca.MX.sym("x", len(coordinates.states))
     own = ca.MX.sym("held", held + len(coordinates.switches))
     t, h, begin = (ca.MX.sym(name) for name in ("t", "h", "begin"))
     due = ca.MX.sym("due", held)
     inputs, later = ca.MX.sym("inputs", sampled), ca.MX.sym("later", sampled)
-    symbols = [coordinates.x, time, coordinates.t0, coordinates.w]
-    rates = ca.Function("rates", symbols, [ca.densify(coordinates.ode)], {"cse": True})
+    equations = Equations(coordinates)
     w = ca.vertcat(inputs, own)
-    far, e3, e5 = one_step(lambda at, state: rates(state, at, begin, w), t, x, h)
+    far, e3, e5 = one_step(lambda at, state: equations.rates(state, at, begin, w), t, x, h)
     by_held = _following_held(coordinates)
-    renewal = _renewal(coordinates, by_held)(far, t + h, ca.vertcat(later, own), due)
+    before = ca.vertcat(later, own)
+    z = equations.algebraics(far, t + h, t + h, before)
+    renewal = _renewal(coordinates, by_held)(far, z, t + h, before, due)
     y = ca.vertcat(x, own)
     u = ca.vertcat(t, h, begin, due, inputs, later)
-    function = ca.Function("passage", [y, u], [ca.vertcat(far, renewal), e3, e5])
-    return Passage(function, len(TIMES) * rates.n_instructions(), by_held)
+    found = [ca.vertcat(far, renewal), e3, e5, *([z] if coordinates.algebraics else [])]
+    instructions = len(TIMES) * equations.instructions
+    return Passage(ca.Function("passage", [y, u], found), instructions, by_held)
+
+
+def linear(coordinates: Coordinates) -> bool:
+    """Whether the algebraic unknowns follow from linear equations."""
+    z = coordinates.z
+    return not ca.depends_on(ca.jacobian(coordinates.algebraic, z), z)
+
+
+class Equations:
+    """Rates x' and algebraics z at (x, t, t0, w), as expressions; instructions: of both."""
+
+    def __init__(self, coordinates: Coordinates):
+        symbols = [coordinates.x, time, coordinates.t0, coordinates.w]
+        z, algebraic = coordinates.z, coordinates.algebraic
+        self._none = not coordinates.algebraics
+        matrix = ca.jacobian(algebraic, z)
+        (rest,) = ca.substitute([algebraic], [z], [ca.SX.zeros(*z.shape)])
+        self._parts = ca.Function("parts", symbols, [matrix, ca.densify(rest)], {"cse": True})
+        self._rates = ca.Function("rates", [z, *symbols], [ca.densify(coordinates.ode)], {"cse": True})
+        counts = self._parts.n_instructions(), self._rates.n_instructions(), z.numel() ** 3
+        self.instructions = sum(counts)
+
+    def algebraics(self, *point: ca.MX) -> ca.MX:
+        """What solves the linear equations, by their factors of Householder."""
+        if self._none:
+            return ca.MX(0, 1)
+        matrix, rest = self._parts(*point)
+        return -ca.solve(matrix, rest, "qr")
+
+    def rates(self, *point: ca.MX) -> ca.MX:
+        """The rates of the states."""
+        return self._rates(self.algebraics(*point), *point)
 
 
 def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
-    """(x, t, w, due) -> what is held, and the modes, from t on."""
+    """(x, z, t, w, due) -> what is held, and the modes, from t on."""
     sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
     due = ca.SX.sym("due", held)
     w = coordinates.w
@@ -57,7 +91,7 @@ def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
         (mode,) = ca.substitute([coordinates.switches.turns[k].value], [w], [known])
         known[sampled + held + k] = mode
     own = ca.densify(known[sampled:, :])
-    return ca.Function("renewal", [coordinates.x, time, w, due], [own], {"cse": True})
+    return ca.Function("renewal", [coordinates.x, coordinates.z, time, w, due], [own], {"cse": True})
 
 
 def _following_held(coordinates: Coordinates) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.buffers import Passages, StepsTaken
+from gantrytau.simulation.sampling.passage import linear
 from gantrytau.simulation.sampling.runge_kutta import ORDER
 from gantrytau.simulation.trail import Trail
 
@@ -38,11 +39,14 @@ class Sampler:
 
     @property
     def suits(self) -> bool:
-        """Whether the model can go this way: it samples, or is given samples, and has no algebraic unknowns and whens."""
+        """Whether the model can go this way: it samples, or is given samples, and has no whens, delays or unknowns that are
+        iterated.
+        """
         c = self.coordinates
-        if not (c.held or c.sampled) or not c.states:
+        if not (c.held or c.sampled) or not c.states or c.rounds.whens or c.dae.flat.delays:
             return False
-        if c.algebraics or c.rounds.whens or c.dae.flat.delays:
+        # from few corners to the next an integrator is quicker than steps that solve systems of equations
+        if c.algebraics and not (c.held and c.kept("linear", lambda: linear(c))):
             return False
         switches, half = c.switches, 2 * len(c.sampled)
         timed = ca.vertcat(
@@ -87,12 +91,13 @@ class Sampler:
 
     def _held_to_constraints(self, trail: Trail, first: int, last: int) -> bool:
         """Project the places that results show, and the last; False where that fails: the integrator may come nearer."""
-        places = trail.shown(first, last)
+        places, c = trail.shown(first, last), self.coordinates
+        t, w = trail.t[places], trail.rows(places)
         try:
-            projected = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(places))
+            trail.x[places] = c.project(trail.x[places], t, w)
         except SolveError:
             return False
-        trail.x[places] = projected
+        trail.z[places] = c.settle(trail.x[places], trail.z[places], t, w)
         return True
 
     def _last(self, trail: Trail, here: int) -> int:
@@ -130,6 +135,7 @@ class Sampler:
         reached = accepted if turn is None else int(np.searchsorted(ends, turn, side="right"))
         n, rows, filled = self.sizes.size, ends[:reached] - 1, places[1 : reached + 1]
         trail.x[filled], trail.held[filled] = found.after[rows, :n], found.after[rows, n:]
+        trail.z[filled] = found.algebraics[rows]
         before = np.append(parts[1:] == 0, False)[:reached]
         trail.held[filled[before]] = found.before[rows[before], n:]
         self.most = min(size * FIRST, calls[-1]) if reached == count else max(1, size // FIRST)
@@ -155,7 +161,13 @@ class Sampler:
             third, fifth = (np.abs(e / scale).max(axis=1) for e in (found.third, found.fifth))
             whole = np.sqrt(fifth**2 + 0.01 * third**2)
             error = h * fifth**2 / np.where(whole > 0, whole, 1.0)
-        return np.where(np.isfinite(error) & np.isfinite(found.after).all(axis=1), error, np.inf)
+        return np.where(
+            np.isfinite(error)
+            & np.isfinite(found.after).all(axis=1)
+            & np.isfinite(found.algebraics).all(axis=1),
+            error,
+            np.inf,
+        )
 
     def _adapt(self, error: np.ndarray, h: np.ndarray) -> None:
         """Choose the next step from errors, of which the last may be above the tolerance."""
@@ -176,11 +188,11 @@ class Sampler:
             return None
         t, h, begin = (told[:count, k] for k in range(3))
         values, slopes = told[:count, 3 + m : 3 + m + half], told[:count, 3 + m + half : 3 + m + 2 * half]
-        own, no_z = found.before[:count, n:], np.zeros((count, 0))
+        own, z = found.before[:count, n:], found.algebraics[:count]
 
         def gaps(x: np.ndarray, at: np.ndarray) -> Margins:
             w = np.hstack([values + slopes * (at - begin)[:, None], slopes, own])
-            return switches.gaps(switches.look(x, no_z, at, w, self.sizes), own[:, m:])
+            return switches.gaps(switches.look(x, c.settle(x, z, at, w), at, w, self.sizes), own[:, m:])
 
         near, far = gaps(found.before[:count, :n], t), gaps(found.after[:count, :n], t + h)
         chosen = np.concatenate([live, live[[turn.counts for turn in switches.turns]]])

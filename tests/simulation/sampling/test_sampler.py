@@ -24,10 +24,10 @@ from gantrytau import (
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.sampling.buffers import Buffer
 from gantrytau.simulation.sampling.compiled import compiled
-from gantrytau.simulation.sampling.passage import passage
+from gantrytau.simulation.sampling.passage import linear, passage
 from gantrytau.simulation.sampling.runge_kutta import one_step
 from gantrytau.simulation.sampling.sampler import Sampler
-from gantrytau_models import prototypes
+from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_models.control.tracking import ControlledRobot
 from tests.simulation.sampled_models import Held
 
@@ -213,3 +213,27 @@ def test_a_sampled_value_that_is_not_finite_is_named_at_its_instant():
 def test_two_points_and_many_show_the_same_end():
     ends = [simulate(Bounded(), stop=1.0, points=points).final("x") for points in (2, 3, 501, 3001)]
     assert np.ptp(ends) < 1e-8  # the tolerance
+
+
+class BrakedSixLinks(Model):
+    """The six-link robot, whose accelerations and forces are algebraic unknowns, braked by sampled forces."""
+
+    robot = SixLinkGantryTau(prototypes.L1)
+    d = Parameter(500.0, unit="N.s/m", description="gain of the speed")
+    m = Parameter(2.0, unit="kg", description="gain of the acceleration")
+    force = Real(3, unit="N", description="sampled forces of the motors")
+
+    def equations(self):
+        for j, cart in enumerate(self.robot.carts):
+            yield sampled(self.force[j], -self.d * cart.v - self.m * der(cart.v), period=0.01)
+            yield cart.f == self.force[j]
+
+
+def test_linear_algebraics_are_solved_within_the_steps(monkeypatch):
+    names = [f"robot.carts[{k}].{letter}" for k in range(3) for letter in "sv"]
+    quick, slow = both_ways(monkeypatch, BrakedSixLinks(), [*names, "force[0]"], stop=0.05, points=6)
+    assert np.abs(quick - slow)[:-1].max() < NEAR
+    assert np.abs(quick - slow)[-1].max() < 500 * NEAR  # the gain
+    coordinates = all_coordinates(translate(BrakedSixLinks(), events=True), {})
+    assert coordinates.algebraics
+    assert linear(coordinates)
