@@ -282,6 +282,30 @@ def test_modes_in_arrays():
     assert found.select(["rooms[1].mode"]).mode("rooms[1].mode")[-1] in ("off", "on")
 
 
+class Supervised(Model):
+    """A room whose owner switches the heater off for good at 20 s."""
+
+    room = Thermostat(T=Fixed(290.0))
+
+    def equations(self):
+        yield transition(self.room.mode, "on", "off", time >= 20.0, priority=1)
+
+
+class Resting(Supervised):
+    """The same with a room that never heats itself again."""
+
+    room = Thermostat(T=Fixed(290.0), low=100.0, mode=Start("on"))
+
+
+def test_a_model_changes_the_mode_of_a_part():
+    with pytest.raises(SolveError, match=r"two transitions of room\.mode out of on may act at once"):
+        simulate(Supervised(room=dict(high=290.0)), start=30.0, stop=40.0)
+    found = simulate(Resting(), stop=40.0, tolerance=TOLERANCE)
+    np.testing.assert_allclose(instants(found, "room.mode"), [20.0], atol=1e-12)
+    warm = 303 - 13 * np.exp(-0.2)
+    assert found.final("room.T") == pytest.approx(283 + (warm - 283) * np.exp(-0.2), abs=NEAR)
+
+
 def test_names_of_modes_in_results_and_check():
     found = simulate(Wall(), stop=0.1)
     assert found.description("mode") == "where it is: 0 approach, 1 contact, 2 release"
