@@ -18,6 +18,7 @@ from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_librari
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
 from gantrytau_fmu.code.formulas import Formulas, formulas_of
+from gantrytau_fmu.code.jumps import with_ends_of_tables
 from gantrytau_fmu.code.model_code import model_code
 from gantrytau_fmu.code.model_graph import entered
 from gantrytau_fmu.describing.documentation import documentation, licenses
@@ -76,6 +77,7 @@ def export_fmu(
     check_target(path)
     dae = _translated(model, given, find, states)
     refuse_delays(dae.flat)
+    dae = with_ends_of_tables(dae)
     outputs, others = _shown(dae, find)
     graph = entered(formulas_of(dae, [*outputs, *others]))
     contents = contents_of(graph, outputs, others)

@@ -50,6 +50,14 @@ class Range:
     high: float
 
     @property
+    def left(self) -> str:
+        """What is said where it does not stay there."""
+        return (
+            f"{self.name} leaves its table, which ends at {self.low:g} and {self.high:g}, and is not defined beyond; add "
+            "points, or let it go on with outside='hold' or 'linear'"
+        )
+
+    @property
     def name(self) -> str:
         """What has to stay there, as it is written."""
         text = str(self.expression)

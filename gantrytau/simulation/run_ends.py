@@ -101,9 +101,7 @@ def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveErr
 def left_table(dae: Translated, t: float, table: Range) -> SolveError:
     """The argument of a table leaves it at time t."""
     return SolveError(
-        f"{dae.name}: at t = {t:.6g} s {table.name} leaves its table, which ends at {table.low:g} and {table.high:g}, and "
-        "is not defined beyond. Add points, or let it go on with outside='hold' or 'linear'; .result holds the motion up to "
-        "there",
+        f"{dae.name}: at t = {t:.6g} s {table.left}; .result holds the motion up to there",
         time=t,
         equations=[],
     )

@@ -1,10 +1,12 @@
 """What happens in an FMU where conditions become true: Discretes and states get new values, or the run ends."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from gantrytau import Dae
+from gantrytau.flattening.flat_model import When
 from gantrytau.flattening.whens import one_round
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.switching import WithModes
@@ -35,6 +37,18 @@ class JumpFormulas:
     def everything(self) -> tuple[ca.SX, ...]:
         """All expressions."""
         return self.conditions, self.discretes, self.values
+
+
+def with_ends_of_tables(dae: Dae) -> Dae:
+    """A model in which leaving a table that is not defined beyond its ends is a when that fails."""
+    leaving = [
+        When(
+            ca.logic_or(one.expression < one.low, one.expression > one.high),
+            (), (), "", "", dae.name, 0, words=f"end of the table of {one.name}", initially=True, failure=one.left,
+        )
+        for one in dae.flat.ranges
+    ]  # fmt: skip
+    return replace(dae, flat=replace(dae.flat, whens=(*dae.flat.whens, *leaving)))
 
 
 def jump_of(found: WithModes, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]]) -> JumpFormulas:

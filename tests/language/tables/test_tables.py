@@ -194,7 +194,7 @@ def test_a_spring_of_a_hundred_pieces_that_are_one_line_is_the_oscillator():
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_simulation_that_leaves_its_table_says_where(sign):
     short = spring(outside="error", xs=np.linspace(-0.5, 0.5, 5), ys=-np.linspace(-0.5, 0.5, 5))
-    words = r"Spring: at t = 0\.523599 s s leaves its table, which ends at -0\.5 and 0\.5, .*Add points"
+    words = r"Spring: at t = 0\.523599 s s leaves its table, which ends at -0\.5 and 0\.5, .*add points"
     with pytest.raises(SolveError, match=words) as stopped:
         simulate(short, stop=3.0, starts={"v": sign})
     assert abs(stopped.value.time - np.arcsin(0.5)) < 1e-7
