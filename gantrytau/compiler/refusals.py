@@ -199,6 +199,14 @@ def no_reinit(place: str, name: str, states: Sequence[str]) -> ModelError:
     )
 
 
+def twice_reinit(place: str, name: str, other: str) -> ModelError:
+    """A state that actions of whens set by two of its names."""
+    return ModelError(
+        f"{place}: found reinit({name}, ...), but {name} is the same state as {other}, which a when sets as well; expected "
+        f"one name and one chain for it: set {other}, and join the whens by .elsewhen"
+    )
+
+
 def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, least: float) -> StructureError:
     """Constraints whose Jacobian, a row each, has not their number as its rank; least: expected singular value."""
     left, values, _ = np.linalg.svd(matrix)

@@ -13,7 +13,7 @@ from gantrytau.compiler.blocks.solution import solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.parameters import ParameterTable, parameter_table
 from gantrytau.compiler.redundancy import Settled, without_redundant
-from gantrytau.compiler.refusals import differentiated, no_reinit
+from gantrytau.compiler.refusals import differentiated, no_reinit, twice_reinit
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import start_values
@@ -144,11 +144,15 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
 
 
 def _refuse_reinits(dae: Translated) -> None:
-    """ModelError for a variable that a when gives a new value although it is no state."""
+    """ModelError for a variable that a when gives a new value although it is no state, or is one by another name."""
+    owners: dict[str, str] = {}
     for one in dae.flat.whens:
         for name, _ in one.reinits:
-            if dae.reduced.aliases[name].symbol not in dae.choice.states:
+            symbol = dae.reduced.aliases[name].symbol
+            if symbol not in dae.choice.states:
                 raise no_reinit(one.label, name, dae.states)
+            if owners.setdefault(symbol, name) != name:
+                raise twice_reinit(one.label, name, owners[symbol])
 
 
 def retranslate(dae: Translated, flat: FlatModel) -> Translated:

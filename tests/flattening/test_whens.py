@@ -260,6 +260,17 @@ def test_only_states_are_set_anew():
     assert set(dae.states) == {"h", "v"}
 
 
+def test_one_state_is_set_by_one_name():
+    lines = (
+        "self.y == -2 * self.v",
+        "when(self.h < 0, reinit(self.y, 1))",
+        "when(self.h < -1, reinit(self.v, 1))",
+    )
+    text = refused(*lines, y=Real(unit="m/s"))
+    assert "equation 5" in text
+    assert "found reinit(v, ...), but v is the same state as y, which a when sets as well" in text
+
+
 class Lever(Model):
     """A point on a circle: one of its coordinates can be a state."""
 

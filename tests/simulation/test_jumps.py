@@ -102,6 +102,38 @@ def test_bounces_that_accumulate_end_with_their_condition():
     assert found.ended == text
 
 
+def test_what_is_caught_and_thrown_again_does_not_accumulate():
+    """A motion that begins at rest at its condition each time, and a condition that is one of a Discrete."""
+
+    class Caught(Model):
+        h = Real(start=0.0, fixed=True)
+        v = Real(start=1.0, fixed=True)
+        flying = Discrete(True)
+        caught = Discrete(0)
+        counted = Discrete(0)
+        thrown = Discrete(1.0)
+
+        def equations(self):
+            yield der(self.h) == self.v
+            yield der(self.v) == -2.5 * self.flying
+            yield when(
+                self.h <= 0,
+                reinit(self.v, 0),
+                reinit(self.h, 0),
+                self.flying == 0,
+                self.caught == pre(self.caught) + 1,
+            ).elsewhen(
+                time >= self.thrown, reinit(self.v, 1), self.flying == 1, self.thrown == pre(self.thrown) + 1
+            )
+            yield when(self.flying < 1, self.counted == pre(self.counted) + 1)
+
+    found = simulate(Caught(), stop=10.9)
+    assert found.final("caught") == found.final("counted") == 11
+    np.testing.assert_allclose(
+        found.time[jumps(found)], np.arange(0.8, 10.9, 0.2)[[k for k in range(51) if k % 5 < 2]], atol=1e-7
+    )
+
+
 def test_a_ball_that_comes_to_rest():
     class Resting(Ball):
         rests = Discrete(False)

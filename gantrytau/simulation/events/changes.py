@@ -150,9 +150,9 @@ class Changes:
     def _act(self, left: int, k: int) -> int:
         """Let whens act whose conditions became true, in rounds; left: the first place at this instant."""
         rounds, trail = self.coordinates.rounds, self.trail
-        if not self._holding.size:
-            return k
         rose = self._holding
+        if not rose.size:
+            return k
         for _ in range(MOST):
             now = rounds.holding(self.point(k))
             rose, self._holding = now & ~self._holding, now
@@ -264,16 +264,21 @@ class Changes:
 
     def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
+        rates, noise = before.rates[0], before.noise[0]
+        passed = _at_zero(before, t, self.coordinates.switches.whole(before.values)) & (rates != 0)
         for i in np.flatnonzero(acts).tolist():
-            own = list(self.coordinates.rounds.of[i])
-            if i in self._acted and own:
-                last, rates = self._acted[i]
-                away = np.abs(rates[own]) * (t - last) / 4  # of a parabola: the farthest
-                self._hops[i] = self._hops[i] + 1 if np.all(away < HOP * before.noise[0][own]) else 0
-                if self._hops[i] >= HOPS:
-                    raise run_ends.accumulating(
-                        self.coordinates.dae, t, self.coordinates.rounds.whens[i].label
-                    )
+            own = [k for k in self.coordinates.rounds.of[i] if passed[k]]
+            last, began = self._acted.get(i, (-np.inf, rates))
+            if t == last:  # another round of one instant
+                continue
+            if own:
+                fastest = np.maximum(np.abs(began[own]), np.abs(rates[own]))
+                away = fastest * (t - last) / 4  # of a parabola: the farthest
+                self._hops[i] = self._hops[i] + 1 if np.all(away < HOP * noise[own]) else 0
+            else:
+                self._hops[i] = 0
+            if self._hops[i] >= HOPS:
+                raise run_ends.accumulating(self.coordinates.dae, t, self.coordinates.rounds.whens[i].label)
             self._acted[i] = t, after.rates[0].copy()
 
     def _settled(self, k: int) -> np.ndarray:
@@ -324,9 +329,14 @@ class Changes:
                 raise run_ends.chattering(self.coordinates.dae, t, conditions)
 
 
+def _at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+    """Which margins of a place are where they turn, as well as that is located, (switches,)."""
+    rest = np.abs(margins.values - whole)[0]
+    return rest <= 2 * JUST_BEHIND * margins.noise[0] + 8 * np.spacing(abs(t)) * np.abs(margins.rates[0])
+
+
 def _location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
     """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
-    rest = np.abs(before.values - whole)[0]
-    near = rest <= 2 * JUST_BEHIND * before.noise[0] + 8 * np.spacing(abs(t)) * np.abs(before.rates[0])
     same = np.abs(after.values - before.values)[0] <= after.noise[0]
-    return np.where(near & same, 1.1 * rest, 0.0)
+    rest = np.abs(before.values - whole)[0]
+    return np.where(_at_zero(before, t, whole) & same, 1.1 * rest, 0.0)
