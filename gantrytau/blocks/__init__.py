@@ -5,7 +5,7 @@ from gantrytau.blocks.arithmetic import Gain, Product, Sum
 from gantrytau.blocks.block import Block, Source
 from gantrytau.blocks.continuous import Derivative, FirstOrder, Integrator, TransferFunction
 from gantrytau.blocks.limiters import DeadZone, Hysteresis, Limiter, RateLimiter, Unlimited
-from gantrytau.blocks.lookup import Table1, Table2
+from gantrytau.blocks.lookup import Delay, Table1, Table2
 from gantrytau.blocks.pid import DiscretePid, Pid
 from gantrytau.blocks.sampled_blocks import DiscreteTransferFunction, PulseWidth, SampleHold
 from gantrytau.blocks.sources import Noise, Pulse, Ramp, Sine, Step
@@ -14,6 +14,7 @@ from gantrytau.mechanics.filters import LowPass
 __all__ = [
     "Block",
     "DeadZone",
+    "Delay",
     "Derivative",
     "DiscretePid",
     "DiscreteTransferFunction",

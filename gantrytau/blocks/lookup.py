@@ -1,8 +1,8 @@
-"""Blocks that look a signal up in a table of numbers."""
+"""Blocks that look a signal up: in a table of numbers, or in its own past."""
 
 from typing import Any, Literal
 
-from gantrytau import Input, Model, Output, table
+from gantrytau import Input, Model, Output, Parameter, delay, table
 from gantrytau.blocks.block import Block
 
 
@@ -42,3 +42,12 @@ class Table2(Model):
     def equations(self):
         arguments, axes = (self.u[0], self.u[1]), (self.xs, self.ys)
         yield self.y == table(arguments, axes, self.values, kind=self.kind, outside=self.outside)
+
+
+class Delay(Block):
+    """y is u as it was a time T ago, before that as it was at the start; see `delay`."""
+
+    T = Parameter(0.1, unit="s", min=0.0, description="delay, above zero")
+
+    def equations(self):
+        yield self.y == delay(self.u, self.T)

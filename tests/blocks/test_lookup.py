@@ -1,11 +1,11 @@
-"""Tables as blocks against SciPy's interpolators."""
+"""Tables as blocks against SciPy's interpolators, and delays against closed forms."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gantrytau import Model, ModelError, connect, simulate, translate
-from gantrytau.blocks import Integrator, Ramp, Table1, Table2
+from gantrytau import Fixed, Model, ModelError, connect, simulate, sin, translate
+from gantrytau.blocks import Delay, Integrator, Ramp, Table1, Table2
 
 XS, YS = [-1.0, 0.0, 0.5, 2.0, 3.0], [2.0, -1.0, 0.0, 4.0, 1.0]
 
@@ -57,3 +57,33 @@ def test_wrong_tables():
     ):
         with pytest.raises(ModelError, match=words):
             translate(block)
+
+
+def test_a_delayed_sine_is_a_sine_later():
+    found = simulate(Delay(T=0.3), stop=2.0, inputs={"u": lambda t: sin(5 * t)}, tolerance=1e-10)
+    expected = np.where(found.time > 0.3, np.sin(5 * (found.time - 0.3)), 0.0)
+    np.testing.assert_allclose(found["y"], expected, atol=1e-7)
+
+
+def test_an_integrator_fed_back_with_a_delay_follows_its_polynomials():
+    """x' = -x(t - 1) from 1: the method of steps gives 1 - t, then 1 - t + (t - 1)^2 / 2, ..."""
+
+    class Oscillator(Model):
+        memory, past = Integrator(k=-1.0, y=Fixed(1.0)), Delay(T=1.0)
+
+        def equations(self):
+            yield connect(self.memory.y, self.past.u)
+            yield connect(self.past.y, self.memory.u)
+
+    found = simulate(Oscillator(), stop=2.0, tolerance=1e-10)
+    t = found.time
+    np.testing.assert_allclose(found["memory.y"], 1 - t + np.maximum(t - 1, 0) ** 2 / 2, atol=1e-7)
+
+
+def test_a_delay_is_above_zero():
+    for T, words in (
+        (0.0, "found T = 0; expected a time above zero"),
+        (-1.0, "T: value is -1, expected at least 0"),
+    ):
+        with pytest.raises(ModelError, match=words):
+            simulate(Delay(T=T), stop=1.0, inputs={"u": 1.0})
