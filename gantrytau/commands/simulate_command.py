@@ -94,7 +94,8 @@ def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
         find = [name for name in drawn if name.startswith("der(")]
         dae = translate(chosen.model, find=find, events=True)
     for name in drawn:
-        dae.expand(name)
+        if name not in dae.flat.friction_modes:
+            dae.expand(name)
     return dae
 
 

@@ -232,6 +232,15 @@ class FlatModel:
         told = (v for v in (*self.variables, *self.propagated) if v.undetermined)
         return {name: v.undetermined for v in told for name in v.elements}
 
+    @cached_property
+    def friction_modes(self) -> tuple[str, ...]:
+        """The modes of frictions that stick, 1, -1, or 0 where they do, as results call them: `mode`, where that is free."""
+        parts = [f.force.rpartition(".") for f in self.frictions]
+        plain = [f"{owner}{dot}mode" for owner, dot, _ in parts]
+        taken = {*self.scalars, *(name for name in plain if plain.count(name) > 1)}
+        pairs = zip(plain, parts, strict=True)
+        return tuple(f"{name}_{own}" if name in taken else name for name, (_, _, own) in pairs)
+
     @property
     def event_names(self) -> tuple[str, ...]:
         """Scalars that are set at instants: sampled variables, Discretes, forces of friction that sticks, delayed ones."""

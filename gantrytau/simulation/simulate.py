@@ -20,7 +20,7 @@ from gantrytau.errors import DoubtfulResult, ModelError, SolveError
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
-from gantrytau.simulation.events.sticking import with_modes
+from gantrytau.simulation.events.sticking import with_sticking
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.motion import all_coordinates
@@ -70,7 +70,7 @@ def simulate(
     that are not finite although the states are.
     """
     _check(start, stop, tolerance, points, max_step)
-    dae = with_modes(model if isinstance(model, Translated) else translate_model(model))
+    dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
     wanted = names(outputs or ())

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from gantrytau import Array, Fixed, Model, Parameter, connect, sin, time
+from gantrytau import Array, Fixed, Model, Parameter, Real, connect, der, sin, stick_slip, time
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.translational import StickSlipFriction
 
@@ -60,6 +60,29 @@ class Chain(Model):
             yield connect(self.springs[k].flange_b, self.masses[k + 1].flange)
         yield connect(self.push.flange, self.masses[0].flange)
         yield self.push.f == self.amplitude * sin(9 * time)
+
+
+class Plank(Model):
+    """A block on a plank on a floor: two frictions, one of them of a speed against a speed."""
+
+    m = Parameter(1.0, unit="kg", description="mass of the plank")
+    n = Parameter(3.0, unit="kg", description="mass of the block")
+    x = Real(unit="m", description="position of the plank", start=0.0, fixed=True)
+    y = Real(unit="m", description="position of the block", start=0.0, fixed=True)
+    v_x = Real(unit="m/s", description="speed of the plank", start=0.0, fixed=True)
+    v_y = Real(unit="m/s", description="speed of the block", start=2.0, fixed=True)
+    slip = Real(unit="m/s", description="speed of the block on the plank")
+    above = Real(unit="N", description="friction between the two")
+    below = Real(unit="N", description="friction on the floor")
+
+    def equations(self):
+        yield self.v_x == der(self.x)
+        yield self.v_y == der(self.y)
+        yield self.slip == self.v_y - self.v_x
+        yield self.m * der(self.v_x) == self.above - self.below
+        yield self.n * der(self.v_y) == -self.above
+        yield stick_slip(self.above, self.slip, coulomb=4.0, smooth=0.0, breakaway=5.0)
+        yield stick_slip(self.below, self.v_x, coulomb=1.0, smooth=0.0, breakaway=3.0)
 
 
 def on_spring(t: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from gantrytau import (
 from gantrytau.mechanics import gears, multibody, rotational, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import FourBar, GantryTau, prototypes
-from tests.references.sticking import Chain, M, OnSpring, Shaken, on_spring, shaken
+from tests.references.sticking import Chain, M, OnSpring, Plank, Shaken, on_spring, shaken
 
 TOLERANCE = 1e-10
 NEAR = 1e2 * TOLERANCE  # errors of steps add up, and what an event takes over from them
@@ -240,6 +240,23 @@ def test_twins_break_away_and_lock_together():
     run = simulate(Twins(masses=rest), stop=1.0, tolerance=TOLERANCE, inputs=pushes)
     np.testing.assert_allclose(run["masses[0].s"], shaken(run.time), atol=NEAR)
     np.testing.assert_allclose(run["masses[1].s"], shaken(run.time), atol=NEAR)
+
+
+def test_a_plank_carries_its_block_along_until_both_rest():
+    """It slides under 4 N against 1 N, until both are equally fast; then the floor slows both, and they rest together."""
+    run = simulate(Plank(), stop=5.0, tolerance=TOLERANCE)
+    t = run.time
+    joint = 2.0 / (3.0 + 4.0 / 3.0)  # both are equally fast: 3 t = 2 - 4/3 t
+    rest = joint + 3.0 * joint / 0.25  # 1 N slows 4 kg
+    expected = np.where(t < joint, 3.0 * t, np.clip(3.0 * joint - 0.25 * (t - joint), 0.0, None))
+    assert rest > 5.0
+    np.testing.assert_allclose(run["v_x"], expected, atol=NEAR)
+    assert np.all(run["mode_above"][t < joint - NEAR] == 1)
+    assert np.all(run["mode_above"][t > joint + NEAR] == 0)
+    assert set(np.unique(run["mode_below"])) == {1.0}
+    assert np.abs(run["slip"][run["mode_above"] == 0]).max() < 1e-15
+    # what holds the block on the plank slows it as the floor slows both
+    np.testing.assert_allclose(run["above"][run["mode_above"] == 0], 0.75, rtol=1e-12)
 
 
 def test_it_turns_back_without_sticking_and_the_force_jumps():

@@ -267,17 +267,18 @@ def _outputs(listed: _Listed, names: Sequence[str]) -> None:
 def _frictions(listed: _Listed) -> tuple[str, ...]:
     """Mode and event indicator of each friction with exact stick-slip; names of the indicators."""
     indicators = []
-    for place, name in enumerate(listed.formulas.frictions):
-        owner = name.rpartition(".")[0]
-        prefix = f"{owner}." if owner else ""
+    modes = listed.formulas.dae.flat.friction_modes
+    for place, (name, mode) in enumerate(zip(listed.formulas.frictions, modes, strict=True)):
+        owner, dot, _ = name.rpartition(".")
+        indicator = f"{owner}{dot}indicator" + mode[len(f"{owner}{dot}mode") :]
         words = f"{owner or name}: 1 slides forward, -1 slides backward, 0 sticks"
         more: dict[str, Any] = dict(
             causality="local", variability="discrete", initial="calculated", type="Int32"
         )
-        listed.add(f"{prefix}mode", "MODE", place, unit="", description=words, **more)
+        listed.add(mode, "MODE", place, unit="", description=words, **more)
         words = f"{owner or name}: an event where it falls through zero"
         more = dict(causality="local", variability="continuous", initial="calculated")
-        reference = listed.add(f"{prefix}indicator", "INDICATOR", place, unit="", description=words, **more)
+        reference = listed.add(indicator, "INDICATOR", place, unit="", description=words, **more)
         indicators.append(listed.variables[reference].name)
     return tuple(indicators)
 

@@ -85,7 +85,7 @@ class Slips:
         return waits
 
 
-def with_modes(dae: Translated) -> Translated:
+def with_sticking(dae: Translated) -> Translated:
     """The same model with forces of frictions as unknowns, and their modes as Discretes."""
     if not dae.flat.frictions:
         return dae
@@ -95,21 +95,13 @@ def with_modes(dae: Translated) -> Translated:
     return dae.made[key]
 
 
-def mode_names(flat: FlatModel) -> list[str]:
-    """The Discretes of frictions, 1 forward, -1 backward, 0 where they stick; named as in an FMU where that is free."""
-    owners = [f.force.rpartition(".")[0] for f in flat.frictions]
-    plain = [f"{owner}.mode" if owner else "mode" for owner in owners]
-    taken = {*flat.scalars, *(name for name in plain if plain.count(name) > 1)}
-    return [f"mode({f.force})" if n in taken else n for f, n in zip(flat.frictions, plain, strict=True)]
-
-
 def _written(flat: FlatModel) -> FlatModel:
     """A flat model without frictions that stick, but with equations and whens of them."""
     symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
     forces = {f.force for f in flat.frictions}
     variables = [replace(v, undetermined=SHARED) if forces & {*v.elements} else v for v in flat.variables]
     equations, whens = list(flat.equations), list(flat.whens)
-    derivatives, modes = dict(flat.derivatives), mode_names(flat)
+    derivatives, modes = dict(flat.derivatives), flat.friction_modes
     for friction, name in zip(flat.frictions, modes, strict=True):
         rate = derivative_name(friction.speed, 1)
         mode, force = ca.SX.sym(name), symbols[friction.force]

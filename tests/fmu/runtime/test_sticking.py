@@ -8,7 +8,7 @@ import pytest
 from gantrytau import Fixed, Model, Parameter, Real, der, simulate, stick_slip
 from gantrytau_fmu import cosimulate, export_fmu
 from tests.fmu.exported import Exported, export
-from tests.references.sticking import C, Chain, M, OnSpring, Shaken, on_spring, shaken
+from tests.references.sticking import C, Chain, M, OnSpring, Plank, Shaken, on_spring, shaken
 
 STEP = 0.004
 
@@ -147,8 +147,9 @@ def test_a_speed_against_a_belt_sticks_to_the_speed_of_the_belt(tmp_path, model)
     [
         (Chain(masses=[dict(s=Fixed(0.0), v=Fixed(0.0))] * 3), [f"masses[{k}].s" for k in range(3)]),
         (OnBelt(), ["s"]),
+        (Plank(), ["x", "y"]),
     ],
-    ids=["chain", "belt"],
+    ids=["chain", "belt", "plank"],
 )
 def test_it_is_the_motion_of_simulate(tmp_path, model, names):
     path = export_fmu(model, tmp_path / "model.fmu", tolerance=1e-11)
