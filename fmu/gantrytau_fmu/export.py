@@ -193,8 +193,9 @@ def _described(
     """The record of the FMU, in the words of FMI 3, before its binaries are there."""
     name = formulas.dae.name
     identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
-    # singular poses are looked for at the end of each step, also of an importer's integrator
-    watches = {"model-exchange": {"needsCompletedIntegratorStep": bool(formulas.roots or formulas.blocks)}}
+    # singular poses are looked for at the end of each step, also of an importer's integrator, as is what turned round
+    watched = bool(formulas.roots or formulas.blocks or formulas.switching.turns)
+    watches = {"model-exchange": {"needsCompletedIntegratorStep": watched}}
     return FmuDescription(
         **vars(about),
         name=name,

@@ -230,6 +230,13 @@ static gt_status gt_call_continue(gt_component *c, const char *function) {
 
 /* ---- Model Exchange */
 
+static gt_status gt_call_completed(gt_component *c) {
+    gt_gaps gaps;
+    const gt_status status = gt_fail(c, gt_completed(c->it));
+    if (GT_GAPS && status < GT_DISCARD && gt_look_at_gaps(c->it, &gaps) == GT_OK) gt_tighten(c->it, &gaps);
+    return status;
+}
+
 static int gt_vector(const gt_component *c, const char *function, const char *what, const void *values, size_t count,
                      size_t expected) {
     return gt_counts(c, function, what, count, expected) && gt_has(c, function, "the array", values, count);

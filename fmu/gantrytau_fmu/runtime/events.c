@@ -8,8 +8,9 @@
 #define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
 #define GT_MARGIN 1e-9       /* of the breakaway force */
 #define GT_MOST_ROUNDS 50    /* of whens at one instant */
-#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, or of a second, or in one communication step */
-#define GT_CROWDED 1e-4
+#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, but no more than GT_CROWDED_TIME, or in one communication step */
+#define GT_CROWDED 1e-5
+#define GT_CROWDED_TIME 1e-3 /* s: of a motion that goes on, a million events in a second are not expected */
 #define GT_ON_TIME 1e-6      /* of a period: instants that close are the same, also where masters add up their steps */
 
 /* Speed and breakaway force of each friction, (2, GT_FRICTIONS), rows first. */
@@ -303,15 +304,16 @@ static gt_status gt_act(gt_instance *it, gt_event_info *info, int *acted) {
 
 /* Refuse events that come ever faster, so that the time stands still. */
 static gt_status gt_count(gt_instance *it) {
-    const double span = it->now.stop_defined ? it->now.stop - it->now.start : 1;
-    if (it->now.time - it->now.events_since > GT_CROWDED * span) {
+    const double span = it->now.stop_defined ? fmin(GT_CROWDED * (it->now.stop - it->now.start), GT_CROWDED_TIME) : GT_CROWDED;
+    if (it->now.time - it->now.events_since > span) {
         it->now.events = 0;
         it->now.events_since = it->now.time;
     }
     if (++it->now.events <= GT_MOST_EVENTS) return GT_OK;
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s, the last of %s at time = %.9g s: they come ever faster, "
                   "or turn back and forth without end; let what repeats come to rest, as by a condition on its speed, or smooth "
-                  "it", GT_NAME, GT_MOST_EVENTS, GT_CROWDED * span, it->last_event, it->now.time);
+                  "it", GT_NAME, GT_MOST_EVENTS, span, it->last_event ? it->last_event : "what an importer found",
+                  it->now.time);
 }
 
 /* All that happens at the present instant, in rounds, until no condition becomes true any more. */
@@ -331,13 +333,15 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
         if (status == GT_OK) status = gt_friction_events(it, &changed);
         if (GT_WHENS && status == GT_OK) status = gt_act(it, info, &acted);
         if (acted) actor = it->last_event;
-        happened |= turned | changed | acted;
+        happened |= turned || changed || acted;
     }
     if (actor) it->last_event = actor;
+    if (GT_GAPS && !it->cosimulation) happened |= 2; /* an importer found an event: where nothing turned it goes on from there */
     if (happened && status == GT_OK) status = gt_count(it);
+    if (happened && status == GT_OK) status = gt_slacken(it);
     if (status == GT_OK) status = gt_next_turn(it, &turn);
     if (status != GT_OK) return status;
-    info->again = sampled || happened;
+    info->again = sampled || happened & 1;
     info->terminate = it->now.ended != 0;
     info->next = fmin(gt_next_sample(it, INFINITY), turn);
     info->next_defined = info->next < INFINITY;

@@ -188,7 +188,7 @@ GT_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Bo
     if (!gt_has(c, __func__, "a result", event_mode, 1) || !gt_has(c, __func__, "a result", terminate, 1))
         return fmi2Error;
     *event_mode = *terminate = 0;
-    return (fmi2Status)gt_fail(c, gt_completed(c->it));
+    return (fmi2Status)gt_call_completed(c);
 }
 
 GT_EXPORT fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {

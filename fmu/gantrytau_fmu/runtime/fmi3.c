@@ -306,7 +306,7 @@ GT_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bool
     if (!gt_has(c, __func__, "a result", event_mode, 1) || !gt_has(c, __func__, "a result", terminate, 1))
         return fmi3Error;
     *event_mode = *terminate = false;
-    return (fmi3Status)gt_fail(c, gt_completed(c->it));
+    return (fmi3Status)gt_call_completed(c);
 }
 
 GT_EXPORT fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {

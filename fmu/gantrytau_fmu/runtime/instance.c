@@ -34,6 +34,7 @@ typedef struct {
     double first_held[GT_ROOM(GT_STEPPING)], first_x[GT_ROOM(GT_STATES)];
     int first_holds[GT_ROOM(GT_WHENS)];
     int holds[GT_ROOM(GT_WHENS)];     /* whether conditions of whens did when they were looked at last */
+    double slack[GT_ROOM(GT_GAPS)];   /* how far behind a turn its mode was found to be that before it, for it turns round there */
     int ended;                        /* number, from 1, of the when that has ended the run */
     int events;                       /* since events_since, s */
     double events_since;

@@ -207,6 +207,7 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
             continue;
         }
         here = there;
+        gt_tighten(it, &here.gaps);
         it->now.size = h = gt_next_size(h, size, norm, last, rejected);
         rejected = 0;
         if (status == GT_OK && !last) status = gt_accepted(it);

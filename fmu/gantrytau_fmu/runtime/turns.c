@@ -66,11 +66,12 @@ static void gt_find_gaps(const gt_instance *it, const gt_margins *margins, gt_ga
         const double sign = gt_turn_counts[i] ? 1 : 2 * modes[i] - 1;
         found->left[i] = sign * margins->values[i] - (gt_turn_counts[i] ? modes[i] : 0);
         found->rates[i] = sign * margins->rates[i];
-        found->noise[i] = margins->noise[i];
+        found->noise[i] = margins->noise[i] + it->now.slack[i];
         if (!gt_turn_counts[i]) continue;
         found->left[more] = modes[i] + 1 - margins->values[i];
         found->rates[more] = -margins->rates[i];
-        found->noise[more++] = margins->noise[i];
+        found->noise[more] = margins->noise[i] + it->now.slack[more];
+        more++;
     }
 }
 
@@ -82,12 +83,14 @@ static gt_status gt_look_at_gaps(gt_instance *it, gt_gaps *found) {
 }
 
 /* The modes just after the present instant: where a margin is zero, its rate decides. */
-static void gt_following(const gt_margins *at, double time, double *modes) {
-    int i;
+static void gt_following(const gt_instance *it, const gt_margins *at, double *modes) {
+    int i, more = GT_TURNS;
     for (i = 0; i < GT_TURNS; i++) {
+        const double slack = fmax(it->now.slack[i], gt_turn_counts[i] ? it->now.slack[more++] : 0);
         const double value = at->values[i], whole = gt_turn_counts[i] ? nearbyint(value) : 0;
         /* as near as a crossing is located, so that what turns round there is not left behind it */
-        const double near = GT_NEAR * at->noise[i] + (GT_LATE + GT_LATE_BY_TIME * fabs(time)) * fabs(at->rates[i]);
+        const double late = GT_LATE + GT_LATE_BY_TIME * fabs(it->now.time);
+        const double near = GT_NEAR * at->noise[i] + late * fabs(at->rates[i]) + 1.5 * slack;
         if (fabs(value - whole) <= near && at->rates[i] != 0)
             modes[i] = gt_turn_counts[i] ? whole - (at->rates[i] < 0) : at->rates[i] > 0;
         else
@@ -102,7 +105,7 @@ static gt_status gt_led_to(gt_instance *it, const double *modes, double *found) 
     memcpy(it->now.m + GT_FRICTIONS, modes, GT_TURNS * sizeof(double));
     it->now.stale = it->outputs_stale = 1;
     status = gt_look(it, &margins);
-    if (status == GT_OK) gt_following(&margins, it->now.time, found);
+    if (status == GT_OK) gt_following(it, &margins, found);
     return status;
 }
 
@@ -157,7 +160,7 @@ static gt_status gt_agree(gt_instance *it, int *changed) {
         else {
             gt_margins margins;
             status = gt_look(it, &margins);
-            if (status == GT_OK) gt_following(&margins, it->now.time, found);
+            if (status == GT_OK) gt_following(it, &margins, found);
         }
         if (status != GT_OK) return status;
         if (gt_are_equal(found, tried[count])) break;
@@ -180,6 +183,26 @@ static gt_status gt_agree(gt_instance *it, int *changed) {
             gt_say(it, GT_OK, GT_LOG_EVENTS, "%s: at time = %.9g s %s turns", GT_NAME, it->now.time, gt_conditions[i]);
         }
     return GT_OK;
+}
+
+/* After an event: what is behind a turn but goes back (a ball that has just been thrown up) is not looked at until it has
+ * passed by as much again, or an importer that looks at signs would take it for passed already. */
+static gt_status gt_slacken(gt_instance *it) {
+    gt_gaps gaps;
+    gt_status status;
+    int i;
+    memset(it->now.slack, 0, sizeof it->now.slack);
+    if (!GT_TURNS) return GT_OK;
+    status = gt_look_at_gaps(it, &gaps);
+    for (i = 0; i < GT_GAPS && status == GT_OK; i++) it->now.slack[i] = fmax(0, -gaps.left[i]);
+    return status;
+}
+
+/* What has come out before its turn again needs no slack. */
+static void gt_tighten(gt_instance *it, const gt_gaps *gaps) {
+    int i;
+    for (i = 0; i < GT_GAPS; i++)
+        if (gaps->left[i] > 0) it->now.slack[i] = 0;
 }
 
 /* The next instant at which something turns by the time alone; INFINITY if there is none. */
@@ -245,7 +268,7 @@ static int gt_strays(gt_instance *it, double t, double size, const double *x, co
         for (i = 0; i < GT_GAPS; i++) {
             const double g0 = first->left[i], g1 = last->left[i], g = middle.left[i];
             const double expected = 0.5 * (g0 + g1) + 0.125 * size * (first->rates[i] - last->rates[i]);
-            if (g < -middle.noise[i] || fabs(g - expected) > GT_STRAYS * fmax(g0, g1)) strays = 1;
+            if (g < -middle.noise[i] || fabs(g - expected) > GT_STRAYS * fmax(g0, g1) + 4 * middle.noise[i]) strays = 1;
         }
     it->sink = sink;
     it->now = kept;

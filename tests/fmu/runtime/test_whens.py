@@ -10,6 +10,7 @@ from gantrytau import (
     Input,
     Model,
     Real,
+    SolveError,
     der,
     logic_and,
     pre,
@@ -19,7 +20,7 @@ from gantrytau import (
     time,
     when,
 )
-from gantrytau_fmu import check_fmu, export_fmu
+from gantrytau_fmu import check_fmu, export_fmu, run_fmu
 from tests.fmu.exported import export
 from tests.fmu.jumping_models import Ball, Balls, G, Tank, Thermostat
 from tests.fmu.runtime.raw_calls import DISCARD, ERROR, OK
@@ -268,6 +269,23 @@ def test_bounces_that_come_ever_faster_end_with_the_name_of_their_condition(fmus
         assert "when((h<=0))" in run.instance.message
         assert "more than 1000 events" in run.instance.message
         assert run["time"] == pytest.approx(over, abs=1e-3)
+
+
+@VERSIONS
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+def test_they_do_so_in_model_exchange_where_an_importer_would_let_the_ball_fall_through(
+    fmus, version, tolerance
+):
+    with pytest.raises(SolveError, match=r"more than 1000 events.*when\(\(h<=0\)\)") as caught:
+        run_fmu(
+            fmus[Ball, version].path,
+            stop=3.0,
+            step=0.01,
+            start={"e": 0.5},
+            tolerance=tolerance,
+            model_exchange=True,
+        )
+    assert caught.value.result.final("h") > -1e-11  # a thousand times rounding
 
 
 @VERSIONS
