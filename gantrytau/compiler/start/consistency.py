@@ -74,9 +74,16 @@ class Level:
 
     def sizes(self, rows: Sequence[int], numbers: np.ndarray) -> np.ndarray:
         """How large the terms of some residuals are, at numbers of the leaves."""
-        x, _, _ = self._symbolic
-        terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
-        return np.array(ca.Function("sizes", [x], [terms])(numbers)).ravel()
+        key = tuple(rows)
+        if key not in self._sizes:
+            x, _, _ = self._symbolic
+            terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
+            self._sizes[key] = ca.Function("sizes", [x], [terms])
+        return np.array(self._sizes[key](numbers)).ravel()
+
+    @cached_property
+    def _sizes(self) -> dict[tuple[int, ...], ca.Function]:
+        return {}
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals, and the entries of their derivatives by the leaves, at numbers of the leaves."""
