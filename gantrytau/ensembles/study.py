@@ -51,14 +51,21 @@ def study(
     if isinstance(model, (Model, Translated)):
         task = model_task(model, axes, stop, inputs, outputs, policy)
         title, axes = task.dae.name, replace(axes, labels=labels(task))
-        fingerprint = {"equations and values": digest(task.dae.flat, task.dae.states, task.dae.known)}
-        fingerprint |= {name: digest(value) for name, value in sorted(task.policy.items())}
     else:
         task = function_task(model, axes, {"stop": stop, "inputs": inputs, "outputs": outputs, **policy})
-        title, fingerprint = task.name, {"function": digest(task.function)}
-    fingerprint |= {"over": digest(list(axes.over.items()), axes.combine), "seeds": digest(axes.seeds)}
-    kept = None if folder is None else KeptCases(folder, fingerprint)
+        title = task.name
+    kept = None if folder is None else KeptCases(folder, _fingerprint(task, axes))
     return _finished(title, axes, task, place, kept)
+
+
+def _fingerprint(task: ModelTask | FunctionTask, axes: Axes) -> dict[str, str]:
+    """What tells a study from others, part by part."""
+    if isinstance(task, ModelTask):
+        found = {"equations and values": digest(task.dae.flat, task.dae.states, task.dae.known)}
+        found |= {name: digest(value) for name, value in sorted(task.policy.items())}
+    else:
+        found = {"function": digest(task.function)}
+    return found | {"over": digest(list(axes.over.items()), axes.combine), "seeds": digest(axes.seeds)}
 
 
 def _finished(
