@@ -3,13 +3,14 @@
 from typing import Any
 
 from gantrytau import Input, Model, Output
+from gantrytau.errors import ModelError
 
 
 class Block(Model):
     """Base of blocks with an input u and an output y, both scalar: `unit="m"` for both, or `unit=("V", "N")`.
 
     Without a unit a port is open: it takes what is connected to it, and claims nothing of it. Gains and limits
-    are open as well, times and frequencies are not. Raises ModelError where connected units disagree.
+    are open as well, times and frequencies are not. Raises ModelError for another unit=, and where connected units disagree.
     """
 
     u = Input(description="input")
@@ -17,6 +18,10 @@ class Block(Model):
 
     def __init__(self, *, unit: str | tuple[str, str] | None = None, **modifications: Any):
         units = (unit, unit) if unit is None or isinstance(unit, str) else unit
+        if not (isinstance(units, tuple) and len(units) == 2):
+            raise ModelError(
+                f"{type(self).__name__}: unit: found {unit!r}, expected a text for both ports, or a pair for u and y"
+            )
         super().__init__(_units(("u", "y"), units), **modifications)
 
 

@@ -40,6 +40,10 @@ class Pid(Model):
     actuator = Unlimited()
 
     def __init__(self, *, limits: tuple[Any, Any] | None = None, **modifications: Any):
+        if not (limits is None or (isinstance(limits, (tuple, list)) and len(limits) == 2)):
+            raise ModelError(
+                f"{type(self).__name__}: limits: found {limits!r}, expected a pair, as (-10.0, 10.0); leave it out for none"
+            )
         defaults = {} if limits is None else dict(actuator=Limiter(lower=limits[0], upper=limits[1]))
         super().__init__(defaults, **modifications)
 

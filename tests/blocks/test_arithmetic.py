@@ -1,5 +1,7 @@
 """Gains, sums and products; what units signals have."""
 
+from typing import Any
+
 import pytest
 
 from gantrytau import Array, Input, Model, ModelError, connect, translate
@@ -83,6 +85,15 @@ def test_the_unit_of_a_gain_itself_is_checked_where_it_is_said():
     assert translate(Said()).evaluate({"force.f": 500.0})["mass.v"] == pytest.approx(0.5, rel=1e-15)
     with pytest.raises(ModelError, match=r"units disagree in `.*gain"):
         translate(Said(gain=dict(k=dict(unit="kg/s"))))
+
+
+def test_units_are_one_or_a_pair():
+    for unit in (("N", "V", "m"), 3, ("N",)):
+        wrong: Any = unit
+        with pytest.raises(
+            ModelError, match=r"Gain: unit: found .*, expected a text for both ports, or a pair for u and y"
+        ):
+            Gain(unit=wrong)
 
 
 def test_the_low_pass_among_the_blocks_is_that_of_the_filters():

@@ -1,5 +1,7 @@
 """The PID controller: its transfer function, its poles in a loop, its limits."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -135,3 +137,12 @@ def test_a_controller_without_its_derivative_holds_an_integrator():
 def test_wrong_controllers(settings, words):
     with pytest.raises(ModelError, match=words):
         translate(Open(pid=settings))
+
+
+def test_wrong_limits():
+    wrongs: list[Any] = [3.0, (1.0,), (1.0, 2.0, 3.0)]
+    for wrong in wrongs:
+        with pytest.raises(ModelError, match=r"Pid: limits: found .*, expected a pair, as \(-10.0, 10.0\)"):
+            Pid(limits=wrong)
+    with pytest.raises(ModelError, match="expected upper >= lower; exchange the two"):
+        translate(Pid(limits=(1.0, -1.0)))
