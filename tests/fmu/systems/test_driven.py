@@ -7,7 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from gantrytau import (
+    Discrete,
     Input,
+    Mode,
     Model,
     ModelError,
     Output,
@@ -16,8 +18,11 @@ from gantrytau import (
     chirp,
     der,
     prbs,
+    pre,
     simulate,
     steps,
+    transition,
+    when,
     white_noise,
 )
 from gantrytau.commands.app import app
@@ -157,3 +162,30 @@ def test_the_command_takes_signals_and_held_columns(lags, tmp_path):
     inputs = {"u[0]": prbs(5, 0.1), "u[1]": steps([0.2], [1.0])}
     exact = simulate(Lags(), stop=1.0, inputs=inputs, seed=4, tolerance=1e-10)
     np.testing.assert_allclose([drawn["y[0]"], drawn["y[1]"]], exact.final("y"), atol=1e-8)
+
+
+class Counter(Model):
+    """Counts how often its input rises through a level, and how often it does so from far below."""
+
+    u = Input(unit="1", description="input")
+    rises = Discrete(0.0, description="rises through a half")
+    swings = Discrete(0.0, description="rises from below minus a half")
+    mode = Mode("low", "high")
+
+    def equations(self):
+        yield when(self.u > 0.5, self.rises == pre(self.rises) + 1)
+        yield transition(self.mode, "low", "high", self.u > 0.5, self.swings == pre(self.swings) + 1)
+        yield transition(self.mode, "high", "low", self.u < -0.5)
+
+
+def test_what_happens_by_a_held_input_is_counted_right(tmp_path):
+    noise = white_noise(1.0, 0.01, seed=2)
+    values = noise.samples(0.0, 5.0).values[:, 0]
+    rises = int(np.sum((values[1:] > 0.5) & (values[:-1] <= 0.5)))
+    far = values[np.abs(values) > 0.5]
+    swings = int(np.sum((far > 0) & (np.append(-1.0, far[:-1]) < 0)))
+    file = export_fmu(Counter(), tmp_path / "counter.fmu")
+    runs = [simulate(Counter(), stop=5.0, points=points, inputs={"u": noise}) for points in (2, 501)]
+    runs += [run_fmu(file, stop=5.0, step=step, inputs={"u": noise}) for step in (0.01, 0.37)]
+    runs.append(run_fmu(file, stop=5.0, step=0.1, inputs={"u": noise}, model_exchange=True))
+    assert [(found.final("rises"), found.final("swings")) for found in runs] == [(rises, swings)] * 5
