@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,8 +20,8 @@ def table(
     xs: Any,
     ys: Any,
     *,
-    kind: Literal["linear", "spline"] = "linear",
-    outside: Literal["hold", "linear", "error"] = "hold",
+    kind: str = "linear",
+    outside: str = "hold",
 ) -> Any:
     """The value at x of a table of numbers, as an expression: it has derivatives, and goes into C code as it is.
 
@@ -56,7 +56,7 @@ def table(
                 "for each of ys; transpose or correct them"
             )
     else:
-        axes, values = (_axis("xs", xs),), _numbers("ys", ys)
+        axes, values = [_axis("xs", xs)], _numbers("ys", ys)
         if values.shape != axes[0].shape:
             raise ModelError(
                 f"table: found {axes[0].size} numbers xs and ys of shape {values.shape}, expected as many, ({axes[0].size},)"
@@ -69,7 +69,7 @@ def _later(*arguments: Any, xs: Any, ys: Any, kind: Any, outside: Any) -> Any:
 
 
 def _value(
-    at: Sequence[ca.SX], axes: tuple[np.ndarray, ...], values: np.ndarray, kind: str, outside: str
+    at: Sequence[ca.SX], axes: Sequence[np.ndarray], values: np.ndarray, kind: str, outside: str
 ) -> ca.SX:
     """The table at scalar arguments."""
     weights = interpolating(axes[0], values, kind)
@@ -112,13 +112,13 @@ def _applied(function: Callable[..., ca.SX], arguments: tuple[Any, ...]) -> Any:
     return found
 
 
-def _axes(given: Any) -> tuple[np.ndarray, ...]:
+def _axes(given: Any) -> list[np.ndarray]:
     if not isinstance(given, (tuple, list)) or len(given) != 2:
         raise ModelError(
             f"table: found {type(given).__name__} for the numbers of two arguments, expected (xs, ys), as in "
             "table((x, y), (xs, ys), values)"
         )
-    return _axis("xs", given[0]), _axis("ys", given[1])
+    return [_axis("xs", given[0]), _axis("ys", given[1])]
 
 
 def _axis(name: str, given: Any) -> np.ndarray:

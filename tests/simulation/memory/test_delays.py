@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from gantrytau import (
+    Discrete,
     InitializationError,
     Input,
     Model,
@@ -22,6 +23,7 @@ from gantrytau import (
     if_else,
     linearize,
     reinit,
+    sampled,
     sign,
     simulate,
     sin,
@@ -227,6 +229,51 @@ def test_a_bounce_is_seen_later():
 
     motion = simulate(Ball(), stop=1.5)
     assert abs(motion.final("s") + 1.0 - motion.at(1.4, "h")) < 10 * TOLERANCE  # of the height 0.1 s ago
+
+
+@pytest.mark.parametrize("T", [1e-9, 1.0, 1e9])
+def test_delays_of_any_scale_and_any_start(T):
+    class Scaled(Model):
+        x = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield T * der(self.x) == -delay(self.x, T)
+
+    assert abs(simulate(Scaled(), stop=3 * T).final("x") + 1 / 6) < TOLERANCE  # 1 - 3 + 2^2 / 2 - 1 / 6
+    assert abs(simulate(Scaled(), start=-T, stop=2 * T).final("x") + 1 / 6) < TOLERANCE
+    assert abs(simulate(Scaled(), stop=0.5 * T).final("x") - 0.5) < TOLERANCE  # shorter than the delay
+
+
+def test_a_sampled_controller_with_a_late_measurement():
+    class Sampled(Model):
+        u = Real(start=0.0)
+        y = Real()
+        x = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield sampled(self.u, -2 * delay(self.x, 0.05), period=0.1)
+            yield der(self.x) == self.u
+            yield self.y == delay(self.u, 0.03)
+
+    x, u = 1.0, 0.0
+    for k in range(10):
+        u = -2 * (x - 0.05 * u if k else 1.0)
+        x += 0.1 * u
+    motion = simulate(Sampled(), stop=1.0)
+    assert abs(motion.final("x") - x) < TOLERANCE
+    assert abs(motion.final("y") - u) < TOLERANCE  # the sample at 1 s arrives at 1.03 s
+
+
+def test_a_discrete_is_delayed():
+    class Counting(Model):
+        n = Discrete(0.0)
+        area = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield when(time > 0.3, self.n == 2.0)
+            yield der(self.area) == delay(self.n, 0.25)
+
+    assert abs(simulate(Counting(), stop=1.0).final("area") - 2 * 0.45) < TOLERANCE
 
 
 def test_a_start_that_is_delayed_is_consistent():
