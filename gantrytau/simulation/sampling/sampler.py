@@ -172,6 +172,8 @@ class Sampler:
     def _adapt(self, error: np.ndarray, h: np.ndarray) -> None:
         """Choose the next step from errors, of which the last may be above the tolerance."""
         k = int(np.argmax(error))
+        if h[: error.size].max() == 0:  # nothing but a jump of inputs
+            return
         if error[k] > 1:
             self.step = h[error.size - 1] * max(SHRINK, SAFETY * error[-1] ** (-1 / ORDER))
         elif error[k] > 0:

@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from gantrytau import (
+    Input,
     Model,
     Parameter,
     Real,
@@ -111,6 +112,32 @@ def test_switches_of_states_and_of_what_is_held_are_those_of_the_integrator(monk
     quick, slow = both_ways(monkeypatch, Bounded(), names, stop=2.0, points=points)
     assert np.abs(quick - slow).max() < 10 * NEAR  # gains of 5 and 20
     assert points < 3 or np.ptp(slow[4]) == 7.0  # both limits are met
+
+
+class Kicked(Oscillator):
+    """The same with friction, kicked by an input that jumps."""
+
+    kick = Input(start=0.0, description="force of the kicks")
+    seen = Real(description="sampled kick")
+
+    def equations(self):
+        yield self.v == der(self.x)
+        yield self.m * der(self.v) == self.f - self.c * self.x + self.kick - 0.3 * fabs(self.v) * self.v
+        yield sampled(self.seen, self.kick, period=0.03)
+        yield sampled(self.integral, self.integral - 20.0 * self.x, period=0.03)
+        yield sampled(self.f, -5.0 * self.v + self.integral, period=0.02)
+
+
+def test_inputs_that_jump_between_switches_and_instants(monkeypatch):
+    times = np.unique(np.round(np.random.default_rng(2).uniform(0.0, 1.0, 60), 3))
+    times = np.unique([0.0, *times, 0.63, 1.0])
+    kicks = np.random.default_rng(3).uniform(-9.0, 9.0, times.size)
+    given = {"kick": Samples(times, kicks, kind="constant")}
+    names = ["x", "v", "f", "seen"]
+    found = both_ways(monkeypatch, Kicked(), names, stop=1.0, points=41, inputs=given)
+    assert np.abs(found[0] - found[1]).max() < 10 * NEAR  # gains of 5 and 20
+    latest = {kicks[np.searchsorted(times, 0.03 * k + 1e-9) - 1] for k in range(34)}
+    assert set(found[0][3].tolist()) <= latest | {0.0}
 
 
 def test_a_stiff_plant_is_left_to_the_integrator_and_right(monkeypatch):
