@@ -65,7 +65,8 @@ def table(
 
 
 def _later(*arguments: Any, xs: Any, ys: Any, kind: Any, outside: Any) -> Any:
-    return table(arguments if len(arguments) > 1 else arguments[0], xs, ys, kind=kind, outside=outside)
+    x = arguments if len(arguments) == 2 else next(iter(arguments))
+    return table(x, xs, ys, kind=kind, outside=outside)
 
 
 def _value(
