@@ -40,12 +40,12 @@ def _feed(found: Any, thing: Any, around: frozenset[int]) -> None:
 
 def _whole(thing: Any) -> bytes | None:
     """What has no parts, as bytes."""
-    if isinstance(thing, np.ndarray) and thing.dtype != object:
-        return f"array {thing.dtype.str} {thing.shape};".encode() + np.ascontiguousarray(thing).tobytes()
-    if isinstance(thing, (ca.SX, ca.MX)):
-        return f"expression {_written(thing)};".encode()
     if isinstance(thing, ca.Function):
         return f"function {thing.serialize()};".encode()
+    if isinstance(thing, (ca.SX, ca.MX)):
+        return f"expression {_written(thing)};".encode()
+    if isinstance(thing, np.ndarray) and thing.dtype != object:
+        return f"array {thing.dtype.str} {thing.shape};".encode() + np.ascontiguousarray(thing).tobytes()
     parts = isinstance(thing, (list, tuple, np.ndarray, Mapping, set, frozenset)) or hasattr(
         thing, "__dict__"
     )

@@ -1,5 +1,7 @@
 """Pictures of studies: lines that say which case they are, bands that hold as many as they say."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 import pytest
@@ -21,14 +23,14 @@ def courses(count):
 
 
 def test_few_cases_are_lines_with_their_names():
-    axis = draw_fan(courses(3), ["x"], None, "Level").axes[0]
+    axis: Any = draw_fan(courses(3), ["x"], None, "Level").axes[0]
     assert [line.get_ydata()[0] for line in axis.lines] == [0, 1, 2]
     assert [text.get_text() for text in axis.get_legend().get_texts()] == ["seed=0", "seed=1", "seed=2"]
     assert axis.get_ylabel() == "x [m]"
 
 
 def test_many_cases_are_a_median_and_bands_that_hold_their_share():
-    axis = draw_fan(courses(101), ["x"], None, "Level").axes[0]
+    axis: Any = draw_fan(courses(101), ["x"], None, "Level").axes[0]
     (median,) = axis.lines
     assert np.all(median.get_ydata() == 50)
     wide, narrow = (band.get_paths()[0].get_extents() for band in axis.collections)
@@ -36,8 +38,8 @@ def test_many_cases_are_a_median_and_bands_that_hold_their_share():
 
 
 def test_many_lines_are_coloured_by_what_was_named_first(tmp_path):
-    found = study(Pendulum(), stop=0.2, over={"m": [1.0, 2.0], "x": np.linspace(0.1, 0.5, 5)}, points=5)
-    axis = found.plot("x", file=tmp_path / "swings.png").axes[0]
+    found = study(Pendulum(), stop=0.2, over={"m": [1.0, 2.0], "x": [0.1, 0.2, 0.3, 0.4, 0.5]}, points=5)
+    axis: Any = found.plot("x", file=tmp_path / "swings.png").axes[0]
     assert len({line.get_color().tobytes() for line in axis.lines}) == 2
     assert {text.get_text() for text in axis.get_legend().get_texts()} == {"m=1", "m=2"}
     assert (tmp_path / "swings.png").stat().st_size > 1000

@@ -76,7 +76,7 @@ def _client(where: str) -> Iterator[Any]:
             "dask: not installed, but where='dask' and addresses need it; pip install 'gantrytau[cluster]'"
         ) from error
     if where == "dask":
-        options = dict(threads_per_worker=1, processes=True, dashboard_address=":0")
+        options: dict[str, Any] = dict(threads_per_worker=1, processes=True, dashboard_address=":0")
         try:
             local = LocalCluster(n_workers=processors(), **options)
         except RuntimeError as error:
