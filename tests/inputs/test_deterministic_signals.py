@@ -1,11 +1,15 @@
 """Steps, sweeps and sums of sines against scipy and their definitions."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.signal import chirp as sweep
 
 from gantrytau import ModelError, chirp, multisine, steps
+
+SQUARE: Any = "square"
 
 
 def test_steps_are_zero_before_the_first_and_hold_the_last():
@@ -98,7 +102,7 @@ def test_samples_of_smooth_signals_are_near_them(signal):
         (lambda: chirp(0.0, 1.0, 1.0), "chirp: found low=0.0, expected a number above zero, in Hz"),
         (lambda: chirp(1.0, 2.0, -1.0), "chirp: found duration=-1.0, expected a number above zero, in s"),
         (
-            lambda: chirp(1.0, 2.0, 1.0, kind="square"),
+            lambda: chirp(1.0, 2.0, 1.0, kind=SQUARE),
             "chirp: found kind='square', expected 'linear' or 'logarithmic'",
         ),
         (lambda: multisine([1.0, 1.0]), "found a frequency twice"),

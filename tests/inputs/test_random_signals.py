@@ -1,5 +1,7 @@
 """White noise and binary sequences: their statistics, and that they are the same numbers for a seed."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -8,6 +10,7 @@ from gantrytau import InputSignal, ModelError, Samples, prbs, white_noise
 from gantrytau.inputs.random_signals import LAGS
 
 PERIOD = 0.01
+HALF: Any = 1.5
 
 
 def test_white_noise_has_the_moments_of_a_normal_distribution():
@@ -151,7 +154,7 @@ def test_values_are_held_from_their_instants_on(period):
 
 
 def test_records_tell_themselves_and_compare():
-    signal = white_noise(0.1, 0.001, seed=3)
+    signal: Any = white_noise(0.1, 0.001, seed=3)
     assert repr(signal) == "white_noise(std=0.1, period=0.001, seed=3)"
     assert repr(prbs(5, 0.1, 2.0, 1)) == "prbs(bits=5, hold=0.1, amplitude=2, seed=1)"
     assert signal == white_noise(0.1, 0.001, seed=3) != white_noise(0.1, 0.001, seed=4)
@@ -172,7 +175,7 @@ def test_records_tell_themselves_and_compare():
         (lambda: white_noise("loud", 0.1), "white_noise: found std='loud'"),
         (lambda: white_noise(1.0, 0.0), "white_noise: found period=0.0, expected a number above zero, in s"),
         (
-            lambda: white_noise(1.0, 0.1, seed=1.5),
+            lambda: white_noise(1.0, 0.1, seed=HALF),
             "white_noise: found seed=1.5, expected a whole number from 0 on",
         ),
         (lambda: white_noise(1.0, 0.1, seed=-1), "found seed=-1"),

@@ -1,5 +1,7 @@
 """Modes and their transitions against closed forms: on events, at instants, by priority, in arrays."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -269,7 +271,7 @@ class Rooms(Model):
     rooms = Array(Thermostat, [dict(T=Fixed(295.0)), dict(T=Fixed(290.0)), dict(mode=Start("on"))])
 
     def equations(self):
-        return ()
+        yield from ()
 
 
 def test_modes_in_arrays():
@@ -323,7 +325,8 @@ def test_modes_are_drawn_as_bands(tmp_path):
     found = simulate(Wall(), stop=1.0)
     figure = found.plot("mode", "s", file=tmp_path / "wall.png")
     bands, line = figure.axes
-    words = [text.get_text() for text in bands.get_legend().get_texts()]
+    legend: Any = bands.get_legend()
+    words = [text.get_text() for text in legend.get_texts()]
     assert words == ["approach", "contact", "release"]
     edges = [patch.get_extents().transformed(bands.transData.inverted()).intervalx for patch in bands.patches]
     np.testing.assert_allclose(np.ravel(edges)[1:-1:2], [*instants(found)], atol=1e-9)

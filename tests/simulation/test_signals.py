@@ -1,5 +1,7 @@
 """Samples and signals as inputs of a simulation: exact at every jump, however short what follows it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -129,7 +131,7 @@ def test_a_lag_driven_by_noise_is_the_discrete_one():
     noise = white_noise(1.0, 0.02, seed=5)
     found = simulate(Lag(), stop=4.0, inputs={"u": noise}, points=201, tolerance=TOLERANCE)
     pole = np.exp(-0.02 / 0.1)
-    exact = lfilter([0.0, 1 - pole], [1.0, -pole], noise.values(0.02 * np.arange(201)))
+    exact: Any = lfilter([0.0, 1 - pole], [1.0, -pole], noise.values(0.02 * np.arange(201)))
     at = np.searchsorted(found.time, np.linspace(0.0, 4.0, 201))
     np.testing.assert_allclose(found["x"][at], exact, atol=100 * TOLERANCE)  # errors of 200 starts add up
 
@@ -190,7 +192,7 @@ def test_signals_without_seed_take_that_of_the_run():
     first = courses(1)
     np.testing.assert_array_equal(first, courses(1))
     assert not np.any(np.all(np.isclose(first, courses(2)), axis=1))
-    correlation = np.corrcoef(first)
+    correlation: Any = np.corrcoef(first)
     assert np.abs(correlation[~np.eye(3, dtype=bool)]).max() < 4 / np.sqrt(500)
     own = white_noise(1.0, 0.1, seed=9)
     kept = courses(1, **{"u[1]": own})

@@ -1,5 +1,7 @@
 """Modes in FMUs of both versions and interfaces, as in `simulate`: on events, at instants, at the start, and refused."""
 
+from typing import Any
+
 import pytest
 
 from gantrytau import Fixed, SolveError, simulate
@@ -23,7 +25,7 @@ def test_an_fmu_changes_its_modes_as_simulate_does(which, fmi, tmp_path):
     file = export_fmu(model, tmp_path / "model.fmu", fmi=fmi, tolerance=1e-10)
     exact = simulate(model, stop=stop, points=11, tolerance=1e-10)
     for model_exchange in (False, True):
-        policy = dict(tolerance=1e-9) if model_exchange else {}
+        policy: Any = dict(tolerance=1e-9) if model_exchange else {}
         found = run_fmu(file, stop=stop, step=stop / 10, model_exchange=model_exchange, **policy)
         assert found.final("mode") == exact.final("mode")
         # errors of the runs at their tolerances, which the growth of a motion through its events multiplies
