@@ -9,6 +9,7 @@ from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.signals import SampledCourse, Signal
 
+NEAR = 64  # times the rounding of time, within which a jump is that of an output point
 LEAST_STEPS = (
     500  # between places at which singular poses and switches are looked for, whatever points are asked for
 )
@@ -139,9 +140,13 @@ class Trail:
         if not written:
             self.kept[self.kept == k] = k + 1
 
-    def show(self, *places: int) -> None:
-        """Let results have some places as well."""
-        self.kept = np.union1d(self.kept, places)
+    def show(self, before: int, behind: int) -> None:
+        """Let results have both sides of a jump; where rounding put it behind an output point, it is there."""
+        near = max(before - 1, 0)
+        if near in self.kept and self.t[before] - self.t[near] <= NEAR * np.spacing(abs(self.t[before])):
+            self.t[before : behind + 1] = self.t[near]
+            before = near
+        self.kept = np.union1d(self.kept, (before, behind))
 
     def stop_at(self, t: float, behind: int) -> None:
         """Let an integration end at a time behind a place."""

@@ -65,14 +65,18 @@ def test_a_pulse_of_an_input_is_found_whatever_points_are_asked_for(points, widt
     push = {"f": lambda t: if_else(between(3.0, t, 3.0 + width), 2 / width, 0.0)}
     found = simulate(Pushed(), stop=5.0, inputs=push, points=points)
     assert found.final("v") == pytest.approx(2.0, abs=1e-8)
-    assert found.time.size == points
+    before = np.flatnonzero(np.diff(found.time) == 0)
+    np.testing.assert_allclose(found.time[before], [3.0, 3.0 + width], rtol=1e-14)
+    np.testing.assert_array_equal(found["f"][before], [0.0, 2 / width])
+    np.testing.assert_array_equal(found["f"][before + 1], [2 / width, 0.0])
 
 
-def test_a_signal_is_shown_as_it_is_written_where_it_jumps():
+def test_a_signal_is_shown_on_both_sides_of_where_it_jumps():
     push = {"f": lambda t: if_else(between(1.0, t, 3.0), 10.0, 0.0)}
     found = simulate(Pushed(), stop=4.0, inputs=push, points=5)
-    np.testing.assert_array_equal(found["f"], [0, 10, 10, 10, 0])
-    np.testing.assert_allclose(found["v"], [0, 0, 10, 20, 20], atol=1e-8)
+    np.testing.assert_array_equal(found.time, [0, 1, 1, 2, 3, 3, 4])
+    np.testing.assert_array_equal(found["f"], [0, 0, 10, 10, 10, 0, 0])
+    np.testing.assert_allclose(found["v"], [0, 0, 0, 10, 20, 20, 20], atol=1e-8)
 
 
 @pytest.mark.parametrize("points", POINTS)
@@ -169,8 +173,9 @@ def test_two_conditions_at_once_and_one_that_hangs_on_another():
             yield der(self.n) == if_else(self.y > if_else(self.x > 0, 0.0, 5.0), 1.0, 0.0)
 
     found = simulate(Two(), stop=3.0, points=4)
-    np.testing.assert_allclose(found["x"], [-1, 0, 0.5, 1], atol=1e-8)
-    np.testing.assert_allclose(found["n"], [0, 0, 1, 2], atol=1e-8)
+    np.testing.assert_array_equal(found.time, [0, 1, 1, 2, 3])
+    np.testing.assert_allclose(found["x"], [-1, 0, 0, 0.5, 1], atol=1e-8)
+    np.testing.assert_allclose(found["n"], [0, 0, 0, 1, 2], atol=1e-8)
 
 
 def test_an_algebraic_variable_jumps_with_what_it_follows():

@@ -132,6 +132,9 @@ class Changes:
                     trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
                     k = k + 1
                 self._agree(k, modes)
+                sampled = trail.due[left].any()  # results have the side behind only
+                if k > left and not sampled and switches.jumped(self.point(left), self.point(k)):
+                    trail.show(left, k)
             if by_states:
                 self._count(self.modes(k), first, float(trail.t[k]))
         k = self._act(left, k)

@@ -12,6 +12,7 @@ from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.singular_poses import Point
 
+JUMP = 1e-6  # of the largest rate or algebraic: less is no jump
 ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
 
 
@@ -58,6 +59,7 @@ class Switches:
             change = ca.jacobian(algebraic, time) + (ca.jacobian(algebraic, x) @ ode if x.numel() else 0)
             found += [by_z, ca.jacobian(algebraic, z), change]
         dense = [ca.densify(e) for e in found]
+        self._moves = ca.Function("moves", list(arguments), [ca.densify(ode)])
         self._slopes = ca.Function("slopes", list(arguments), [ca.densify(by_x)])
         self._look = ca.Function("margins", [*arguments, self._size], dense, {"cse": True})
 
@@ -82,6 +84,12 @@ class Switches:
         rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
         return Margins(values, rates, noise)
+
+    def jumped(self, before: Point, after: Point) -> bool:
+        """Whether rates or algebraics differ at two places of one instant; at a kink they do not."""
+        moves = [np.append(np.array(self._moves(x, z, t, t, w)), z) for x, z, t, w in (before, after)]
+        size = np.abs(moves).max(initial=0.0)
+        return bool(np.any(np.abs(moves[1] - moves[0]) > JUMP * size))
 
     def written(self, margins: np.ndarray) -> np.ndarray:
         """The modes that belong to margins as the model writes it."""
