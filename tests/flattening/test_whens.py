@@ -1,5 +1,7 @@
 """What a model states of instants at which a condition becomes true: its records, one round of them, and what is refused."""
 
+from typing import Any
+
 import casadi as ca
 import pytest
 
@@ -70,7 +72,7 @@ def refused(*lines: str, kind: type[Exception] = ModelError, **members) -> str:
     return str(error.value)
 
 
-COUNT = dict(n=Discrete(0, description="count"))
+COUNT: dict[str, Any] = dict(n=Discrete(0, description="count"))
 
 
 def test_records_of_a_ball():

@@ -159,10 +159,10 @@ def test_records_tell_themselves_and_compare():
     assert repr(prbs(5, 0.1, 2.0, 1)) == "prbs(bits=5, hold=0.1, amplitude=2, seed=1)"
     assert signal == white_noise(0.1, 0.001, seed=3) != white_noise(0.1, 0.001, seed=4)
     assert len({signal, white_noise(0.1, 0.001, seed=3), white_noise([0.1, 0.2], 0.001)}) == 2
-    assert isinstance(signal, InputSignal)
-    assert isinstance(signal.samples(0.0, 1.0), Samples)
     with pytest.raises(AttributeError):
         signal.std = 3.0
+    assert isinstance(signal, InputSignal)
+    assert isinstance(signal.samples(0.0, 1.0), Samples)
 
 
 @pytest.mark.parametrize(
