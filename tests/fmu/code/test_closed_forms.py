@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Fixed, Model, Parameter, Real, der, if_else, simulate, sin, translate
+from gantrytau_fmu.systems.slave import hook_log
 from gantrytau_models import GantryTau, Pendulum, prototypes
 from tests.fmu.exported import export
 from tests.fmu.runtime.raw_calls import OK
@@ -59,6 +60,7 @@ def test_the_integrator_of_an_importer_does_not_mirror_it(pendulums, version, to
             relative_tolerance=tolerance,
             logger=lambda *words: lines.append(words[-1]),
         )
+    hook_log()  # FMPy's proxy keeps calling the last logger, which is gone
     assert any(b"singular" in line for line in lines), lines
 
 
