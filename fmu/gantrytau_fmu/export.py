@@ -12,7 +12,6 @@ from typing import Literal
 
 from gantrytau import Dae, Model, translate
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.flattening.flat_checks import refuse_delays
 from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
@@ -30,8 +29,8 @@ from gantrytau_fmu.description import AboutFmu, Experiment, FmuDescription, FmuI
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
 RUNTIME = (
-    "functions.c instance.c linear.c solve.c passages.c values.c derivatives.c turns.c initialize.c events.c state.c "
-    "{solver}.c step.c calls.c component.c fmi2.c fmi3.c"
+    "functions.c instance.c linear.c past.c solve.c passages.c values.c derivatives.c turns.c history.c initialize.c "
+    "events.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
 )
 INCLUDED = ("functions.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
@@ -76,7 +75,6 @@ def export_fmu(
     targets = chosen(platforms)
     check_target(path)
     dae = _translated(model, given, find, states)
-    refuse_delays(dae.flat)
     dae = with_ends_of_tables(dae)
     outputs, others = _shown(dae, find)
     graph = entered(formulas_of(dae, [*outputs, *others]))
@@ -155,7 +153,7 @@ def _shown(dae: Dae, find: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, .
         )
     if find:
         return tuple(dict.fromkeys(_found(dae, name) for given in find for name in dae.expand(given))), ()
-    known = set(dae.inputs)
+    known = {*dae.inputs, *(d.name for d in dae.flat.delays)}
     names = [n for n in dict.fromkeys(dae.variables) if n not in known]
     own = {n for v in dae.flat.variables if v.kind == "output" and not v.owner for n in v.elements}
     outputs = tuple(n for n in names if n in own)
@@ -193,8 +191,9 @@ def _described(
     """The record of the FMU, in the words of FMI 3, before its binaries are there."""
     name = formulas.dae.name
     identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
-    # singular poses are looked for at the end of each step, also of an importer's integrator, as is what turned round
-    watched = bool(formulas.roots or formulas.blocks or formulas.switching.turns)
+    # singular poses are looked for at the end of each step, also of an importer's integrator, as is what turned round,
+    # and delays remember it
+    watched = bool(formulas.roots or formulas.blocks or formulas.switching.turns or formulas.delays)
     watches = {"model-exchange": {"needsCompletedIntegratorStep": watched}}
     return FmuDescription(
         **vars(about),

@@ -100,8 +100,8 @@ def refuse_delays(flat: FlatModel) -> None:
     """ModelError naming the first delay of a model."""
     for one in flat.delays:
         raise ModelError(
-            f"{one.name}: found a value of the past, expected equations of one time. simulate remembers it; functions, "
-            "linear systems, optimisation and FMUs cannot: leave it out there, or write a chain of first-order lags, "
+            f"{one.name}: found a value of the past, expected equations of one time. simulate and FMUs remember it; "
+            "functions, linear systems and optimisation cannot: leave it out there, or write a chain of first-order lags, "
             "T / n * der(y) == x - y, n times; translate(..., events=True) takes it as known"
         )
 

@@ -87,6 +87,8 @@ class _Listed:
         more.setdefault("unit", unit)
         more.setdefault("description", words)
         found, width = fmi_name(name), int(order > 1)
+        if name in self.formulas.delays:
+            found = f"'{name}'"  # no structured name by itself
         while (
             found in self.taken
         ):  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
@@ -341,8 +343,18 @@ def _structure(
         return Unknown(variables[reference].name, tuple(variables[k].name for k in known))
 
     # what initial equations determine depends on all that they may hold
+    # and what is delayed begins as what it looks back at
+    entries = listed.entries
+    late = {r for r, is_late in zip(listed.rates, depends.delayed_rates, strict=True) if is_late}
+    late |= {
+        r for r in by_output if entries[r].kind == "OUTPUT" and depends.delayed_outputs[entries[r].index]
+    }
+    late |= {
+        r for r in by_output if entries[r].kind == "DERIVATIVE" and depends.delayed_rates[entries[r].index]
+    }
     at_start = {
-        r: (row | first) if (row & ~first).any() else row & first for r, row in {**by_output, **rates}.items()
+        r: (row | first) if r in late or (row & ~first).any() else row & first
+        for r, row in {**by_output, **rates}.items()
     }
     at_start |= {found[n]: first for n in solved}
     calculated = [r for r in at_start if variables[r].initial == "calculated"]

@@ -1,6 +1,7 @@
 """The formulas of an FMU, taken from a Dae: what the runtime evaluates, in the arrays that it holds.
 
-t time, x states, u what is known from outside (inputs, then sampled variables, then Discretes), z unknowns of the blocks
+t time, x states, u what is known from outside (inputs, then sampled variables, then Discretes, then
+what is delayed), z unknowns of the blocks
 that have no closed form, p parameters, e which conditions of whens have become true, m modes of frictions with exact
 stick-slip (1 forward, -1 backward, 0 locked), then of what switches. The force of such a friction is one of the z; its
 equation depends on the mode.
@@ -42,8 +43,9 @@ class Formulas:
 
     careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
     expression by name; samples: new values of `held`, clocks: which period each follows; jump: what whens do; friction:
-    speed and breakaway force by turns; roots: name of an unknown -> what comes to zero where its closed form ends;
-    switching: what turns at events.
+    speed and breakaway force by turns; delays: what is known from the past, past: expressions of which it is that,
+    delay_times: in s; roots: name of an unknown -> what comes to zero where its closed form ends; switching: what turns
+    at events.
     """
 
     dae: Dae
@@ -57,6 +59,9 @@ class Formulas:
     periods: ca.SX
     discretes: tuple[str, ...]
     jump: JumpFormulas
+    delays: tuple[str, ...]
+    past: ca.SX
+    delay_times: ca.SX
     blocks: tuple[ImplicitBlock, ...]
     outputs: Mapping[str, ca.SX]
     frictions: tuple[str, ...]
@@ -80,8 +85,9 @@ class Formulas:
 
     @property
     def start_parameters(self) -> frozenset[str]:
-        """Parameters on which start values or sampling periods depend: they act during initialisation only."""
-        return self.starts.parameters | {s.name() for s in ca.symvar(self.periods)}
+        """Parameters on which start values, sampling periods or delays depend: they act during initialisation only."""
+        fixed = column([self.periods, self.delay_times])
+        return self.starts.parameters | {s.name() for s in ca.symvar(fixed)}
 
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
@@ -102,10 +108,8 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
 
 def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) -> Formulas:
     """kept: names of the modes that are known."""
-    dae = found.dae
-    system = dae.system()
-    outputs = _evaluated(dae, outputs)
-    flat = dae.flat
+    dae, system = found.dae, found.dae.system()
+    outputs, flat = _evaluated(dae, outputs), dae.flat
     sampled, frictions = flat.sampled, flat.frictions
     turning = switching(found, system, kept)
 
@@ -117,12 +121,14 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
     updates = at_once([dae.to_reduced(s.expression) for s in sampled])
     slides, rows, friction = _frictions(found, system)
     initial = at_once([dae.to_reduced(e.residual) for e in flat.initial_equations])
-    everything = [system.ode, system.residuals, *wanted, *updates, *rows, friction, *initial]
+    past = at_once(found.past)
+    everything = [system.ode, system.residuals, *wanted, *updates, *rows, friction, *initial, *past]
     jump = jump_of(found, at_once)
     differentiated = _input_derivatives(dae, column([*everything, *jump.everything]))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
     forces = [_symbol(system, f.force) for f in frictions]
-    held = [_symbol(system, n) for n in (*(s.name for s in sampled), *flat.discretes)]
+    instants = (*(s.name for s in sampled), *flat.discretes, *(d.name for d in flat.delays))
+    held = [_symbol(system, n) for n in instants]
     blocks = _blocks(system, frictions, forces, rows)
     arrays = {
         "t": system.time,
@@ -147,6 +153,9 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         periods=periods,
         discretes=flat.discretes,
         jump=jump,
+        delays=tuple(d.name for d in flat.delays),
+        past=column([ca.densify(e) for e in past]),
+        delay_times=column(at_once([dae.to_reduced(d.time) for d in flat.delays])),
         blocks=blocks,
         outputs=dict(zip(outputs, wanted, strict=True)),
         frictions=tuple(f.force for f in frictions),

@@ -92,7 +92,7 @@ def _moving(model: ModelGraph) -> list[str]:
     formulas, graph, found = model.formulas, model.graph, []
     names = {
         "x": formulas.states,
-        "u": (*formulas.inputs, *formulas.held, *formulas.discretes),
+        "u": (*formulas.inputs, *formulas.held, *formulas.discretes, *formulas.delays),
         "z": formulas.z_names,
     }
     for divisor in model.roots["gt_pivots"]:
@@ -116,7 +116,8 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_DISCRETES=len(formulas.discretes),
         GT_WHENS=len(formulas.jump.labels),
         GT_REINITS=len(formulas.jump.states),
-        GT_KNOWN=len(formulas.inputs) + len(formulas.held) + len(formulas.discretes),
+        GT_KNOWN=formulas.arrays["u"].numel(),
+        GT_DELAYS=len(formulas.delays),
         GT_ALGEBRAICS=sum(counts),
         GT_BLOCKS=len(counts),
         GT_LARGEST_BLOCK=max(counts, default=0),
@@ -174,6 +175,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _texts("gt_z_names", formulas.z_names),
         _texts("gt_root_names", formulas.roots),
         _texts("gt_held_names", (*formulas.held, *formulas.discretes)),
+        *([_texts("gt_delay_names", formulas.delays)] if formulas.delays else []),
         _texts("gt_clock_names", [formulas.held[k] for k in held]),
         "typedef struct {",
         "  void (*residual)(const double *const *a, double *restrict r, double *restrict w);",

@@ -11,6 +11,7 @@ from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
+OF_DELAYS = ("gt_past", "gt_past_rates", "gt_delay_times")
 ARRAYS = ("t", "x", "u", "z", "p", "m", "e", *SEEDS)
 
 
@@ -79,6 +80,9 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         "gt_samples": formulas.samples,
         "gt_conditions_hold": formulas.jump.conditions,
         "gt_jump": column([formulas.jump.acts, formulas.jump.discretes, formulas.jump.values]),
+        "gt_past": formulas.past,
+        "gt_past_rates": _along(formulas.past, point, way),
+        "gt_delay_times": formulas.delay_times,
         "gt_turning": column([formulas.switching.margins, formulas.switching.noise]),
         "gt_turning_rates": _along(formulas.switching.margins, point, way),
         "gt_forward": _along(everything, point, way),
@@ -87,6 +91,8 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
             formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])
         ),
     }
+    if not formulas.delays:
+        named = {name: found for name, found in named.items() if name not in OF_DELAYS}
     for k, block in enumerate(formulas.blocks):
         named[f"gt_residual_{k}"] = block.residual
         named[f"gt_jacobian_{k}"] = ca.vec(ca.densify(ca.jacobian(block.residual, block.unknowns)))

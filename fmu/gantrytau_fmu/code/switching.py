@@ -24,13 +24,14 @@ from gantrytau_fmu.code.arrays import column
 @dataclass(frozen=True, eq=False)
 class WithModes:
     """A model whose equations hold modes; laws: those of its frictions, (coulomb, smooth, breakaway) each; conditions: of
-    its whens.
+    its whens; past: what its delays look back at.
     """
 
     dae: Dae
     pieces: InModes
     laws: tuple[tuple[ca.SX, ca.SX, ca.SX], ...]
     conditions: tuple[ca.SX, ...]
+    past: tuple[ca.SX, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +78,15 @@ def written(dae: Dae) -> WithModes:
         dae = replace(dae, indexed=replace(dae.indexed, residuals=pieces.residuals))
         pattern = Pattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
         dae = replace(dae, blocks=solved(dae, pattern).blocks)
-    return WithModes(dae, pieces, laws, tuple(found[count:]))
+    past = pieces.conditions[len(pieces.conditions) - len(dae.flat.delays) :]
+    return WithModes(dae, pieces, laws, tuple(found[count:]), past)
 
 
 def moving(found: WithModes, system: System) -> ca.SX:
     """What motions depend on, and what is done when."""
     frictions = system.dae.flat.frictions
     speeds = [system.dae.expression(name) for f in frictions for name in (f.speed, f"der({f.speed})")]
-    instants = [*speeds, *(e for law in found.laws for e in law), *found.conditions]
+    instants = [*speeds, *(e for law in found.laws for e in law), *found.conditions, *found.past]
     return column([system.ode, system.residuals, *(system.to_system(instants) if instants else [])])
 
 

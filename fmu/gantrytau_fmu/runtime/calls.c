@@ -232,7 +232,10 @@ static gt_status gt_call_continue(gt_component *c, const char *function) {
 
 static gt_status gt_call_completed(gt_component *c) {
     gt_gaps gaps;
-    const gt_status status = gt_fail(c, gt_completed(c->it));
+    gt_status status = gt_fail(c, gt_completed(c->it));
+#if GT_DELAYS
+    if (status < GT_DISCARD) status = gt_fail(c, gt_remember(c->it));
+#endif
     if (GT_GAPS && status < GT_DISCARD && gt_look_at_gaps(c->it, &gaps) == GT_OK) gt_tighten(c->it, &gaps);
     return status;
 }

@@ -321,7 +321,15 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     int sampled = 0, happened = 0, acted = 1, round;
     const char *actor = NULL;
     double turn = INFINITY;
-    gt_status status = gt_sample(it, &sampled);
+    gt_status status = GT_OK;
+#if GT_DELAYS
+    if (!it->cosimulation) status = gt_remember(it);
+    if (status == GT_OK && !it->cosimulation) status = gt_begin_past(it);
+#endif
+    if (status == GT_OK) status = gt_sample(it, &sampled);
+#if GT_DELAYS
+    gt_arrive(it);
+#endif
     memset(info, 0, sizeof *info);
     for (round = 0; status == GT_OK && acted; round++) {
         int turned = 0, changed = 0;
@@ -340,6 +348,10 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     if (happened && status == GT_OK) status = gt_count(it);
     if (happened && status == GT_OK) status = gt_slacken(it);
     if (status == GT_OK) status = gt_next_turn(it, &turn);
+#if GT_DELAYS
+    if (status == GT_OK && !it->cosimulation) status = gt_begin_piece(it);
+    if (status == GT_OK && !it->cosimulation) turn = fmin(turn, gt_next_arrival(&it->memory, it->now.time));
+#endif
     if (status != GT_OK) return status;
     info->again = sampled || happened & 1;
     info->terminate = it->now.ended != 0;

@@ -20,6 +20,9 @@ static gt_status gt_initial_residual(gt_instance *it, double *residual) {
     it->now.stale = 1;
     gt_point_at(it, &it->now.time, it->now.x);
     if (gt_solve(it, 0) != GT_OK) return GT_ERROR;
+#if GT_DELAYS
+    if (gt_settle_past(it) != GT_OK) return GT_ERROR;
+#endif
     gt_initial(it->a, residual, it->w);
     for (i = 0; i < GT_INITIAL; i++)
         if (!isfinite(residual[i])) return GT_DISCARD;
@@ -105,6 +108,9 @@ static gt_status gt_initialize(gt_instance *it) {
     gt_event_info info;
     double rates[GT_ROOM(GT_STATES)];
     gt_status status = gt_present(it);
+#if GT_DELAYS
+    if (status == GT_OK) status = gt_check_delays(it);
+#endif
     if (status == GT_OK) status = gt_refresh(it);
     if (status == GT_OK) status = gt_check_pivots(it);
     if (status != GT_OK) return status;

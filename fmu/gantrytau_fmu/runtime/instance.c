@@ -17,7 +17,7 @@
 typedef struct {
     double time;
     double x[GT_ROOM(GT_STATES)];
-    double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables, then Discretes */
+    double u[GT_ROOM(GT_KNOWN)];      /* inputs, then held variables, then Discretes, then what is delayed */
     double z[GT_ROOM(GT_ALGEBRAICS)]; /* unknowns of the implicit blocks */
     double p[GT_ROOM(GT_PARAMETERS)];
     double m[GT_ROOM(GT_MODES)];      /* of frictions: 1 forward, -1 backward, 0 locked; then of what switches */
@@ -45,8 +45,28 @@ typedef struct {
     int unsettled; /* the last event iteration asked for another one */
 } gt_state;
 
+#if GT_DELAYS
+#define GT_MEMORY 4096
+#define GT_FIRST_DELAY (GT_KNOWN - GT_DELAYS)
+
+/* What delays look back at, which belongs to a saved state, too: a ring of places. */
+typedef struct {
+    double t[GT_MEMORY], kept[GT_MEMORY][GT_DELAYS][3]; /* values, rates, second rates */
+    int left[GT_MEMORY];     /* how often what is not smooth behind a place arrives a delay later */
+    int straight[GT_MEMORY]; /* before a place inputs moved, at unknown rates: a line leads to it */
+    double first[GT_DELAYS]; /* values before the start */
+    double delays[GT_DELAYS], shortest, longest, sizes[GT_DELAYS], since; /* s; when the present smooth piece began */
+    double u[GT_ROOM(GT_KNOWN)], x[GT_ROOM(GT_STATES)], p[GT_ROOM(GT_PARAMETERS)], m[GT_ROOM(GT_MODES)]; /* at the last place */
+    int begun, oldest, count;
+} gt_memory;
+#endif
+
 struct gt_instance {
     gt_state now;
+#if GT_DELAYS
+    gt_memory memory;
+    double place[GT_DELAYS][3];
+#endif
     gt_mode mode;
     double time; /* as the caller knows it */
     int cosimulation, fmi;
@@ -93,6 +113,14 @@ static gt_status gt_begin_modes(gt_instance *it);
 static gt_status gt_begin_whens(gt_instance *it);
 static gt_status gt_agree(gt_instance *it, int *changed);
 static int gt_other_side(const gt_instance *it);
+#if GT_DELAYS
+static gt_status gt_factors(gt_instance *it);
+static void gt_clear_direction(gt_instance *it);
+static void gt_along_states(gt_instance *it, int parameters);
+static gt_status gt_solve(gt_instance *it, int quiet);
+static gt_status gt_move(gt_instance *it, double time, const double *x);
+static gt_status gt_check_delays(gt_instance *it);
+#endif
 
 /* A time for differences: short within `span`, but one that numbers of the size of `time` can tell. */
 static double gt_small_time(double time, double span) {
@@ -107,6 +135,9 @@ static void gt_point_at(gt_instance *it, const double *time, const double *x) {
 
 static void gt_reset(gt_instance *it) {
     memset(&it->now, 0, sizeof it->now);
+#if GT_DELAYS
+    memset(&it->memory, 0, sizeof it->memory);
+#endif
     memcpy(it->now.x, gt_start_x, GT_STATES * sizeof(double));
     memcpy(it->now.u, gt_start_u, GT_KNOWN * sizeof(double));
     memcpy(it->now.z, gt_start_z, GT_ALGEBRAICS * sizeof(double));

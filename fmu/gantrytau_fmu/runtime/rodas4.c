@@ -61,6 +61,9 @@ static gt_status gt_prepare(gt_instance *it) {
     for (j = -1; j < GT_STATES; j++) {
         gt_clear_direction(it);
         *(j < 0 ? &it->dt : it->dx + j) = 1;
+#if GT_DELAYS
+        if (j < 0) gt_put_past_rates(it);
+#endif
         gt_along(it, 0);
         memcpy(j < 0 ? it->rate_of_time : it->jacobian + j * GT_STATES, it->g, GT_STATES * sizeof(double));
     }

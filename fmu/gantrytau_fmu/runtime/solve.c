@@ -187,7 +187,13 @@ static gt_status gt_refresh(gt_instance *it) {
     gt_parameters(it);
     if (!it->now.stale) return GT_OK; /* a restored z is kept as it is, to the last bit */
     gt_point_at(it, &it->now.time, it->now.x);
+#if GT_DELAYS
+    gt_put_past(it, it->now.time, it->now.u);
+#endif
     status = gt_solve(it, 0);
+#if GT_DELAYS
+    if (status == GT_OK && !it->memory.begun) status = gt_settle_past(it);
+#endif
     if (status != GT_OK) {
         memcpy(it->now.z, it->now.solved_z, sizeof it->now.z); /* so that the next try does not begin astray */
         return status;
@@ -242,12 +248,23 @@ static gt_status gt_get_rates(gt_instance *it, double *rates) {
 static gt_status gt_rates_at(gt_instance *it, double time, const double *x, double *rates) {
     double sum = 0;
     int i;
+#if GT_DELAYS
+    double late[GT_DELAYS];
+    memcpy(late, it->now.u + GT_FIRST_DELAY, sizeof late);
+    gt_put_past(it, time, it->now.u);
+#endif
     gt_point_at(it, &time, x);
     if (GT_BLOCKS && (gt_solve(it, 1) != GT_OK || gt_other_side(it) >= 0)) {
+#if GT_DELAYS
+        memcpy(it->now.u + GT_FIRST_DELAY, late, sizeof late);
+#endif
         gt_point_at(it, &it->now.time, it->now.x);
         return GT_DISCARD;
     }
     gt_rates(it->a, rates, it->w);
+#if GT_DELAYS
+    memcpy(it->now.u + GT_FIRST_DELAY, late, sizeof late);
+#endif
     gt_point_at(it, &it->now.time, it->now.x);
     for (i = 0; i < GT_STATES; i++) sum += rates[i] - rates[i]; /* NaN unless all are finite */
     return sum == 0 ? GT_OK : GT_DISCARD;

@@ -178,6 +178,9 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
     if (GT_INDICATORS && status == GT_OK) status = gt_look_ahead(it, &here);
     while (status == GT_OK && end - it->now.time > shortest) {
         const double t = it->now.time, rest = end - t;
+#if GT_DELAYS
+        h = fmin(h, it->memory.shortest);
+#endif
         const int last = h >= rest * (1 - 1e-9);
         const double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, next = last ? end : t + size;
         double norm, share;
@@ -194,10 +197,21 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
             continue;
         }
         status = gt_move(it, next, it->next);
+#if GT_DELAYS
+        if (status == GT_OK && gt_too_wide(it, t, x, size, &status)) {
+            rejected = 1;
+            h = 0.5 * size;
+            continue;
+        }
+#endif
         if (GT_INDICATORS && status == GT_OK) status = gt_look_ahead(it, &there);
         if (GT_INDICATORS && status == GT_OK && there.least < 0) {
             *event = 1;
-            return gt_locate(it, t, size, x, here.least, there.least);
+            status = gt_locate(it, t, size, x, here.least, there.least);
+#if GT_DELAYS
+            if (status == GT_OK) status = gt_remember(it);
+#endif
+            return status;
         }
         share = gt_overlooked(it, t, x, size, span, &here.gaps, &there.gaps, &status);
         if (share == 1 && gt_slipped(it, t, x, size, span, &spare, &status)) share = 0.5;
@@ -206,6 +220,9 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
             h = share * size;
             continue;
         }
+#if GT_DELAYS
+        if (status == GT_OK) status = gt_keep_place(it, 0, 0);
+#endif
         here = there;
         gt_tighten(it, &here.gaps);
         it->now.size = h = gt_next_size(h, size, norm, last, rejected);
@@ -252,12 +269,20 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
         it->now.stale = it->outputs_stale = 1;
     }
     it->now.first = 0;
+#if GT_DELAYS
+    status = gt_begin_past(it);
+#endif
     while (status == GT_OK) {
         double next;
         if (GT_CLOCKS || GT_MODES || GT_WHENS) status = gt_handle_events(it, &events);
         if (it->now.ended) break;
         if (status == GT_OK) status = gt_next_turn(it, &turn);
         next = fmin(GT_CLOCKS ? gt_next_sample(it, end) : INFINITY, turn);
+#if GT_DELAYS
+        gt_arrive(it);
+        if (status == GT_OK) status = gt_begin_piece(it);
+        next = fmin(next, gt_next_arrival(&it->memory, it->now.time));
+#endif
         if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);
         if (!event && it->now.time >= end) break;
     }

@@ -29,6 +29,9 @@ static void gt_along_motion(gt_instance *it, const double *rates) {
     memset(it->dz, 0, sizeof it->dz);
     it->dt = 1;
     memcpy(it->dx, rates, GT_STATES * sizeof(double));
+#if GT_DELAYS
+    gt_put_past_rates(it);
+#endif
     if (!GT_TURNS_OF_BLOCKS) return;
     for (number = 0; number < GT_BLOCKS && it->factors_stale && sound; number++)
         sound = gt_factor_block(it, gt_blocks + number) != 0;

@@ -9,6 +9,7 @@ import pytest
 from gantrytau import Fixed, Input, Model, Result, connect, simulate
 from gantrytau.blocks import (
     DeadZone,
+    Delay,
     Derivative,
     DiscretePid,
     DiscreteTransferFunction,
@@ -47,11 +48,12 @@ class Signals(Model):
     hold = SampleHold(period=PERIOD)
     digital = DiscreteTransferFunction(numerator=[0.2, 0.1], denominator=[1.0, -1.1, 0.4], period=PERIOD)
     memory = Integrator()
+    late = Delay(T=0.07)
 
     def equations(self):
         yield connect(self.wave.y, self.sum.u[0])
         yield connect(self.pulse.y, self.sum.u[1])
-        for block in (self.shape, self.slow, self.zone, self.relay, self.hold, self.digital):
+        for block in (self.shape, self.slow, self.zone, self.relay, self.hold, self.digital, self.late):
             yield connect(self.sum.y, block.u)
         yield connect(self.wave.y, self.slope.u)
         yield connect(self.zone.y, self.memory.u)
@@ -82,7 +84,7 @@ class Servo(Model):
 
 
 OUTPUTS = {
-    Signals: ["shape.y", "slope.y", "slow.y", "memory.y", "relay.y", "hold.y", "digital.y"],
+    Signals: ["shape.y", "slope.y", "slow.y", "memory.y", "relay.y", "hold.y", "digital.y", "late.y"],
     Servo: ["motor.rotor.w", "motor.i", "pid.y", "other.y", "noise.y"],
 }
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from gantrytau import Model, Output, Parameter, Real, delay, der, simulate, table, terminate, when
-from gantrytau.errors import ModelError
+from gantrytau import Model, Output, Parameter, Real, der, simulate, table, terminate, when
 from gantrytau_fmu import export_fmu
 
 
@@ -80,14 +79,3 @@ def test_the_code_of_a_table_is_in_proportion_to_its_points(tmp_path):
         with ZipFile(path) as archive:
             sizes.append(len(archive.read("sources/model.c")))
     assert sizes[1] < 4.1 * sizes[0]
-
-
-def test_a_delay_is_refused_by_its_name(tmp_path):
-    class Late(Model):
-        x = Real(start=1.0, fixed=True)
-
-        def equations(self):
-            yield der(self.x) == -delay(self.x, 1.0)
-
-    with pytest.raises(ModelError, match=r"delay\(x, 1\): found a value of the past, .*FMUs cannot"):
-        export_fmu(Late(), tmp_path / "late.fmu")
