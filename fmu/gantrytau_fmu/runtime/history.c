@@ -2,6 +2,7 @@
 #if GT_DELAYS
 
 #define GT_LEAST_APART 1e-9   /* of the shortest delay: places are laid no closer */
+#define GT_DENSE 1e-3         /* of the longest delay: places that are closer go where they are not needed */
 #define GT_JUMP_OF_PAST 1e-9  /* of the largest value */
 
 /* Values and rates along the motion of what delays look back at, at a point whose delayed values move at `late` rates. */
@@ -71,6 +72,32 @@ static gt_status gt_find_place(gt_instance *it) {
     return status;
 }
 
+/* Whether an interval of that length from a place to it->place is too long for the polynomial between. The cubic and the
+ * quintic differ in the middle; the error of the latter is about the 3/2 power. */
+static int gt_far_apart(const gt_instance *it, int from, double length) {
+    const gt_memory *memory = &it->memory;
+    int d, far = 0;
+    for (d = 0; d < GT_DELAYS; d++) {
+        const double *begin = memory->kept[gt_kept_at(memory, from)][d], *end = it->place[d];
+        const double largest = fmax(memory->sizes[d], fabs(end[0]));
+        const double apart = fabs(length * length * (begin[2] + end[2]) - 2 * length * (end[1] - begin[1])) / 64;
+        far |= largest > 0 && pow(apart / largest, 1.5) > it->now.tolerance;
+    }
+    return far;
+}
+
+/* Whether the last place is not needed between the one before it and it->place: steps may be far shorter than delays. */
+static int gt_is_spare(const gt_instance *it) {
+    const gt_memory *memory = &it->memory;
+    const int last = gt_kept_at(memory, memory->count - 1);
+    double before, length;
+    if (memory->count < 2 || memory->left[last] || memory->straight[last]) return 0;
+    if (memcmp(memory->u, it->now.u, GT_INPUTS * sizeof(double))) return 0;
+    before = gt_time_kept(memory, memory->count - 2);
+    length = it->now.time - before;
+    return before < memory->t[last] && length < GT_DENSE * memory->longest && !gt_far_apart(it, memory->count - 2, length);
+}
+
 /* Keep it->place. left: how often what is not smooth there travels on; again: it stands beside the last. */
 static gt_status gt_keep_place(gt_instance *it, int left, int again) {
     gt_memory *memory = &it->memory;
@@ -78,14 +105,15 @@ static gt_status gt_keep_place(gt_instance *it, int left, int again) {
     const int last = gt_kept_at(memory, memory->count - 1 + (memory->count == 0));
     const int twice = again && memory->count > 1 && gt_time_kept(memory, memory->count - 2) == memory->t[last];
     int here, d;
+    if (!again && left == 0 && gt_is_spare(it)) memory->count--;
     while (memory->count > 2 && gt_time_kept(memory, 1) < old) {
         memory->oldest = (memory->oldest + 1) % GT_MEMORY;
         memory->count--;
     }
     if (memory->count == GT_MEMORY) {
         for (d = 0; d < GT_DELAYS - 1 && memory->delays[d] < memory->longest; d++) {}
-        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found more than %d steps within the %.6g s of %s at time = %.9g s; take a larger tolerance, "
-                      "longer communication steps, a shorter delay, or export the model without its fastest motions", GT_NAME, GT_MEMORY,
+        return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found more than %d places within the %.6g s of %s at time = %.9g s, where steps end or "
+                      "something jumps; take a larger tolerance, fewer jumps of inputs and events, or a shorter delay", GT_NAME, GT_MEMORY,
                       memory->longest, gt_delay_names[d], it->now.time);
     }
     here = twice ? last : gt_kept_at(memory, memory->count);
@@ -104,18 +132,13 @@ static gt_status gt_keep_place(gt_instance *it, int left, int again) {
 }
 
 /* Whether the step of that size that leads from (t, x) to the present point, whose place is found, is too long for the
- * polynomial between: then back. The cubic and the quintic differ in the middle; the error of the latter is about the 3/2 power. */
+ * polynomial between: then back. */
 static int gt_too_wide(gt_instance *it, double t, const double *x, double size, gt_status *status) {
     const gt_memory *memory = &it->memory;
-    int d, wide = 0;
+    int wide;
     *status = gt_find_place(it);
     if (*status != GT_OK || !memory->count || size <= GT_LEAST_APART * memory->shortest) return 0;
-    for (d = 0; d < GT_DELAYS; d++) {
-        const double *begin = memory->kept[gt_kept_at(memory, memory->count - 1)][d], *end = it->place[d];
-        const double largest = fmax(memory->sizes[d], fabs(end[0]));
-        const double apart = fabs(size * size * (begin[2] + end[2]) - 2 * size * (end[1] - begin[1])) / 64;
-        wide |= largest > 0 && pow(apart / largest, 1.5) > it->now.tolerance;
-    }
+    wide = gt_far_apart(it, memory->count - 1, size);
     if (wide) *status = gt_move(it, t, x);
     return wide;
 }
