@@ -21,6 +21,7 @@ from gantrytau import (
     Parameter,
     Real,
     connect,
+    delay,
     der,
     exp,
     fabs,
@@ -88,6 +89,21 @@ class Juggled(Model):
         yield when(self.n >= 10_000, terminate("many bounces"))
 
 
+class Late(Model):
+    """Juggling that looks back: at the ball, at a sample, at an unknown that is iterated, and at the input."""
+
+    push = Input(start=0.0, description="acceleration")
+    T = Parameter(0.03, unit="s", description="delay")
+    ball = Juggled()
+    x = Real(start=0.0, fixed=True, description="follows what was")
+    y = Output(description="what was")
+
+    def equations(self):
+        yield self.ball.push == delay(self.push, self.T)
+        yield self.y == delay(self.ball.h, self.T) + delay(self.ball.drag, 0.011)
+        yield der(self.x) == self.y + delay(self.ball.seen, 2 * self.T) - self.x
+
+
 class Root(Model):
     """der(x) = -sqrt(x) + u / x comes to an end at x = 0, where nothing is defined any more."""
 
@@ -123,6 +139,8 @@ MAKERS = {
     "explicit_sledge": lambda: (Sledge(), {}),
     "juggled": lambda: (Juggled(), {}),
     "stiffly_juggled": lambda: (Juggled(), {"solver": "rodas4"}),
+    "late": lambda: (Late(), {}),
+    "stiffly_late": lambda: (Late(), {"solver": "rodas4"}),
     "root": lambda: (Root(), {}),
     "lags": lambda: (Lags(), {}),
     # three equal sides and one that fits: a parallelogram, singular where it is flat

@@ -1,5 +1,6 @@
 """Delays in FMUs: the method of steps, what simulate finds, saved states, and what is refused."""
 
+from ctypes import c_size_t
 from math import factorial
 
 import numpy as np
@@ -25,7 +26,7 @@ from gantrytau import (
 )
 from gantrytau_fmu import check_fmu
 from tests.fmu.exported import Exported, export
-from tests.fmu.runtime.raw_calls import ERROR, OK
+from tests.fmu.runtime.raw_calls import ERROR, OK, integers, reals
 
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 EVERY = 0.0997  # s, where nothing jumps
@@ -305,3 +306,17 @@ def test_sampling_at_the_instant_at_which_a_jump_arrives(tmp_path):
         for _ in range(30):
             run.step(EVERY)
             assert run["x"] == pytest.approx(expected.at(run.time, "x"), abs=1e-8)
+
+
+@VERSIONS
+def test_slopes_take_what_is_delayed_as_known(oscillators, version):
+    """x' = -x(t - T) does not change with x; y does not either, once the past is another than the present."""
+    with oscillators[version].new().begin() as run:
+        run.step(1.3)
+        references = run.fmu.references
+        for unknown in ("der(x)", "y"):
+            found = reals([np.nan])
+            lists = integers([references[unknown]]), c_size_t(1), integers([references["x"]]), c_size_t(1)
+            ends = (reals([1.0]), found) if version == 2 else (reals([1.0]), c_size_t(1), found, c_size_t(1))
+            assert run.instance("GetDirectionalDerivative", *lists, *ends) == OK
+            assert found[0] == 0

@@ -12,7 +12,9 @@ MODELS = (
     "sledge",
     "juggled",
     "stiffly_juggled",
-)  # implicit blocks; friction and samples; whens
+    "late",
+    "stiffly_late",
+)  # implicit blocks; friction and samples; whens; delays
 
 
 @pytest.mark.parametrize("model", MODELS)

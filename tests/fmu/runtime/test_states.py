@@ -10,7 +10,13 @@ import pytest
 from tests.fmu.runtime.raw_calls import DISCARD, ERROR, OK, Library, reals
 from tests.fmu.runtime.robust_models import Unpacked, unpacked
 
-MODELS = ("parallelogram", "sledge", "explicit_sledge", "robot")  # implicit blocks, events and both solvers
+MODELS = (
+    "parallelogram",
+    "sledge",
+    "explicit_sledge",
+    "robot",
+    "late",
+)  # implicit blocks, events, both solvers, delays
 INPUTS = {"parallelogram": "torque", "robot": "carts[0].f"}
 STEP = 0.004
 
@@ -119,7 +125,7 @@ def settle(instance):
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_state_of_model_exchange_continues_to_the_last_bit(model, version, tmp_path):
     name, found = model
-    count = {"robot": 6}.get(name, 2)
+    count = {"robot": 6, "late": 3}.get(name, 2)
     run = fresh(library(found, version), "ModelExchange")
     assert run.start() == OK
     settle(run)
