@@ -37,6 +37,6 @@ class Base(Optimization):
 )
 def test_a_table_is_refused_where_it_stands(place, members):
     with pytest.raises(
-        ModelError, match=rf"({place}).*found a call of the function 'lut'.*`table` is to come"
+        ModelError, match=rf"({place}).*found a call of the function 'lut'.*write table\(x, xs, ys\)"
     ):
         optimize(type("One", (Base,), members), elements=4)
