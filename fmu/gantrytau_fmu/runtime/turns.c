@@ -10,7 +10,7 @@
 #define GT_LATE 2e-13
 #define GT_LATE_BY_TIME 4e-14
 #define GT_MOST_AGREED 24   /* rounds in which modes lead to each other */
-#define GT_MOST_AT_ONCE 8   /* switches of which all choices are tried */
+#define GT_MOST_CHOICES 1024 /* of modes that are tried where they do not lead to each other */
 #define GT_DEEP 0.5         /* of the lower end: a dip between two places that may reach below that is looked at */
 #define GT_STRAYS 0.1       /* of the larger end: so far from the cubic through the ends a middle is unknown */
 #define GT_FORESIGHT 4      /* steps within which a margin that falls to zero may be why one fails */
@@ -116,68 +116,82 @@ static int gt_are_equal(const double *some, const double *others) {
     return !memcmp(some, others, GT_TURNS * sizeof(double));
 }
 
-/* One mode leads to another in a circle: all choices of what changed on it, those first in which the least changes. */
-static int gt_choose(gt_instance *it, double (*tried)[GT_ROOM(GT_TURNS)], int count) {
-    double modes[GT_ROOM(GT_TURNS)], others[GT_ROOM(GT_TURNS)], found[GT_ROOM(GT_TURNS)];
-    int changing[GT_MOST_AT_ONCE], many = 0, least, bits, i, k;
+/* Modes that agree with themselves, of all between those that were tried, the nearest to the first; all: both sides of every
+ * switch besides. 0 if there are none, or too many to be tried. */
+static int gt_search(gt_instance *it, double (*tried)[GT_ROOM(GT_TURNS)], int count, int all) {
+    double low[GT_ROOM(GT_TURNS)], high[GT_ROOM(GT_TURNS)], modes[GT_ROOM(GT_TURNS)], best[GT_ROOM(GT_TURNS)];
+    double found[GT_ROOM(GT_TURNS)], choices = 1, nearest = INFINITY;
     const gt_sink kept = it->sink;
+    int i, k;
     for (i = 0; i < GT_TURNS; i++) {
-        others[i] = tried[0][i];
-        for (k = 1; k < count; k++)
-            if (tried[k][i] != tried[0][i]) others[i] = tried[k][i];
-        if (others[i] == tried[0][i]) continue;
-        if (many == GT_MOST_AT_ONCE) return 0;
-        changing[many++] = i;
-    }
-    it->sink = NULL; /* a choice that has no solution is no failure */
-    for (least = 1; least <= many; least++)
-        for (bits = 1; bits < 1 << many; bits++) {
-            int differ = 0;
-            memcpy(modes, tried[0], sizeof modes);
-            for (k = 0; k < many; k++)
-                if (bits >> k & 1) {
-                    modes[changing[k]] = others[changing[k]];
-                    differ++;
-                }
-            if (differ == least && gt_led_to(it, modes, found) == GT_OK && gt_are_equal(modes, found)) {
-                it->sink = kept;
-                return 1;
-            }
+        low[i] = high[i] = tried[0][i];
+        for (k = 1; k < count; k++) {
+            low[i] = fmin(low[i], tried[k][i]);
+            high[i] = fmax(high[i], tried[k][i]);
         }
+        if (all && !gt_turn_counts[i]) {
+            low[i] = 0;
+            high[i] = 1;
+        }
+        choices *= high[i] - low[i] + 1;
+    }
+    if (!(choices <= GT_MOST_CHOICES)) return 0;
+    memcpy(modes, low, sizeof modes);
+    it->sink = NULL; /* a choice that has no solution is no failure */
+    do {
+        double apart = 0;
+        for (k = 0; k < GT_TURNS; k++) apart += fabs(modes[k] - tried[0][k]);
+        if (apart < nearest && gt_led_to(it, modes, found) == GT_OK && gt_are_equal(modes, found)) {
+            memcpy(best, modes, sizeof best);
+            nearest = apart;
+        }
+        for (i = 0; i < GT_TURNS && ++modes[i] > high[i]; i++) modes[i] = low[i];
+    } while (i < GT_TURNS);
+    if (nearest < INFINITY && gt_led_to(it, best, found) != GT_OK) nearest = INFINITY;
     it->sink = kept;
-    return 0;
+    return nearest < INFINITY;
+}
+
+/* No modes agree with the margins that they lead to: says why, back at the first that were tried. */
+static gt_status gt_disagree(gt_instance *it, double (*tried)[GT_ROOM(GT_TURNS)], int count, gt_status status) {
+    double found[GT_ROOM(GT_TURNS)];
+    int i;
+    if (status != GT_OK) status = gt_led_to(it, tried[count - 1], found);
+    memcpy(it->now.m + GT_FRICTIONS, tried[0], GT_TURNS * sizeof(double));
+    it->now.stale = 1;
+    if (status != GT_OK) return status;
+    for (i = 0; i < GT_TURNS - 1 && tried[0][i] == tried[count - 1][i]; i++) {}
+    return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at time = %.9g s no side of %s agrees with what follows from it: the equations have no "
+                  "solution there, or the motion would slide along the switch; smooth it, as tanh(x / small) for sign(x), or "
+                  "change what jumps", GT_NAME, it->now.time, gt_conditions[i]);
 }
 
 /* Modes that agree with the margins they lead to, from the present ones on; *changed tells whether they are others. */
 static gt_status gt_agree(gt_instance *it, int *changed) {
     double tried[GT_MOST_AGREED][GT_ROOM(GT_TURNS)], found[GT_ROOM(GT_TURNS)];
     double *modes = it->now.m + GT_FRICTIONS;
+    const gt_sink kept = it->sink;
     int count = 0, i, k;
     *changed = 0;
     if (!GT_TURNS) return GT_OK;
     memcpy(found, modes, GT_TURNS * sizeof(double));
-    while (count < GT_MOST_AGREED) {
+    for (;;) {
         gt_status status;
         memcpy(tried[count], found, sizeof found);
+        it->sink = NULL; /* where these lead to nothing, others may hold */
         if (count) status = gt_led_to(it, tried[count], found);
         else {
             gt_margins margins;
             status = gt_look(it, &margins);
             if (status == GT_OK) gt_following(it, &margins, found);
         }
-        if (status != GT_OK) return status;
-        if (gt_are_equal(found, tried[count])) break;
+        it->sink = kept;
+        if (status == GT_OK && gt_are_equal(found, tried[count])) break;
         count++;
         for (k = 0; k < count && !gt_are_equal(found, tried[k]); k++) {}
-        if (k < count) {
-            if (gt_choose(it, tried, count)) break;
-            for (i = 0; i < GT_TURNS - 1 && tried[k][i] == tried[count - 1][i]; i++) {}
-            memcpy(modes, tried[0], GT_TURNS * sizeof(double));
-            it->now.stale = 1;
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at time = %.9g s no side of %s agrees with what follows from it: the equations have no "
-                          "solution there, or the motion would slide along the switch; smooth it, as tanh(x / small) for sign(x), or "
-                          "change what jumps", GT_NAME, it->now.time, gt_conditions[i]);
-        }
+        if (status == GT_OK && k == count && count < GT_MOST_AGREED) continue;
+        if (gt_search(it, tried, count, 0) || gt_search(it, tried, count, 1)) break;
+        return gt_disagree(it, tried, count, status);
     }
     for (i = 0; i < GT_TURNS; i++)
         if (modes[i] != tried[0][i]) {

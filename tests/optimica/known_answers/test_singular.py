@@ -264,4 +264,5 @@ def test_an_oscillator_to_rest():
     assert 0 < first < np.pi
     assert 0 < last < np.pi
     duration = first + np.pi + last
-    assert optimize(Quieted, elements=100).final_time == pytest.approx(duration, abs=2e-3)
+    # one search in three ends where the conditions contradict each other nearby, on some processors and not on others
+    assert optimize(Quieted, elements=100, starts=3).final_time == pytest.approx(duration, abs=2e-3)
