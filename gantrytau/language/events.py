@@ -124,8 +124,8 @@ def delay(x: Any, T: Any) -> ca.SX:
 
     x: an expression of variables, scalar or vector; T: s, a number or an expression of parameters, above zero. Before the
     start it was what it is there. What jumps or bends does so again T later. The order of its interpolation is that of the
-    integrator. `simulate` has it; linear systems, functions and optimisation refuse it, where a Pade approximation or a
-    chain of first-order lags can stand for it. Raises ModelError for a T that is not above zero.
+    integrator. `simulate` and FMUs have it; linear systems, functions and optimisation refuse it, where a Pade approximation
+    or a chain of first-order lags can stand for it. Raises ModelError for a T that is not above zero.
     """
     expression = ca.densify(ca.SX(x))
     time = ca.SX(T)

@@ -1,8 +1,8 @@
 """Random motions x' = A x + b + sum c_k s_k that switch on states and on time, solved exactly from switch to switch.
 
-s_k is an absolute value, a limiter, a jump or a kink of a linear function of the states, or a pulse of time. Between two
-switches the system is affine, and a matrix exponential takes it as far as one likes; where a margin has changed its sign,
-the instant is found by bisection.
+s_k is an absolute value, a limiter, a jump, a kink or a table of a linear function of the states, or a pulse of time.
+Between two switches the system is affine, and a matrix exponential takes it as far as one likes; where a margin has changed
+its sign, the instant is found by bisection.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
-from gantrytau import Input, Model, Real, between, der, fabs, if_else
+from gantrytau import Input, Model, Real, between, der, fabs, if_else, table
 
 LOOKS = 1500  # at the margins
 GRAZED = 2e-3  # of a margin that turns back without a change of sign
@@ -28,6 +28,11 @@ SHAPES: dict[str, tuple[Any, tuple[float, ...], tuple[tuple[float, float], ...]]
         ((0.0, -0.5), (1.0, 0.0), (0.0, 0.5)),
     ),
     "jump": (lambda z: if_else(z > 0.1, 1.0, -0.5), (0.1,), ((0.0, -0.5), (0.0, 1.0))),
+    "table": (
+        lambda z: table(z, [-1.0, -0.25, 0.5, 1.0], [0.5, -0.4, 0.2, 0.2], outside="hold"),
+        (-1.0, -0.25, 0.5),
+        ((0.0, 0.5), (-1.2, -0.7), (0.8, -0.2), (0.0, 0.2)),
+    ),
     "kink": (lambda z: if_else(z > 0, 2 * z, 0.5 * z), (0.0,), ((0.5, 0.0), (2.0, 0.0))),
 }
 
