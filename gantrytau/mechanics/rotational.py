@@ -11,15 +11,12 @@ from gantrytau import (
     Output,
     Parameter,
     Real,
-    between,
     der,
-    exp,
-    fabs,
-    if_else,
     require,
     stick_slip,
     tanh,
 )
+from gantrytau.mechanics.friction_laws import asymmetric_friction, dahl_rate, linear_sign, stribeck_friction
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 BESIDE = "a relative sensor carries no torque; connect it beside a component, not in its place"
@@ -158,9 +155,7 @@ class LinearFriction(TanhFriction):
 
     def equations(self):
         yield from Friction.equations(self)
-        slope = self.w / self.w_s
-        sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
-        yield self.tau == self.tau_c * sign + self.tau_v * self.w
+        yield self.tau == self.tau_c * linear_sign(self.w / self.w_s) + self.tau_v * self.w
 
 
 class AsymmetricFriction(Friction):
@@ -182,11 +177,7 @@ class AsymmetricFriction(Friction):
 
     def equations(self):
         yield from super().equations()
-        sign = tanh(self.w / self.w_s)
-        plus, minus = (1 + sign) / 2, (1 - sign) / 2
-        coulomb = self.tau_c[0] * plus + self.tau_c[1] * minus
-        viscous = self.tau_v[0] * plus + self.tau_v[1] * minus
-        yield self.tau == coulomb * sign + viscous * self.w
+        yield self.tau == asymmetric_friction(self.w, self.tau_c, self.tau_v, self.w_s)
 
 
 class StribeckFriction(TanhFriction):
@@ -212,12 +203,8 @@ class StribeckFriction(TanhFriction):
             "expected a static friction tau_s of at least the Coulomb friction tau_c",
         )
         yield require(self.w_stribeck > 0, "expected a Stribeck speed above zero")
-        slope = self.w / self.w_s
-        sign = tanh(slope)
-        # |w|, but w_s at rest, where the sign is zero: smooth for any exponent
-        size = self.w_s * (slope * sign + 1 - sign**2)
-        fall = exp(-((size / self.w_stribeck) ** self.n))
-        yield self.tau == (self.tau_c + (self.tau_s - self.tau_c) * fall) * sign + self.tau_v * self.w
+        dry = stribeck_friction(self.w, self.w_s, self.tau_c, self.tau_s, self.w_stribeck, self.n)
+        yield self.tau == dry + self.tau_v * self.w
 
 
 class DahlFriction(Friction):
@@ -238,7 +225,7 @@ class DahlFriction(Friction):
             self.tau_c > 0, "expected a Coulomb friction tau_c above zero; take Frictionless for none"
         )
         yield require(self.sigma_0 > 0, "expected a stiffness sigma_0 above zero")
-        yield der(self.z) == self.w - self.sigma_0 * fabs(self.w) * self.z / self.tau_c
+        yield der(self.z) == dahl_rate(self.w, self.z, self.sigma_0, self.tau_c)
         yield self.tau == self.sigma_0 * self.z + self.tau_v * self.w
 
 

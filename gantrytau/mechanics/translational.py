@@ -11,15 +11,12 @@ from gantrytau import (
     Output,
     Parameter,
     Real,
-    between,
     der,
-    exp,
-    fabs,
-    if_else,
     require,
     stick_slip,
     tanh,
 )
+from gantrytau.mechanics.friction_laws import asymmetric_friction, dahl_rate, linear_sign, stribeck_friction
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 BESIDE = "a relative sensor carries no force; connect it beside a component, not in its place"
@@ -142,9 +139,7 @@ class LinearFriction(TanhFriction):
 
     def equations(self):
         yield from Friction.equations(self)
-        slope = self.v / self.v_s
-        sign = if_else(between(-1, slope, 1), slope, if_else(slope > 0, 1, -1))
-        yield self.f == self.f_c * sign + self.f_v * self.v
+        yield self.f == self.f_c * linear_sign(self.v / self.v_s) + self.f_v * self.v
 
 
 class AsymmetricFriction(Friction):
@@ -163,11 +158,7 @@ class AsymmetricFriction(Friction):
 
     def equations(self):
         yield from super().equations()
-        sign = tanh(self.v / self.v_s)
-        plus, minus = (1 + sign) / 2, (1 - sign) / 2
-        coulomb = self.f_c[0] * plus + self.f_c[1] * minus
-        viscous = self.f_v[0] * plus + self.f_v[1] * minus
-        yield self.f == coulomb * sign + viscous * self.v
+        yield self.f == asymmetric_friction(self.v, self.f_c, self.f_v, self.v_s)
 
 
 class StribeckFriction(TanhFriction):
@@ -192,12 +183,8 @@ class StribeckFriction(TanhFriction):
             self.f_s >= self.f_c, "expected a static friction f_s of at least the Coulomb friction f_c"
         )
         yield require(self.v_stribeck > 0, "expected a Stribeck speed above zero")
-        slope = self.v / self.v_s
-        sign = tanh(slope)
-        # |v|, but v_s at rest, where the sign is zero: smooth for any exponent
-        size = self.v_s * (slope * sign + 1 - sign**2)
-        fall = exp(-((size / self.v_stribeck) ** self.n))
-        yield self.f == (self.f_c + (self.f_s - self.f_c) * fall) * sign + self.f_v * self.v
+        dry = stribeck_friction(self.v, self.v_s, self.f_c, self.f_s, self.v_stribeck, self.n)
+        yield self.f == dry + self.f_v * self.v
 
 
 class DahlFriction(Friction):
@@ -216,7 +203,7 @@ class DahlFriction(Friction):
         yield from super().equations()
         yield require(self.f_c > 0, "expected a Coulomb friction f_c above zero; take Frictionless for none")
         yield require(self.sigma_0 > 0, "expected a stiffness sigma_0 above zero")
-        yield der(self.z) == self.v - self.sigma_0 * fabs(self.v) * self.z / self.f_c
+        yield der(self.z) == dahl_rate(self.v, self.z, self.sigma_0, self.f_c)
         yield self.f == self.sigma_0 * self.z + self.f_v * self.v
 
 
