@@ -8,7 +8,7 @@ import pytest
 
 from gantrytau import Input, Model, Parameter, Real, c_source, cos, sin, translate
 from gantrytau_models import FourBar
-from tests.answers.test_c_code import compiled_only, load, same
+from tests.answers.test_c_code import ROUNDING, compiled_only, error, load
 
 ANGLES = [n * math.pi / 2 + e for n in (-1, 0, 1, 2) for e in (0.0, 1e-15, -1e-12, 1e-9, 1e-6, 1e-3)]
 FOUND = ["der(crank.w)", "loops[0].f"]
@@ -69,7 +69,7 @@ def test_derivatives_are_those_of_the_branch_that_is_taken(falls):
 def test_c_code_chooses_as_well(falls, tmp_path):
     (compiled,) = load(c_source(falls, name="falls", jacobian=True), tmp_path, "falls")
     for angle in (0.0, 0.3, math.pi):
-        same(compiled(angle, 1.0, 2.0), falls(angle, 1.0, 2.0))
+        assert error(compiled(angle, 1.0, 2.0), falls(angle, 1.0, 2.0)) <= ROUNDING
 
 
 def test_where_nothing_is_determined_there_is_no_number():

@@ -82,8 +82,11 @@ def test_a_component_by_itself_and_inputs_that_are_given_are_silent(build):
     file = build("silent", lines)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        cosimulate({"a": file}, stop=0.1, step=0.1)
-        cosimulate({"a": file, "b": file}, [("a.y", "b.u")], stop=0.1, step=0.1, start={"a.u": 0.5})
+        alone = cosimulate({"a": file}, stop=0.1, step=0.1)
+        two = cosimulate({"a": file, "b": file}, [("a.y", "b.u")], stop=0.1, step=0.1, start={"a.u": 0.25})
+    assert alone["a.u"] == pytest.approx([0.5, 0.5])
+    assert two["a.u"] == pytest.approx([0.25, 0.25])
+    assert two["b.u"] == pytest.approx([1.0, 1.0])
 
 
 def test_what_cannot_be_set_says_what_can(build):

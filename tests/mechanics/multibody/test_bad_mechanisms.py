@@ -70,12 +70,10 @@ class Triangle(Model):
         yield connect(self.top.frame_b, self.two.frame_b)
 
 
-def refused(model, kind, *words):
-    """The message of what translate raises, which must have all the words."""
+def refusal(model, kind):
+    """The message of what translate raises."""
     with pytest.raises(kind) as raised:
         translate(model)
-    for word in words:
-        assert word in str(raised.value)
     return str(raised.value)
 
 
@@ -83,13 +81,10 @@ def refused(model, kind, *words):
 
 
 def test_a_loop_that_cannot_close_says_where_and_what_to_do():
-    refused(
-        Triangle(ground=dict(r=[2.0, 0.0, 0.0])),
-        InitializationError,
-        "Triangle: the loop through top, one, left, world, ground, right, two stays open",
-        "between top.frame_b and two.frame_b, by",
-        "correct lengths, offsets or joint axes",
-    )
+    found = refusal(Triangle(ground=dict(r=[2.0, 0.0, 0.0])), InitializationError)
+    assert "Triangle: the loop through top, one, left, world, ground, right, two stays open" in found
+    assert "between top.frame_b and two.frame_b, by" in found
+    assert "correct lengths, offsets or joint axes" in found
 
 
 @pytest.mark.parametrize(
@@ -103,7 +98,7 @@ def test_a_loop_that_cannot_close_says_where_and_what_to_do():
 )
 def test_a_loop_that_cannot_close_says_by_how_much(base, gap):
     """Two bars of 0.6 m in the plane of x and z reach 1.2 m; what is left is the gap, across the plane as well."""
-    refused(Triangle(ground=dict(r=base)), InitializationError, f"by {gap} m and 0 deg")
+    assert f"by {gap} m and 0 deg" in refusal(Triangle(ground=dict(r=base)), InitializationError)
 
 
 @pytest.mark.parametrize("other", [Mount(r=[1.0, 0.0, 0.0]), World()])
@@ -118,7 +113,9 @@ def test_two_fixed_places_that_disagree(other):
             yield connect(self.second.frame_b, self.bar.frame_b)
 
     words = "the loop through second, world, bar stays open between second.frame_b and bar.frame_b, by 0.5 m and 0 deg"
-    refused(Torn(), InitializationError, words, "Expected frames that meet")
+    found = refusal(Torn(), InitializationError)
+    assert words in found
+    assert "Expected frames that meet" in found
 
 
 def test_two_fixed_orientations_that_disagree():
@@ -129,7 +126,7 @@ def test_two_fixed_orientations_that_disagree():
         def equations(self):
             yield connect(self.world.frame_b, self.second.frame_b)
 
-    refused(Twisted(), InitializationError, "world.frame_b and second.frame_b, by 0 m and 17.2 deg")
+    assert "world.frame_b and second.frame_b, by 0 m and 17.2 deg" in refusal(Twisted(), InitializationError)
 
 
 def test_fixed_places_that_agree_are_welcome():
@@ -149,16 +146,18 @@ def test_two_worlds_with_different_gravity_are_refused():
     class Worlds(Thrown):
         moon = World(g=1.62)
 
-    refused(Worlds(), ModelError, "moon", "World")
+    found = refusal(Worlds(), ModelError)
+    assert "moon" in found
+    assert "World" in found
 
 
 def test_a_body_without_a_world():
     class Lost(Model):
         body = Body()
 
-    refused(
-        Lost(), ModelError, "body (Body): found no World", "declare `world = World()` in the body of Lost"
-    )
+    found = refusal(Lost(), ModelError)
+    assert "body (Body): found no World" in found
+    assert "declare `world = World()` in the body of Lost" in found
 
 
 def test_joints_that_hang_in_the_air():
@@ -170,12 +169,9 @@ def test_joints_that_hang_in_the_air():
         def equations(self):
             yield connect(self.hinge.frame_b, self.bar.frame_a)
 
-    refused(
-        Loose(),
-        StructureError,
-        "hinge.frame_a: nothing determines the orientation",
-        "Connect it to the world",
-    )
+    found = refusal(Loose(), StructureError)
+    assert "hinge.frame_a: nothing determines the orientation" in found
+    assert "Connect it to the world" in found
 
 
 # motions that nothing determines, or several things do
@@ -189,7 +185,9 @@ def test_rotation_without_inertia():
             yield connect(self.world.frame_b, self.hinge.frame_a)
             yield connect(self.hinge.frame_b, self.mass.frame_a)
 
-    refused(Spindle(), StructureError, "Undetermined: hinge.phi (nothing holds the rotation about its axis)")
+    assert "Undetermined: hinge.phi (nothing holds the rotation about its axis)" in refusal(
+        Spindle(), StructureError
+    )
 
 
 def test_sliding_without_mass():
@@ -199,7 +197,9 @@ def test_sliding_without_mass():
         def equations(self):
             yield connect(self.world.frame_b, self.rail.frame_a)
 
-    refused(Empty(), StructureError, "Undetermined: rail.s (nothing holds the sliding along its axis)")
+    assert "Undetermined: rail.s (nothing holds the sliding along its axis)" in refusal(
+        Empty(), StructureError
+    )
 
 
 def test_rotation_between_a_rod_and_a_bar():
@@ -216,9 +216,9 @@ def test_rotation_between_a_rod_and_a_bar():
             yield connect(self.rod.frame_b, self.bar.frame_a)
             yield connect(self.bar.frame_b, self.mass.frame_a)
 
-    refused(
-        Hanging(), StructureError, "bar.frame_a: nothing determines the orientation", "its rotation is free"
-    )
+    found = refusal(Hanging(), StructureError)
+    assert "bar.frame_a: nothing determines the orientation" in found
+    assert "its rotation is free" in found
 
 
 class SpinningBar(Model):
@@ -233,7 +233,9 @@ class SpinningBar(Model):
 
 
 def test_rotation_of_a_bar_about_itself_is_named():
-    refused(SpinningBar(), StructureError, "ball.q", "nothing holds the rotation in the ball joint")
+    found = refusal(SpinningBar(), StructureError)
+    assert "ball.q" in found
+    assert "nothing holds the rotation in the ball joint" in found
 
 
 class Driven(Swing):
@@ -262,7 +264,10 @@ def test_a_joint_driven_twice(second, word):
             yield from super().equations()
             yield connect(self.other.flange, self.hinge.axis)
 
-    refused(Twice(), StructureError, "Overdetermined by 1", "other", word)
+    found = refusal(Twice(), StructureError)
+    assert "Overdetermined by 1" in found
+    assert "other" in found
+    assert word in found
 
 
 def test_a_joint_driven_and_locked():
