@@ -6,7 +6,7 @@ import pytest
 from gantrytau import Fixed, GantryTauError, Model, ModelError, Start, StructureError, connect, der, translate
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody import LineForce, PointMass, SphericalSpherical, World
-from tests.mechanics.multibody.test_bad_mechanisms import Driven, Swing, Thrown, refused
+from tests.mechanics.multibody.test_bad_mechanisms import Driven, Swing, Thrown, refusal
 from tests.references.rotations import turn
 
 # parameters
@@ -20,17 +20,15 @@ def test_a_rod_of_negative_length():
             yield connect(self.world.frame_b, self.rod.frame_a)
             yield connect(self.rod.frame_b, self.mass.frame_a)
 
-    refused(Rod(), ModelError, "rod.L: value is -1, expected at least 0 (length between")
-    refused(
-        Rod(rod=dict(L=0.0)),
-        ModelError,
-        "rod (SphericalSpherical): found rod.L = 0; expected a length above zero",
+    assert "rod.L: value is -1, expected at least 0 (length between" in refusal(Rod(), ModelError)
+    assert "rod (SphericalSpherical): found rod.L = 0; expected a length above zero" in refusal(
+        Rod(rod=dict(L=0.0)), ModelError
     )
 
 
 @pytest.mark.parametrize("model", [Swing, Thrown])
 def test_negative_mass(model):
-    refused(model(body=dict(m=-1.0)), ModelError, "body.m: value is -1, expected at least 0 (mass)")
+    assert "body.m: value is -1, expected at least 0 (mass)" in refusal(model(body=dict(m=-1.0)), ModelError)
 
 
 def test_a_hinged_body_may_have_inertia_alone():
@@ -40,21 +38,15 @@ def test_a_hinged_body_may_have_inertia_alone():
 
 @pytest.mark.parametrize("body", [dict(m=0.0), dict(J=np.zeros((3, 3)))])
 def test_a_free_body_without_inertia(body):
-    refused(
-        Thrown(body=body),
-        StructureError,
-        "the body has no mass or inertia against this motion",
-        "Expected mass",
-    )
+    found = refusal(Thrown(body=body), StructureError)
+    assert "the body has no mass or inertia against this motion" in found
+    assert "Expected mass" in found
 
 
 def test_a_hinged_body_without_mass_and_inertia():
-    refused(
-        Swing(body=dict(m=0.0, J=np.zeros((3, 3)))),
-        StructureError,
-        "nothing holds the rotation about its axis",
-        "hinge",
-    )
+    found = refusal(Swing(body=dict(m=0.0, J=np.zeros((3, 3)))), StructureError)
+    assert "nothing holds the rotation about its axis" in found
+    assert "hinge" in found
 
 
 IMPOSSIBLE = {
@@ -66,7 +58,9 @@ IMPOSSIBLE = {
 
 @pytest.mark.parametrize("words", IMPOSSIBLE)
 def test_an_inertia_that_no_body_has(words):
-    refused(Thrown(body=dict(J=IMPOSSIBLE[words])), ModelError, "body (Body): found body.J[0,0] =", words)
+    found = refusal(Thrown(body=dict(J=IMPOSSIBLE[words])), ModelError)
+    assert "body (Body): found body.J[0,0] =" in found
+    assert words in found
 
 
 @pytest.mark.parametrize("J", [np.zeros((3, 3)), np.diag([0.0, 0.1, 0.1]), np.diag([0.2, 0.1, 0.1])])
@@ -81,16 +75,15 @@ def test_a_thin_plate_with_rounded_inertia_is_welcome():
 
 
 def test_an_inertia_of_the_wrong_shape():
-    refused(Thrown(body=dict(J=np.eye(2))), ModelError, "body.J: value has shape (2, 2), expected (3, 3)")
+    assert "body.J: value has shape (2, 2), expected (3, 3)" in refusal(
+        Thrown(body=dict(J=np.eye(2))), ModelError
+    )
 
 
 def test_an_axis_of_length_zero():
-    refused(
-        Swing(hinge=dict(n=[0.0, 0.0, 0.0])),
-        ModelError,
-        "hinge (Revolute): found hinge.n[0] = 0",
-        "expected an axis that is not zero",
-    )
+    found = refusal(Swing(hinge=dict(n=[0.0, 0.0, 0.0])), ModelError)
+    assert "hinge (Revolute): found hinge.n[0] = 0" in found
+    assert "expected an axis that is not zero" in found
 
 
 def test_a_line_force_between_points_that_coincide():
@@ -104,7 +97,7 @@ def test_a_line_force_between_points_that_coincide():
             yield connect(self.line.flange_a, self.spring.flange_a)
             yield connect(self.line.flange_b, self.spring.flange_b)
 
-    refused(Line(), GantryTauError, "line")
+    assert "line" in refusal(Line(), GantryTauError)
 
 
 # states, causality, start values
@@ -166,14 +159,13 @@ def test_equations_with_coordinates_that_do_not_exist():
             yield from super().equations()
             yield der(self.body.q[0]) == 0
 
-    refused(Asked(), ModelError, "body.q[0], which does not exist", "use the orientation R")
+    found = refusal(Asked(), ModelError)
+    assert "body.q[0], which does not exist" in found
+    assert "use the orientation R" in found
 
 
 @pytest.mark.parametrize("start", [Start([1.0, 0.0, 0.0, 0.0]), Fixed([0.0, 1.0, 0.0, 0.0])])
 def test_start_values_of_coordinates_that_do_not_exist(start):
-    refused(
-        Swing(body=dict(q=start)),
-        ModelError,
-        "body.q: found a start value, but it does not exist",
-        "of those joints",
-    )
+    found = refusal(Swing(body=dict(q=start)), ModelError)
+    assert "body.q: found a start value, but it does not exist" in found
+    assert "of those joints" in found
