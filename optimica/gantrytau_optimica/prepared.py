@@ -1,6 +1,6 @@
 """A problem ready to be solved, again and again, with other parameters and guesses."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,9 +23,9 @@ from gantrytau_optimica.refinement.multistart import Guesses, searched
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings
+from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings, objective_size
 from gantrytau_optimica.solving.moving_points import settled
-from gantrytau_optimica.solving.second_look import moved_aside
+from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
@@ -40,7 +40,7 @@ LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
-MOST_ASIDE = 3  # times that a solve goes on from a place that is no minimum
+MOST_LEFT = 3  # places that are no minimum, which a solve leaves
 
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
 REMEDIES = {
@@ -118,13 +118,14 @@ class Prepared:
             close = self.solved(
                 optimum.built, program, self._solver(program, replace(again, near=True)), first
             )
-            return (
-                close
-                if close.success and not (found.success and found.objective < close.objective)
-                else found
-            )
+            closer = close.success and not (found.success and found.objective < close.objective)
+            return close if closer else found
 
-        return refined(optimum, self.refine, solve, reached)
+        def told(program: Program, first: np.ndarray) -> Optimum:
+            found = solve(program, first)
+            return replace(found, left=optimum.left + found.left)
+
+        return refined(optimum, self.refine, told, reached)
 
     @property
     def _reached(self) -> BestSoFar:
@@ -176,8 +177,10 @@ class Prepared:
             optimum = self.solved(built, program, nearby, first)
             if optimum.success:
                 return optimum
-        optimum = self._minimum(built, program, first)
-        if optimum.success or self.refine is None or not self._reached.clock.left:
+        optimum = self.solved(built, program, self.solver, first)
+        if optimum.success:
+            return self._resized(optimum)
+        if self.refine is None or not self._reached.clock.left:
             return optimum
         layouts = program.places.layouts
         plain = transcribe(
@@ -189,20 +192,6 @@ class Prepared:
             return optimum
         again = self.solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
-
-    def _minimum(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
-        """From one first guess; if that ends where the objective falls to a side, from there."""
-        found = self.solved(built, program, self.solver, first)
-        for _ in range(MOST_ASIDE):
-            aside = moved_aside(found.program, found.solution, first) if found.success else None
-            if aside is None or not self._reached.clock.left:
-                break
-            better = self.solved(found.built, found.program, self.solver, aside)
-            if not (better.success and better.objective < found.objective):
-                solution = replace(found.solution, status=NO_MINIMUM)
-                return replace(found, solution=solution)
-            found = better
-        return self._resized(found) if found.success else found
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
@@ -233,7 +222,7 @@ class Prepared:
         program = transcribe(built.problem, meshes, layouts[0].scheme, located)
         solver = self._solver(program, replace(self.solver.settings, near=True))
         again = self.solved(built, program, solver, warm_start(list(found.phases.values()), program))
-        return again if again.success else found
+        return replace(again, left=found.left + again.left) if again.success else found
 
     def _coarse(self, built: Built) -> Program:
         """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,
@@ -249,7 +238,30 @@ class Prepared:
         return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
 
     def solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
-        """Where the solver ends from a first guess of the unknowns of a program; what was reached knows it as well."""
+        """Where the solver ends from a first guess of the unknowns of a program, maxima and saddles left."""
+        found = self._ended(built, program, solver, beside_obstacles(program, first))
+        for _ in range(MOST_LEFT):
+            beside = list(places_aside(found.program, found.solution)) if found.success else []
+            better = next(self._better(found, solver, beside), None)
+            if better is None:
+                if beside:
+                    found = replace(found, solution=replace(found.solution, status=NO_MINIMUM))
+                break
+            found = replace(better, left=found.left + 1)
+        self._reached.keep(found)
+        return found
+
+    def _better(self, found: Optimum, solver: Solver, places: Iterable[np.ndarray]) -> Iterator[Optimum]:
+        """Where the solver ends from these unknowns, if the objective is less there."""
+        margin = VANISHED * objective_size(found.program)
+        for first in places:
+            if self._reached.clock.left:
+                better = self._ended(found.built, found.program, solver, first)
+                if better.success and better.objective < found.objective - margin:
+                    yield better
+
+    def _ended(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
+        """Where the solver ends; what was reached knows it as well."""
         clock = self._reached.clock
         try:
             solution = solver.solve(program, first, clock)

@@ -8,6 +8,7 @@ from typing import Any
 from gantrytau_optimica.answers.archive.optimum_files import SUFFIX, save_optimum
 from gantrytau_optimica.answers.playback.playback import Playback, play_back
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
+from gantrytau_optimica.answers.second_order import SecondOrder, second_order
 from gantrytau_optimica.failures.failure_report import report
 from gantrytau_optimica.failures.relaxation import Relaxed, relax
 
@@ -22,7 +23,7 @@ class Optimum(ProgramAnswer):
     def with_notes(self, **notes: Any) -> "Optimum":
         """The same answer with `refinement` or `search`; what was found out about it already stays."""
         noted = replace(self, **notes)
-        for name in {"playback", "phases"} & vars(self).keys():
+        for name in {"playback", "phases", "second_order"} & vars(self).keys():
             object.__setattr__(noted, name, vars(self)[name])
         return noted
 
@@ -35,10 +36,15 @@ class Optimum(ProgramAnswer):
         """The model driven anew by the inputs found, with all limits and conditions looked at between the nodes."""
         return play_back(self)
 
+    @cached_property
+    def second_order(self) -> SecondOrder:
+        """Whether it is a minimum, by the curvature of the objective."""
+        return second_order(self.built, self.program, self.solution, list(self.phases.values()), self.left)
+
     def report(self) -> str:
         """How it ended, what remains violated or binds, and what becomes of it when played back, in the model's words."""
         found = report(self.built, self.program, self.solution, list(self.phases.values()))
-        lines = [found, str(self.playback)] if self.success else [found]
+        lines = [found, str(self.second_order), str(self.playback)] if self.success else [found]
         more = [str(x) for x in (self.refinement, self.search) if x is not None]
         return "\n".join([*lines, *more])
 

@@ -20,7 +20,8 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 class ProgramAnswer(Answer):
     """A solved program, or one that was not solved, as an answer; build_time in s.
 
-    refinement: how it was refined, if it was; search: the branches found from several first guesses, if there were.
+    refinement: how it was refined, if it was; search: the branches found from several first guesses, if there were;
+    left: how many maxima and saddles the solver left on its way here.
     """
 
     name: str
@@ -30,6 +31,7 @@ class ProgramAnswer(Answer):
     build_time: float
     refinement: Any = None
     search: Any = None
+    left: int = 0
 
     @property
     def dae(self) -> Dae:

@@ -179,7 +179,7 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
     result of several phases a signal is NaN outside of its own.
 
     component: path of the component that the solution is of. What the solution does not have keeps its default guess;
-    ModelError if it has no variable of the model at all.
+    ModelError if it has no variable and no free number of the model at all.
     """
     before = f"{component}." if component else ""
     times: dict[str, np.ndarray] = {}
@@ -187,7 +187,8 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
         own = name[len(before) :]
         if name.startswith(before) and own in source:
             times[name] = _times(source, own)
-    if not times:
+    numbers = {before + n: x for n, x in getattr(source, "free", {}).items() if before + n in dae.parameters}
+    if not times and not numbers:
         what = f"none of the variables of {component}" if component else "no variable of the problem"
         raise ModelError(
             f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the "
@@ -200,8 +201,7 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
         if np.any(known):
             t = every[known]
             found[name] = _Stretched((t - t[0]) / (t[-1] - t[0]), values[known])
-    numbers = {before + n: x for n, x in getattr(source, "free", {}).items()}
-    return {**found, **{n: x for n, x in numbers.items() if n in dae.parameters}}
+    return {**found, **numbers}
 
 
 def _times(source: Result | GivenSolution, name: str) -> np.ndarray:

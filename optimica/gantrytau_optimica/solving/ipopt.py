@@ -1,6 +1,7 @@
 """Ipopt on a transcribed problem: progress, interruption, and statuses in words."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +32,7 @@ PUSH = 1e-2  # Ipopt's bound_push and bound_frac: how far a guess is moved insid
 
 UNLIMITED = 1e200
 
+LAST = 3  # steps that tell whether a solution is a minimum
 FAR = 1e5  # typical sizes that an unknown moves from its guess when it runs away
 
 # From a solution nearby the barrier begins low: begun high, it may lead to another branch.
@@ -49,7 +51,11 @@ FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by acci
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Unknowns w and multipliers as Ipopt left them; status in words; times in s."""
+    """Unknowns w and multipliers as Ipopt left them; status in words; times in s.
+
+    upright: whether its last steps were made without regularisation, so that curvature was positive in all directions
+    that conditions leave free.
+    """
 
     w: np.ndarray
     multipliers: np.ndarray
@@ -60,6 +66,7 @@ class Solution:
     status: str
     iterations: int
     solve_time: float
+    upright: bool = False
 
 
 class Pressed(KeyboardInterrupt):
@@ -167,10 +174,18 @@ class Solver:
             status=WORDS.get(word, word.replace("_", " ").lower()),
             iterations=int(stats["iter_count"]),
             solve_time=time.perf_counter() - begin,
+            upright=_upright(stats),
         )
         if self.watch.pressed:
             raise Pressed(solution)
         return solution
+
+
+def _upright(stats: Mapping[str, Any]) -> bool:
+    last = stats.get("iterations", {}).get("regularization_size", ())[1:][
+        -LAST:
+    ]  # the first tells of no step
+    return len(last) > 0 and not any(last)
 
 
 def pushed(program: Program, guess: np.ndarray) -> np.ndarray:
