@@ -35,21 +35,7 @@ from gantrytau import (
     when,
 )
 from gantrytau.flattening.whens import one_round
-
-
-class Ball(Model):
-    """A ball that falls on a floor and bounces."""
-
-    g = Parameter(9.81, unit="m/s2", description="gravity")
-    e = Parameter(0.8, unit="1", description="part of the speed that is left")
-    h = Real(unit="m", description="height", start=1.0, fixed=True)
-    v = Real(unit="m/s", description="speed", start=0.0, fixed=True)
-    bounces = Discrete(0, unit="1", description="bounces so far")
-
-    def equations(self):
-        yield der(self.h) == self.v
-        yield der(self.v) == -self.g
-        yield when(self.h <= 0, reinit(self.v, -self.e * pre(self.v)), self.bounces == pre(self.bounces) + 1)
+from tests.simulation.balls import Ball
 
 
 def falling(*lines: str, **members):

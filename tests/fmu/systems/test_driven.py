@@ -29,7 +29,7 @@ from gantrytau.commands.app import app
 from gantrytau_fmu import cosimulate, export_fmu
 from gantrytau_fmu.systems.drives import Drive, between
 from gantrytau_fmu.systems.run_fmu import run_fmu
-from tests.fmu.systems.small_fmus import Builder, variable
+from tests.fmu.systems.small_fmus import variable
 
 PULSE = Samples([0.0, 0.3, 0.3 + 1e-6], [1.0, 1e6, 1.0], kind="constant")
 TRIANGLE = Samples([0.0, 0.3, 0.3 + 1e-6, 0.3 + 2e-6, 1.0], [1.0, 1.0, 1e6 + 1.0, 1.0, 1.0])
@@ -50,11 +50,6 @@ class Lags(Model):
 @pytest.fixture(scope="module")
 def lags(tmp_path_factory):
     return export_fmu(Lags(), tmp_path_factory.mktemp("lags") / "lags.fmu", tolerance=1e-10)
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory):
-    return Builder(tmp_path_factory.mktemp("fmus"))
 
 
 def integrator(build, name, **more):

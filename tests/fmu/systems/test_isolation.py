@@ -5,14 +5,9 @@ import pytest
 
 from gantrytau import InitializationError, SolveError
 from gantrytau_fmu.systems.cosimulate import cosimulate
-from tests.fmu.systems.small_fmus import Builder, variable
+from tests.fmu.systems.small_fmus import variable
 
 LINES = [variable("u", "input", 0.0), variable("y", "output", 1.0)]
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory):
-    return Builder(tmp_path_factory.mktemp("fmus"))
 
 
 def test_a_component_in_its_own_process_gives_the_same(build):

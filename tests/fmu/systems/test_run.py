@@ -15,14 +15,9 @@ from gantrytau.progress import Progress
 from gantrytau_fmu import export_fmu
 from gantrytau_fmu.systems.run_fmu import run_fmu
 from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
-from tests.fmu.systems.small_fmus import Builder, variable
+from tests.fmu.systems.small_fmus import variable
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory):
-    return Builder(tmp_path_factory.mktemp("fmus"))
 
 
 @pytest.fixture(scope="module")

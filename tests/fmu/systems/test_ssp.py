@@ -9,7 +9,7 @@ from gantrytau import ModelError
 from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_fmu.systems.ssp.read_ssp import STRUCTURE
 from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
-from tests.fmu.systems.small_fmus import Builder, variable
+from tests.fmu.systems.small_fmus import variable
 
 SPACES = "http://ssp-standard.org/SSP1/SystemStructure"
 HEAD = (
@@ -17,11 +17,6 @@ HEAD = (
     f'xmlns:ssv="{SPACES}ParameterValues" version="1.0" name="s">'
 )
 WIRES = [("a.y", "b.u"), ("b.y", "a.u")]
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory):
-    return Builder(tmp_path_factory.mktemp("fmus"))
 
 
 def lag(build, name, start, fmi="2.0"):

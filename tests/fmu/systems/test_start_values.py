@@ -9,12 +9,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
-from tests.fmu.systems.small_fmus import Builder, variable
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory):
-    return Builder(tmp_path_factory.mktemp("fmus"))
+from tests.fmu.systems.small_fmus import variable
 
 
 def spring(build, fmi="2.0"):
