@@ -13,6 +13,7 @@ from gantrytau.compiler.blocks.pivots import reliable
 from gantrytau.language.piecewise import Switched, with_modes
 
 RELAXED_PIVOT = 0.1  # smallest pivot relative to its row, at all sample points, that is divided by
+LEAST_PIVOT = 1e-6  # the same of constants, where otherwise nothing could be divided by
 
 
 @dataclass(frozen=True)
@@ -44,20 +45,28 @@ def tear(
     sizes = reliable(numbers, largest)
     rows, columns = jacobian.sparsity().get_triplet()
     incidence: dict[int, set[int]] = {i: set() for i in range(jacobian.shape[0])}
-    solvable: set[tuple[int, int]] = set()
-    for i, j, entry in zip(rows, columns, jacobian.nonzeros(), strict=True):
+    entries = list(zip(rows, columns, jacobian.nonzeros(), strict=True))
+    for i, j, _ in entries:
         incidence[i].add(j)
-        if (i, j) in barred:
-            large = False
-        elif i in partner:
-            large = partner[i] == j and sizes[i, j] > 0
-        elif entry.is_constant():
-            large = sizes[i, j] >= 1e-6
-        else:
-            large = (relaxed or not ca.depends_on(entry, x)) and sizes[i, j] >= RELAXED_PIVOT
-        if large:
-            solvable.add((i, j))
-    return _search(incidence, solvable, first, set(partner.values()))
+
+    def solvable(least: float) -> set[tuple[int, int]]:
+        """Places that may be divided by; least: what constants need of their row."""
+        found: set[tuple[int, int]] = set()
+        for i, j, entry in entries:
+            if (i, j) in barred:
+                large = False
+            elif i in partner:
+                large = partner[i] == j and sizes[i, j] > 0
+            elif entry.is_constant():
+                large = sizes[i, j] >= least
+            else:
+                large = (relaxed or not ca.depends_on(entry, x)) and sizes[i, j] >= RELAXED_PIVOT
+            if large:
+                found.add((i, j))
+        return found
+
+    torn = _search(incidence, solvable(RELAXED_PIVOT), first, set(partner.values()))
+    return torn if torn.assignments else _search(incidence, solvable(LEAST_PIVOT), first, set(partner.values()))
 
 
 def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
