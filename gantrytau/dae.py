@@ -12,7 +12,7 @@ from gantrytau.answers.diagnosis import Diagnosis, diagnose
 from gantrytau.answers.evaluation import evaluate
 from gantrytau.answers.instant_function import instant_function, is_before
 from gantrytau.compiler.request import Request, names
-from gantrytau.compiler.system import System, assemble
+from gantrytau.compiler.system import Causality, System, assemble
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.flattening.check_units import check_units
@@ -36,13 +36,18 @@ class Dae(Translated):
         """Sizes, mobility, loops, states, blocks and the start; prints itself."""
         return diagnose(self)
 
-    def system(self, form: Literal["explicit", "lifted"] = "explicit") -> System:
+    def system(
+        self, form: Literal["explicit", "lifted"] = "explicit", causality: Causality | None = None
+    ) -> System:
         """The equations as x' = ode(t, x, z, u, p), 0 = residuals(t, x, z, u, p).
 
         explicit: everything that has a closed form is inserted, z is what has none. lifted: square roots
-        and torn unknowns stay in z with equations of their own, which optimisers prefer.
+        and torn unknowns stay in z with equations of their own, which optimisers prefer. causality, of lifted forms:
+        "inverse" has accelerations in z, from which reactions and inputs follow; "forward" has what is left of solving
+        for them; by default inverse where no closed form leads forwards and less is left. Raises ModelError for
+        "inverse" where inputs and accelerations do not match.
         """
-        return assemble(self, form)
+        return assemble(self, form, causality)
 
     def equations(self, format: Literal["text", "latex", "html", "modelica"] = "text") -> str:
         """The equations, written out: every block with the component equations it comes from, or the flat model.

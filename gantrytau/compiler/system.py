@@ -1,14 +1,21 @@
 """The sorted blocks put together as one semi-explicit system, with what has no closed form left implicit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution, column
-from gantrytau.compiler.translated import Translated
+from gantrytau.compiler.blocks.inverse_form import Equations, Inverse, inverse_of, torn_of
+from gantrytau.compiler.blocks.pivots import Guide
+from gantrytau.compiler.blocks.solution import Block
+from gantrytau.compiler.translated import Origin, Translated, origin_of
+from gantrytau.errors import ModelError
+
+Causality = Literal["inverse", "forward"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +36,9 @@ class Algebraic:
 class System:
     """x' = ode, 0 = residuals, all in SX of (time, x, z, u, p).
 
-    definitions: (symbol, expression) in order of solution, through which every variable can be expressed.
+    definitions: (symbol, expression) in order of solution, through which every variable can be expressed; origins: of
+    the algebraics; inverse: blocks that are solved for inputs, with accelerations among the algebraics; forward: why
+    blocks that have a form of that kind in general have none here, in words.
     """
 
     dae: Translated
@@ -45,6 +54,9 @@ class System:
     definitions: tuple[tuple[ca.SX, ca.SX], ...]
     ode: ca.SX
     residuals: ca.SX
+    origins: tuple[Origin, ...]
+    inverse: tuple[Inverse, ...]
+    forward: tuple[str, ...]
 
     def to_system(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions in reduced symbols as expressions of (time, x, z, u, p) and derivatives of inputs."""
@@ -54,10 +66,25 @@ class System:
         return [ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True)]
 
 
-def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
+def assemble(
+    dae: Translated, form: Literal["explicit", "lifted"], causality: Causality | None = None
+) -> System:
     """Put the blocks of a Dae together; see Dae.system."""
     chains, table = dae.reduced.chains, dae.table
-    definitions, algebraics = _left_implicit(dae, form)
+    left = _Left(dae, form)
+    for one in _in_order(dae, form, causality, left.forward):
+        if isinstance(one, Inverse):
+            left.enter_inverse(one)
+        else:
+            left.enter(one)
+    if causality == "inverse" and not left.inverse:
+        why = f" ({'; '.join(left.forward)})" if left.forward else ""
+        raise ModelError(
+            f"{dae.name}: causality='inverse', but nothing has an inverse form here{why}, expected as many inputs that "
+            "drive a mechanism as it has accelerations of states; leave causality out",
+            argument="causality",
+        )
+    algebraics = left.algebraics
     draft = System(
         dae=dae,
         time=dae.flat.time,
@@ -69,9 +96,12 @@ def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
         u=column([chains.sx(n) for n in dae.known]),
         parameters=table.independent,
         p=column([table.symbols[n] for n in table.independent]),
-        definitions=tuple(definitions),
+        definitions=tuple(left.definitions),
         ode=column([chains.rate(n) for n in dae.choice.states]),
         residuals=column([a.residual for a in algebraics]),
+        origins=tuple(left.origins),
+        inverse=tuple(left.inverse),
+        forward=tuple(left.forward),
     )
     closed = [a.closed for a in algebraics if a.closed is not None]
     ode, residuals, *closed = draft.to_system([draft.ode, draft.residuals, *closed])
@@ -83,25 +113,100 @@ def assemble(dae: Translated, form: Literal["explicit", "lifted"]) -> System:
     return replace(draft, ode=ode, residuals=residuals, algebraics=resolved)
 
 
-def _left_implicit(
-    dae: Translated, form: Literal["explicit", "lifted"]
-) -> tuple[list[tuple[ca.SX, ca.SX]], list[Algebraic]]:
+def _in_order(
+    dae: Translated, form: Literal["explicit", "lifted"], causality: Causality | None, why: list[str]
+) -> Iterator[Block | Inverse]:
+    """The blocks in the order of their solution, inverse forms in the place of those they stand for.
+
+    why: gets the reasons why blocks have none.
+    """
+    chains, inverse = dae.reduced.chains, dict[int, Inverse]()
+    if form == "explicit" or causality == "forward":
+        yield from dae.blocks
+        return
+    unknowns = [n for block in dae.blocks for n in block.unknowns]
+    symbols = {n: chains.named(n) for n in (*unknowns, *dae.inputs)}
+    every = Equations(dae.blocks, dae.indexed.residuals, dae.indexed.incidence, symbols, dae.inputs)
+    guide = partial(Guide, dae.start, dae.parameter_values, dae.choice.states)
+    rates = guide().rates
+    for number, block in enumerate(dae.blocks):
+        wanted = causality == "inverse" or block.solution is None
+        if not wanted or block.kind != "linear" or not rates & set(block.unknowns):
+            continue
+        found = inverse_of(every, number, guide)
+        if isinstance(found, str):
+            why.append(found)
+        elif causality is None and found.tears >= len(block.tears):
+            why.append(f"as many unknowns found together ({found.tears}) as forwards ({len(block.tears)})")
+        else:
+            inverse[number] = found
+    moved = {k for number, one in inverse.items() for k in one.members if k != number}
+    done: set[int] = set()
+    waiting: list[int] = []
+    for number in range(len(dae.blocks)):
+        waiting += [] if number in moved else [number]
+        for k in list(waiting):
+            own = inverse[k].members if k in inverse else {k}
+            if set().union(*(every.needs[m] for m in own)) - own <= done:
+                yield inverse.get(k, dae.blocks[k])
+                done |= own
+                waiting.remove(k)
+
+
+class _Left:
     """What the blocks define outright, in order, and what stays as an equation."""
-    definitions: list[tuple[ca.SX, ca.SX]] = []
-    algebraics: list[Algebraic] = []
-    for block in dae.blocks:
-        count = len(block.tears)
-        solution: Sequence[ca.SX | None] = block.solution or [None] * count
-        several = count > 1 and block.kind in ("linear", "spheres")
-        if form == "lifted" and block.root is not None:
+
+    def __init__(self, dae: Translated, form: Literal["explicit", "lifted"]):
+        self.dae, self.form = dae, form
+        self.definitions: list[tuple[ca.SX, ca.SX]] = []
+        self.algebraics: list[Algebraic] = []
+        self.origins: list[Origin] = []
+        self.inverse: list[Inverse] = []
+        self.forward: list[str] = []
+
+    def enter(self, block: Block) -> None:
+        """A block that is solved for its unknowns."""
+        solution: Sequence[ca.SX | None] = block.solution or [None] * len(block.tears)
+        if self.form == "lifted" and block.root is not None:
             # no square root to differentiate at zero
             w, radicand = block.root.root, block.root.radicand
-            algebraics.append(Algebraic(w.name(), w, w**2 - radicand, ca.sqrt(ca.fmax(radicand, 0)), 0.0))
-            definitions.append((block.tears[0], block.root.value))
-        elif block.solution is None or (form == "lifted" and several):
+            self.algebraics.append(
+                Algebraic(w.name(), w, w**2 - radicand, ca.sqrt(ca.fmax(radicand, 0)), 0.0)
+            )
+            self.definitions.append((block.tears[0], block.root.value))
+        elif block.solution is None or (self.form == "lifted" and torn_of(block)):
             rows = zip(block.tears, block.residuals, solution, strict=True)
-            algebraics += [Algebraic(y.name(), y, residual, closed) for y, residual, closed in rows]
+            self.algebraics += [Algebraic(y.name(), y, residual, closed) for y, residual, closed in rows]
         else:
-            definitions += zip(block.tears, block.solution, strict=True)
-        definitions += block.inner
-    return definitions, algebraics
+            self.definitions += zip(block.tears, block.solution, strict=True)
+        self.definitions += block.inner
+        self.origins.append(origin_of(self.dae, block))
+
+    def enter_inverse(self, inverse: Inverse) -> None:
+        """A block that is solved for inputs: an equation for each of them belongs to an acceleration."""
+        named, inputs = self.dae.reduced.chains.named, set(inverse.inputs)
+        place = len(self.algebraics)
+        rows: list[tuple[ca.SX, Origin]] = []
+        for block in inverse.blocks:
+            origin = origin_of(self.dae, block)
+            self.origins.append(origin)
+            torn, closed = torn_of(block), block.solution or [None] * len(block.tears)
+            if torn:
+                for y, residual, form in zip(torn, block.residuals, closed, strict=True):
+                    if y.name() in inputs:
+                        rows.append((residual, origin))
+                    else:
+                        self.algebraics.append(Algebraic(y.name(), y, residual, form))
+            outright = block.inner if torn else block.definitions
+            rows += [(u - e, origin) for u, e in outright if u.name() in inputs]
+            self.definitions += [(y, e) for y, e in outright if y.name() not in inputs]
+        found = [
+            Algebraic(name, named(name), row, None)
+            for name, (row, _) in zip(inverse.rates, rows, strict=True)
+        ]
+        self.algebraics[place:place] = found
+        self.origins += [
+            replace(origin, tears=(name,), inner=())
+            for name, (_, origin) in zip(inverse.rates, rows, strict=True)
+        ]
+        self.inverse.append(inverse)

@@ -129,15 +129,7 @@ class Translated:
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
         """Which equations give which symbols, block by block."""
-        return tuple(
-            Origin(
-                tuple(self.equation_name(key) for key in block.equations),
-                tuple(y.name() for y in block.tears),
-                tuple(symbol.name() for symbol, _ in block.inner),
-                block.root is not None,
-            )
-            for block in self.blocks
-        )
+        return tuple(origin_of(self, block) for block in self.blocks)
 
     @cached_property
     def symbols(self) -> tuple[str, ...]:
@@ -238,6 +230,16 @@ class Translated:
         index, times = key
         name = self.reduced.equations[index].name
         return name if times == 0 else f"{name}, differentiated {'once' if times == 1 else f'{times} times'}"
+
+
+def origin_of(dae: Translated, block: Block) -> Origin:
+    """Where a block of its equations comes from."""
+    return Origin(
+        tuple(dae.equation_name(key) for key in block.equations),
+        tuple(y.name() for y in block.tears),
+        tuple(symbol.name() for symbol, _ in block.inner),
+        block.root is not None,
+    )
 
 
 def solved(dae: Translated, pattern: Pattern) -> SolvedBlocks:
