@@ -8,6 +8,7 @@ from typing import Any, Literal, Unpack
 
 from gantrytau import SolveError
 from gantrytau.compiler.request import names
+from gantrytau.compiler.system import Causality
 from gantrytau_optimica.answers.archive.run_record import require_place, write_record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
@@ -40,6 +41,7 @@ def optimize(
     lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
     controls: Mapping[str, Any] | None = None,
+    causality: Causality | None = None,
     refine: float | None = None,
     starts: int = 1,
     tolerance: float = 1e-8,
@@ -56,6 +58,8 @@ def optimize(
     guess: name -> number, array or function of time, or another solution; a component -> a solution of that component.
     Default: a straight line between given initial and final values, else start values.
     controls: input -> dict(kind="constant" | "linear" | "ramps", elements=1, max_step=None, step_penalty=0.0).
+    causality: whether equations of motion are solved for forces ("inverse", accelerations being guessed) or for
+    accelerations ("forward"); by default inverse where that leaves less to be found together. Inputs are the same.
     refine: relative accuracy to which limits and conditions hold when played back, and to which the objective stands.
     starts: first guesses that are tried; `.search` of the answer tells the branches they led to.
     tolerance: of Ipopt; max_time: s, of the whole call: a refinement that is not done ends with its best round;
@@ -65,8 +69,8 @@ def optimize(
     pressed; ModelError for what is written wrongly.
     """
     policy = Policy(
-        elements, points, scheme, lengths, guess, controls, refine, starts, tolerance, max_iterations, max_time,
-        progress,
+        elements, points, scheme, lengths, guess, controls, causality, refine, starts, tolerance, max_iterations,
+        max_time, progress,
     )  # fmt: skip
     if record is not None:
         require_place(record)
@@ -107,7 +111,7 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     begin = time.perf_counter()
     near, guess = solution_given(policy.guess), read_guesses(policy.guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
-    built = build(read, guess, held, read_controls(read, policy.controls or {}))
+    built = build(read, guess, held, read_controls(read, policy.controls or {}), policy.causality)
     if one_point(read):  # a static problem: one element, one point
         policy = replace(
             policy, elements=1, points=1, scheme="radau", lengths="given", controls=None, refine=None

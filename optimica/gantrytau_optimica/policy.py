@@ -8,6 +8,7 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.compiler.system import Causality
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.solving.clock import Progress
@@ -36,6 +37,7 @@ class TranscriptionKeywords(MeshKeywords, total=False):
     lengths: Literal["given", "free"]
     guess: Guesses | None
     controls: Mapping[str, Any] | None
+    causality: Causality | None
 
 
 class PolicyKeywords(TranscriptionKeywords, total=False):
@@ -55,6 +57,7 @@ class Policy:
     lengths: Literal["given", "free"] = "given"
     guess: Guesses | None = None
     controls: Mapping[str, Any] | None = None
+    causality: Causality | None = None
     refine: float | None = None
     starts: int = 1
     tolerance: float = 1e-8
@@ -71,6 +74,7 @@ class Policy:
             ("progress", told is None or callable(told), "a function of (iteration, objective)"),
             ("refine", accuracy is None or (isinstance(accuracy, float) and 1e-9 <= accuracy < 1),
              "a relative accuracy from 1e-9 to below 1, as 1e-6"),
+            ("causality", self.causality in (None, "inverse", "forward"), "'inverse', 'forward' or None, the better one"),
             ("starts", _whole(self.starts), "a whole number of at least 1"),
             ("lengths", self.lengths in ("given", "free"),
              "'given' or 'free' (the optimiser places the borders of the elements)"),

@@ -206,7 +206,7 @@ class Prepared:
             return found
         pieces = {s.name: s.pieces for phase in problem.phases for s in phase.inputs}
         held = [n.name for n in problem.free if n.held]
-        built = build(found.built.read, guess_of(found, found.dae), held, pieces)
+        built = build(found.built.read, guess_of(found, found.dae), held, pieces, found.built.causality)
         free = tuple(
             replace(new, guess=old.guess, min=old.min, max=old.max, nominal=abs(old.guess) or None)
             if old.held

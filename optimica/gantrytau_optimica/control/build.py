@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError
-from gantrytau.compiler.system import System
+from gantrytau.compiler.system import Causality, System
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
 from gantrytau_optimica.control.built import Built, with_values
@@ -37,14 +37,15 @@ def build(
     guess: Mapping[str, Any],
     held: Sequence[str] = (),
     controls: Mapping[str, Pieces] | None = None,
+    causality: Causality | None = None,
 ) -> Built:
     """Bring a problem into the form that is transcribed.
 
-    held: scalar parameters that stay symbols; controls: how inputs are made, by scalar name. Raises ModelError where
-    it cannot be brought into that form.
+    held: scalar parameters that stay symbols; controls: how inputs are made, by scalar name; causality: see Dae.system.
+    Raises ModelError where it cannot be brought into that form.
     """
     dae = read.dae
-    system = dae.system("lifted")
+    system = dae.system("lifted", causality)
     chosen = _free_numbers(dae, guess, held)
     open_names = {n.name for n in chosen}
     numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
@@ -90,7 +91,8 @@ def build(
     check_symbols(draft, read.name)
     names = [a.name for a in system.algebraics if a.closed is not None]
     forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
-    built = Built(read, draft, system, numbers, points, constraints, dict(zip(names, forms, strict=True)))
+    closed = dict(zip(names, forms, strict=True))
+    built = Built(read, draft, system, numbers, points, constraints, closed, causality)
     return replace(built, problem=with_sizes(with_guesses(built, guess)))
 
 

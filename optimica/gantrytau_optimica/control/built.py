@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau import ModelError
-from gantrytau.compiler.system import System
+from gantrytau.compiler.system import Causality, System
 from gantrytau.language.symbols import split_derivative, time
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.problem.optimization import Point
@@ -24,6 +24,7 @@ class Built:
     points: tuple[Point, ...]
     constraints: tuple[ConstraintRow, ...]
     closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
+    causality: Causality | None = None  # as it was asked for
 
     def expressed(self, names: Sequence[str]) -> ca.SX:
         """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.

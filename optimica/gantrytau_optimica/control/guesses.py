@@ -13,11 +13,11 @@ from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase
+from gantrytau_optimica.control.dependent_guesses import Guess, dependent_guesses
 from gantrytau_optimica.control.limits import value_at
 from gantrytau_optimica.problem.optimization import Point
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
-Guess = Callable[[np.ndarray], np.ndarray]
 RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
 
 
@@ -38,7 +38,7 @@ def first_guesses(built: Built, given: Mapping[str, Any]) -> dict[str, Guess]:
             symbols[key] = found[signal.name] = own.get(key) or _constant(dae.start.get(key, 0.0))
         for course in phase.courses:
             symbols[course.symbol.name()] = _course(course, span)
-        found.update(_algebraics(built, phase, symbols, own, span))
+        found.update(dependent_guesses(built, phase, symbols, own, span))
     return found
 
 
@@ -51,10 +51,12 @@ def with_algebraics(built: Built, problem: ControlProblem) -> ControlProblem:
         symbols = {s.symbol.name(): s.guess for s in (*phase.states, *phase.inputs)}
         symbols |= {c.symbol.name(): _course(c, span) for c in phase.courses}
         own = {a.symbol.name(): a.guess for a in phase.algebraics if a.name not in built.closed}
-        found = _algebraics(built, phase, symbols, own, span)
-        phases.append(
-            replace(phase, algebraics=tuple(replace(a, guess=found[a.name]) for a in phase.algebraics))
+        found = dependent_guesses(built, phase, symbols, own, span)
+        algebraics, inputs = (
+            tuple(replace(s, guess=found.get(s.name, s.guess)) for s in part)
+            for part in (phase.algebraics, phase.inputs)
         )
+        phases.append(replace(phase, algebraics=algebraics, inputs=inputs))
     return replace(problem, phases=tuple(phases))
 
 
@@ -267,61 +269,3 @@ def trapezoid(fraction: Any) -> tuple[np.ndarray, np.ndarray]:
     left = np.minimum(f, 1 - f)
     half = np.where(left < RAMP, top * left**2 / (2 * RAMP), top * (left - RAMP / 2))
     return np.where(f < 0.5, half, 1 - half), top * np.minimum(left / RAMP, 1.0)
-
-
-LEAST_ROOT = (
-    0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
-)
-
-
-def _algebraics(
-    built: Built,
-    phase: Phase,
-    symbols: Mapping[str, Guess],
-    own: Mapping[str, Guess],
-    span: tuple[float, float],
-) -> dict[str, Guess]:
-    """Algebraics from their closed forms along the guess of the rest, where they have one, one after another."""
-    dae, free = built.read.dae, built.problem.free
-    old = ca.vertcat(*(dae.parameter_symbols[n] for n in built.numbers), built.problem.numbers)
-    values = ca.DM([*built.numbers.values(), *(n.guess for n in free)])
-    leaves = [s.symbol for s in (*phase.states, *phase.inputs, *phase.courses)]
-    signals = [symbols[s.name()] for s in leaves]
-    found: dict[str, Guess] = {}
-    for algebraic in phase.algebraics:
-        closed = built.closed.get(algebraic.name)
-        if algebraic.symbol.name() in own:
-            guess = own[algebraic.symbol.name()]
-        elif closed is None:
-            guess = _constant(dae.start.get(algebraic.name, 1.0))
-        else:
-            closed = ca.substitute(closed, old, values) if old.numel() else closed
-            function = ca.Function(
-                "closed", [built.problem.time, ca.vertcat(ca.SX(0, 1), *leaves)], [ca.densify(closed)]
-            )
-            guess = _Closed(function, tuple(signals), span, root=algebraic.min == 0.0)
-        found[algebraic.name] = guess
-        leaves.append(algebraic.symbol)
-        signals.append(guess)
-    return found
-
-
-class _Closed:
-    """A closed form evaluated along the guess; remembers its last answer, which later ones ask for again."""
-
-    def __init__(self, function: ca.Function, signals: tuple[Guess, ...], horizon, root: bool):
-        self.function, self.signals, self.horizon, self.root = function, signals, horizon, root
-        self.last: tuple[np.ndarray, np.ndarray] | None = None
-
-    def __call__(self, fraction: np.ndarray) -> np.ndarray:
-        fraction = np.atleast_1d(fraction)
-        if self.last is not None and np.array_equal(self.last[0], fraction):
-            return self.last[1]
-        start, stop = self.horizon
-        columns = np.array([signal(fraction) for signal in self.signals]).reshape(-1, fraction.size)
-        found = np.array(self.function(start + (stop - start) * fraction[None, :], columns)).ravel()
-        found = np.where(np.isfinite(found), found, 1.0)
-        if self.root:
-            found = np.maximum(found, LEAST_ROOT * (np.max(found) or 1.0))
-        self.last = (fraction, found)
-        return found

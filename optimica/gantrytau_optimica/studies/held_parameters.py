@@ -25,7 +25,7 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     values = optimum.numbers
     held = [n.name for n in program.problem.free if n.held]
     pieces = {s.name: s.pieces for phase in program.problem.phases for s in phase.inputs}
-    built = _same_sizes(build(old.read, {}, [*held, *missing], pieces), old, values)
+    built = _same_sizes(build(old.read, {}, [*held, *missing], pieces, old.causality), old, values)
     layouts = program.places.layouts
     located = np.array([n.guess for n in built.problem.free])
     borders = [layout.placed(optimum.solution.w).borders for layout in layouts]

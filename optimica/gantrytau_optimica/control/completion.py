@@ -1,0 +1,132 @@
+"""First guesses that agree with the model: what no closed form gives is found along the guess of the rest.
+
+    0 = r(t, x, z, u)          z by Newton's method, block after block, from one time to the next
+
+Each time begins where the one before ended, the first one where the model starts, so that mechanisms stay assembled as they
+are there. A step is halved where Newton's corrections do not shrink as they do near a solution (Deuflhard, Newton Methods
+for Nonlinear Problems, 2004, section 2.1): a longer one might end on another branch. In inverse causality accelerations
+are the slopes of the guessed speeds, and the inputs are what moves the mechanism so.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.compiler.dulmage_mendelsohn import decompose
+from gantrytau_optimica.control.control_problem import Phase, Signal
+
+MOST_CORRECTIONS = 12
+SHRINKING = 0.5  # of a correction: the next one is no larger near a solution
+SMALL = 1e-10  # of the unknowns of a block: corrections that end the iteration
+ROUNDING = 1e-6  # the same of corrections that rounding keeps from shrinking
+MOST_HALVINGS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """Accelerations among the algebraics, and the inputs that are to follow from them, as signals of a phase.
+
+    speeds: numbers of the states whose slopes the accelerations are.
+    """
+
+    rates: tuple[Signal, ...] = ()
+    speeds: tuple[int, ...] = ()
+    inputs: tuple[Signal, ...] = ()
+
+
+def driven(phase: Phase) -> Driven:
+    """What moves a phase, where all its inputs could follow from as many accelerations; else nothing."""
+    algebraics = {a.symbol.element_hash(): a for a in phase.algebraics}
+    rates = [(k, algebraics.get(e.element_hash())) for k, e in enumerate(phase.ode.elements())]
+    found = [(k, a) for k, a in rates if a is not None]
+    if len(found) != len(phase.inputs):
+        return Driven()
+    return Driven(tuple(a for _, a in found), tuple(k for k, _ in found), phase.inputs)
+
+
+class Completion:
+    """Values of the unknowns of a phase that solve its equations where the others are known."""
+
+    def __init__(
+        self,
+        residuals: ca.SX,
+        knowns: ca.SX,
+        unknowns: ca.SX,
+        closed: Mapping[int, ca.SX],
+        start: np.ndarray,
+    ):
+        """knowns: symbols of all that is known; unknowns: as many symbols as there are residuals; closed: what gives an
+        unknown outright, by its place, as a square root; start: values of the unknowns near a solution.
+        """
+        self.start = start
+        rows, columns = ca.jacobian_sparsity(residuals, unknowns).get_triplet()
+        pattern: list[list[int]] = [[] for _ in range(residuals.numel())]
+        for i, j in zip(rows, columns, strict=True):
+            pattern[i].append(j)
+        found = decompose(pattern, unknowns.numel())
+        self.determined = not (found.surplus or found.undetermined)
+        self.blocks: list[tuple[ca.Function, np.ndarray, bool]] = []
+        for own, places in found.blocks:
+            outright = closed.get(places[0]) if len(places) == 1 else None
+            r, x = residuals[list(own)], unknowns[list(places)]
+            results = [r, ca.jacobian(r, x)] if outright is None else [outright]
+            function = ca.Function(
+                "block", [knowns, unknowns], [ca.densify(e) for e in results], {"cse": True}
+            )
+            self.blocks.append((function, np.array(places), outright is not None))
+
+    def along(self, begin: np.ndarray, knowns: np.ndarray) -> np.ndarray:
+        """Unknowns (k, n) at values of what is known (n, m), from those at the start with what is known there, (m,).
+
+        NaN from where no solution is found.
+        """
+        found = np.full((len(knowns), self.start.size), np.nan)
+        here, y = begin, self.start
+        for k, there in enumerate(knowns):
+            reached = self._moved(here, there, y, MOST_HALVINGS)
+            if reached is None:
+                break
+            here, y = there, reached
+            found[k] = y
+        return found
+
+    def _moved(self, here: np.ndarray, there: np.ndarray, y: np.ndarray, halvings: int) -> np.ndarray | None:
+        """The unknowns there, from those here, in as many steps as it takes; None where they are not found."""
+        found = self._solved(there, y)
+        if found is not None or not halvings:
+            return found
+        middle = 0.5 * (here + there)
+        half = self._moved(here, middle, y, halvings - 1)
+        return None if half is None else self._moved(middle, there, half, halvings - 1)
+
+    def _solved(self, known: np.ndarray, y: np.ndarray) -> np.ndarray | None:
+        y = y.copy()
+        for function, places, outright in self.blocks:
+            if outright:
+                y[places] = float(function(known, y))
+            elif not self._corrected(function, places, known, y):
+                return None
+        return y if np.all(np.isfinite(y)) else None
+
+    @staticmethod
+    def _corrected(function: ca.Function, places: np.ndarray, known: np.ndarray, y: np.ndarray) -> bool:
+        """Whether Newton's method solves one block, in place."""
+        before = np.inf
+        for _ in range(MOST_CORRECTIONS):
+            r, jacobian = (np.array(part) for part in function(known, y))
+            if not (np.all(np.isfinite(r)) and np.all(np.isfinite(jacobian))):
+                return False
+            try:
+                step = np.linalg.solve(jacobian, r)[:, 0]
+            except np.linalg.LinAlgError:
+                return False
+            y[places] -= step
+            size = float(np.linalg.norm(step))
+            if size <= SMALL * float(np.linalg.norm(y[places])) or size == 0.0:
+                return True
+            if size > SHRINKING * before:
+                return size <= ROUNDING * float(np.linalg.norm(y[places]))
+            before = size
+        return False
