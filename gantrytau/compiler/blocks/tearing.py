@@ -66,7 +66,9 @@ def tear(
         return found
 
     torn = _search(incidence, solvable(RELAXED_PIVOT), first, set(partner.values()))
-    return torn if torn.assignments else _search(incidence, solvable(LEAST_PIVOT), first, set(partner.values()))
+    return (
+        torn if torn.assignments else _search(incidence, solvable(LEAST_PIVOT), first, set(partner.values()))
+    )
 
 
 def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:

@@ -12,6 +12,7 @@ from gantrytau import Dae, ModelError
 from gantrytau.compiler.system import Causality, System
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
+from gantrytau_optimica.control.assembly import with_assembly
 from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
 from gantrytau_optimica.control.control_problem import (
@@ -93,7 +94,7 @@ def build(
     forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
     closed = dict(zip(names, forms, strict=True))
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)
-    return replace(built, problem=with_sizes(with_guesses(built, guess)))
+    return replace(built, problem=with_assembly(built, with_sizes(with_guesses(built, guess))))
 
 
 def _statements(read: SymbolicProblem) -> list[ca.SX]:

@@ -8,7 +8,7 @@ for Nonlinear Problems, 2004, section 2.1): a longer one might end on another br
 are the slopes of the guessed speeds, and the inputs are what moves the mechanism so.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca

@@ -1,6 +1,6 @@
 """First guesses of what depends on states and inputs: from closed forms, else by Newton's method along the guess."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import casadi as ca

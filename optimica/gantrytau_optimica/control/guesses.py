@@ -1,7 +1,7 @@
 """First guesses: what the caller gives, else a straight line between given ends, else the start values."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -14,9 +14,7 @@ from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase
 from gantrytau_optimica.control.dependent_guesses import Guess, dependent_guesses
-from gantrytau_optimica.control.limits import value_at
-from gantrytau_optimica.problem.optimization import Point
-from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
+from gantrytau_optimica.control.ends import values_at_ends
 
 RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
 
@@ -25,7 +23,7 @@ def first_guesses(built: Built, given: Mapping[str, Any]) -> dict[str, Guess]:
     """A function of shares of the horizon (n,) for every signal of the control problem, by name."""
     dae, problem = built.read.dae, built.problem
     horizons = [horizon(problem, phase) for phase in problem.phases]
-    ends = _ends(dae, built.points, built.constraints, {n.name: n.guess for n in problem.free})
+    ends = values_at_ends(dae, built.points, built.constraints, {n.name: n.guess for n in problem.free})
     found: dict[str, Guess] = {}
     for phase, span in zip(problem.phases, horizons, strict=True):
         own = _given(dae, given, span)
@@ -209,42 +207,6 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
 def _times(source: Result | GivenSolution, name: str) -> np.ndarray:
     """The times of a variable, in an optimum those of its phase."""
     return np.asarray(source.time if isinstance(source, Result) else source.time_of(name))
-
-
-def _ends(
-    dae: Dae, points: Sequence[Point], constraints: Sequence[ConstraintRow], chosen: Mapping[str, float]
-) -> dict[str, dict[str, float]]:
-    """Values given at the start and at the end, by symbol; `chosen`: free and held numbers."""
-    meaning = {
-        s.element_hash(): (p.time, e)
-        for p in points
-        if isinstance(p.time, str)
-        for s, e in zip(p.symbol.elements(), p.expression.elements(), strict=True)
-        if e.is_symbolic()
-    }
-    found: dict[str, dict[str, float]] = {}
-    for constraint in constraints:
-        known = meaning.get(constraint.expression.element_hash())
-        value = _number(dae, constraint.lower, chosen)
-        if known is None or value is None or value != _number(dae, constraint.upper, chosen):
-            continue
-        which, leaf = known
-        alias = dae.root(leaf.name())
-        if alias is not None and alias.root is not None:
-            found.setdefault(alias.symbol, {})[which] = dae.number(alias.root_value(value))
-    return found
-
-
-def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None:
-    """The value of an expression of parameters, or None if others occur in it."""
-    if bound.is_constant():
-        return float(bound)
-    bound = dae.to_reduced(bound)
-    leaves = ca.symvar(bound)
-    if any(leaf.name() not in dae.parameter_values for leaf in leaves):
-        return None
-    numbers = {**dae.parameter_values, **chosen}
-    return value_at(bound, {leaf.element_hash(): numbers[leaf.name()] for leaf in leaves})
 
 
 def _from_ends(dae: Dae, symbol: str, ends: Mapping[str, Mapping[str, float]], span: float) -> Guess:

@@ -117,7 +117,11 @@ class Solver:
         }
         if settings.near:
             options["ipopt"] |= NEAR
-        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program)
+        import json
+        import os
+
+        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program) * float(os.environ.get("OS", "1"))
+        options["ipopt"] |= json.loads(os.environ.get("IP", "{}"))
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
 
