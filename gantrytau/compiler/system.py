@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution, column
-from gantrytau.compiler.blocks.inverse_form import Equations, Inverse, inverse_of, torn_of
+from gantrytau.compiler.blocks.inverse_form import Inverse, SortedEquations, inverse_of, torn_of
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.translated import Origin, Translated, origin_of
@@ -57,6 +57,15 @@ class System:
     origins: tuple[Origin, ...]
     inverse: tuple[Inverse, ...]
     forward: tuple[str, ...]
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Positions among the algebraics that close loops without closed form, and may do so in several ways."""
+        orders = self.dae.indexed.orders
+        torn = (
+            y.name() for b in self.dae.blocks if b.kind == "nonlinear" and b.solution is None for y in b.tears
+        )
+        return tuple(name for name in torn if orders.get(name, 0) >= 2)
 
     def to_system(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions in reduced symbols as expressions of (time, x, z, u, p) and derivatives of inputs."""
@@ -126,7 +135,7 @@ def _in_order(
         return
     unknowns = [n for block in dae.blocks for n in block.unknowns]
     symbols = {n: chains.named(n) for n in (*unknowns, *dae.inputs)}
-    every = Equations(dae.blocks, dae.indexed.residuals, dae.indexed.incidence, symbols, dae.inputs)
+    every = SortedEquations(dae.blocks, dae.indexed.residuals, dae.indexed.incidence, symbols, dae.inputs)
     guide = partial(Guide, dae.start, dae.parameter_values, dae.choice.states)
     rates = guide().rates
     for number, block in enumerate(dae.blocks):
@@ -136,8 +145,10 @@ def _in_order(
         found = inverse_of(every, number, guide)
         if isinstance(found, str):
             why.append(found)
-        elif causality is None and found.tears >= len(block.tears):
-            why.append(f"as many unknowns found together ({found.tears}) as forwards ({len(block.tears)})")
+        elif causality is None and found.tears >= found.forward:
+            why.append(
+                f"solved for forces, {found.tears} unknowns would be found together, forwards {found.forward}"
+            )
         else:
             inverse[number] = found
     moved = {k for number, one in inverse.items() for k in one.members if k != number}

@@ -15,8 +15,9 @@ from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.failures.dependence import check_freedom
+from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses, Policy, PolicyKeywords, policy_of
-from gantrytau_optimica.prepared import Prepared, parameter_names, read_guesses, solution_given
+from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.problem_checks import one_point
 from gantrytau_optimica.problem.read_problem import read_problem
@@ -58,8 +59,7 @@ def optimize(
     guess: name -> number, array or function of time, or another solution; a component -> a solution of that component.
     Default: a straight line between given initial and final values, else start values.
     controls: input -> dict(kind="constant" | "linear" | "ramps", elements=1, max_step=None, step_penalty=0.0).
-    causality: whether equations of motion are solved for forces ("inverse", accelerations being guessed) or for
-    accelerations ("forward"); by default inverse where that leaves less to be found together. Inputs are the same.
+    causality: equations of motion solved for forces ("inverse") or accelerations ("forward"); default: the shorter way.
     refine: relative accuracy to which limits and conditions hold when played back, and to which the objective stands.
     starts: first guesses that are tried; `.search` of the answer tells the branches they led to.
     tolerance: of Ipopt; max_time: s, of the whole call: a refinement that is not done ends with its best round;

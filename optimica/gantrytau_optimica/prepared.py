@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError, Result, SolveError
+from gantrytau import ModelError, SolveError
 from gantrytau.flattening.shapes import elements_of
-from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
@@ -17,13 +15,21 @@ from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
+from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
-from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 from gantrytau_optimica.refinement.multistart import Guesses, searched
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
+from gantrytau_optimica.solving.assembly import MOST_WIDER, assembled_near, rests_on
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings, objective_size
+from gantrytau_optimica.solving.ipopt import (
+    NOT_BEGUN,
+    Pressed,
+    Solution,
+    Solver,
+    SolverSettings,
+    objective_size,
+)
 from gantrytau_optimica.solving.moving_points import settled
 from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
@@ -35,6 +41,7 @@ FEW = 30  # elements, from which on first guesses are tried on half as many
 STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh if its branch was lost
 MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 MOST_TRIED = 300  # iterations from one of several first guesses
+MOST_FIRM = 300  # iterations of the first attempt
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
@@ -177,7 +184,7 @@ class Prepared:
             optimum = self.solved(built, program, nearby, first)
             if optimum.success:
                 return optimum
-        optimum = self.solved(built, program, self.solver, first)
+        optimum = self._twice(built, program, first)
         if optimum.success:
             return self._resized(optimum)
         if self.refine is None or not self._reached.clock.left:
@@ -192,6 +199,20 @@ class Prepared:
             return optimum
         again = self.solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
+
+    def _twice(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
+        """From one first guess, once with limits that count as much as the objective, and if need be once as it is."""
+        settings = self.solver.settings
+        if not settings.firm:
+            return self.solved(built, program, self.solver, first)
+        most = min(settings.max_iterations, MOST_FIRM)
+        found = self.solved(
+            built, program, self._solver(program, replace(settings, max_iterations=most)), first
+        )
+        if found.success or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
+            return found
+        again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
+        return again if again.success or not found.success else found
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
@@ -264,7 +285,7 @@ class Prepared:
         """Where the solver ends; what was reached knows it as well."""
         clock = self._reached.clock
         try:
-            solution = solver.solve(program, first, clock)
+            solution = self._assembled(built, program, solver, first)
             program, solution = settled(
                 program, solution, lambda p, w: self._solver(p, solver.settings).solve(p, w, clock)
             )
@@ -277,6 +298,18 @@ class Prepared:
         optimum = Optimum(built.read.name, built, program, solution, self.build_time)
         self._reached.keep(optimum)
         return optimum
+
+    def _assembled(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Solution:
+        """Where the solver ends with loops assembled as in the first guess."""
+        clock, loops = self._reached.clock, built.system.loops
+        narrow = assembled_near(program, loops, first) if loops else program
+        solution = solver.solve(narrow, first, clock)
+        for _ in range(MOST_WIDER):
+            if not (solution.success and clock.left and rests_on(narrow, program, solution.w)):
+                return solution
+            narrow = assembled_near(program, loops, solution.w)
+            solution = solver.solve(narrow, solution.w, clock)
+        return solution
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
         found: dict[str, float] = {}
@@ -344,40 +377,3 @@ def solved_or_raise(optimum: Optimum) -> Optimum:
     remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
     ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
     raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
-
-
-def solution_given(guess: Any) -> bool:
-    """Whether a guess is an optimum, on whose branch the search should stay."""
-    return isinstance(guess, Answer)
-
-
-def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
-    """Guesses by name, from those of the caller or from another solution. Raises ModelError for unknown names."""
-    if isinstance(guess, SavedOptimum):
-        return guess.guesses(read.dae)
-    if isinstance(guess, (Result, Answer)):
-        return guess_of(guess, read.dae)
-    if guess is not None and not isinstance(guess, Mapping):
-        raise ModelError(
-            f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum",
-            argument="guess",
-        )
-    found: dict[str, Any] = {}
-    for name, value in (guess or {}).items():
-        if isinstance(value, (Result, Answer)):
-            found.update(guess_of(value, read.dae, name))
-        else:
-            elements, shape = read.dae.expand(name), read.dae.flat.shape(name)
-            if shape and elements[0] in read.dae.parameter_symbols:  # free numbers are guessed one by one
-                found.update(zip(elements, elements_of(f"guess {name}", value, shape), strict=True))
-            else:
-                found[name] = value
-    return found
-
-
-def parameter_names(read: SymbolicProblem, name: str) -> tuple[str, ...]:
-    """Scalar names of a parameter; ModelError if it is none."""
-    elements = read.dae.expand(name)
-    if elements[0] not in read.dae.parameter_symbols:
-        raise ModelError(f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter")
-    return tuple(elements)

@@ -29,13 +29,15 @@ SINGULAR = 1e-8  # smallest singular value of a scaled block relative to its lar
 class Inverse:
     """A block with its accelerations as what is guessed: the blocks that are left, which solve for the inputs as well.
 
-    members: places of the blocks that it stands for, that of the accelerations and those that lead from inputs to it.
+    members: places of the blocks that it stands for, that of the accelerations and those that lead from inputs to it;
+    forward: how many unknowns these find together.
     """
 
     rates: tuple[str, ...]
     inputs: tuple[str, ...]
     blocks: tuple[Block, ...]
     members: frozenset[int]
+    forward: int
 
     @property
     def tears(self) -> int:
@@ -45,7 +47,7 @@ class Inverse:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class SortedEquations:
     """All equations of a model and its blocks in the order of their solution.
 
     symbols: of all unknowns and inputs, by name; inputs: their scalar names.
@@ -100,7 +102,7 @@ def torn_of(block: Block) -> tuple[ca.SX, ...]:
     return block.tears if block.solution is None or several else ()
 
 
-def inverse_of(every: Equations, number: int, guide: Callable[[], Guide]) -> Inverse | str:
+def inverse_of(every: SortedEquations, number: int, guide: Callable[[], Guide]) -> Inverse | str:
     """The inverse form of a block, or why it has none. guide: makes one that knows no block yet."""
     rates = guide().rates
     core = every.leading_to([number])
@@ -125,13 +127,13 @@ def inverse_of(every: Equations, number: int, guide: Callable[[], Guide]) -> Inv
     return why
 
 
-def _among(every: Equations, members: Collection[int]) -> tuple[str, ...]:
+def _among(every: SortedEquations, members: Collection[int]) -> tuple[str, ...]:
     """Inputs in the equations of some blocks."""
     leaves = frozenset().union(*(every.leaves[k] for k in members))
     return tuple(n for n in every.inputs if n in leaves)
 
 
-def _inverse(every: Equations, members: frozenset[int], guide: Guide) -> Inverse | str:
+def _inverse(every: SortedEquations, members: frozenset[int], guide: Guide) -> Inverse | str:
     """The inverse form of some blocks together, or why there is none."""
     inside = [every.blocks[k] for k in sorted(members)]
     unknowns = [n for block in inside for n in block.unknowns]
@@ -149,7 +151,8 @@ def _inverse(every: Equations, members: frozenset[int], guide: Guide) -> Inverse
     found = solve_blocks(pattern.blocks, every.residuals, every.symbols, guide).blocks
     if any(b.kind not in ("linear", "explicit") or _singular(b, guide) for b in found):
         return "with the accelerations given, the forces are not determined at the start"
-    return Inverse(rates, inputs, found, members)
+    together = sum(len(torn_of(block)) for block in inside)
+    return Inverse(rates, inputs, found, members, together)
 
 
 def _singular(block: Block, guide: Guide) -> bool:

@@ -12,7 +12,6 @@ from gantrytau import Dae, ModelError
 from gantrytau.compiler.system import Causality, System
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
-from gantrytau_optimica.control.assembly import with_assembly
 from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
 from gantrytau_optimica.control.control_problem import (
@@ -45,8 +44,7 @@ def build(
     held: scalar parameters that stay symbols; controls: how inputs are made, by scalar name; causality: see Dae.system.
     Raises ModelError where it cannot be brought into that form.
     """
-    dae = read.dae
-    system = dae.system("lifted", causality)
+    dae, system = read.dae, read.dae.system("lifted", causality)
     chosen = _free_numbers(dae, guess, held)
     open_names = {n.name for n in chosen}
     numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
@@ -94,7 +92,7 @@ def build(
     forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
     closed = dict(zip(names, forms, strict=True))
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)
-    return replace(built, problem=with_assembly(built, with_sizes(with_guesses(built, guess))))
+    return replace(built, problem=with_sizes(with_guesses(built, guess)))
 
 
 def _statements(read: SymbolicProblem) -> list[ca.SX]:

@@ -26,6 +26,18 @@ class Built:
     closed: Mapping[str, ca.SX]  # what gives an algebraic outright, by its name
     causality: Causality | None = None  # as it was asked for
 
+    @property
+    def causality_words(self) -> str:
+        """Which way equations of motion were solved, and why, in a line; "" where there was no choice."""
+        system, asked = self.system, "as asked for" if self.causality else ""
+        if system.inverse:
+            tears, forward = (sum(getattr(i, n) for i in system.inverse) for n in ("tears", "forward"))
+            why = asked or f"{tears} unknowns are found together instead of {forward}"
+            forces = ", ".join(n for i in system.inverse for n in i.inputs)
+            return f"Inverse causality, {why}: accelerations are found, {forces} follow."
+        why = asked or "; ".join(system.forward)
+        return f"Forward causality: {why}." if why else ""
+
     def expressed(self, names: Sequence[str]) -> ca.SX:
         """Variables of the model, scalar names, in signals, courses, time and free numbers of the problem.
 

@@ -95,7 +95,7 @@ def _completed(
         span,
     )
     found: dict[str, Guess] = {
-        s.name: own.get(s.symbol.name(), _Part(along, k, s.min == 0.0)) for k, s in enumerate(unknowns)
+        s.name: own.get(s.symbol.name(), _Unknown(along, k, s.min == 0.0)) for k, s in enumerate(unknowns)
     }
     for signal, slope in zip(moving.rates, along.speeds, strict=True):
         found[signal.name] = own.get(signal.symbol.name(), _Slope(slope, span[1] - span[0]))
@@ -188,7 +188,7 @@ class _Along:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Unknown:
     """One of the unknowns along the guess."""
 
     along: _Along

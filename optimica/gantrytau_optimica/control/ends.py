@@ -44,7 +44,7 @@ def values_at_ends(
 
 def _following(dae: Dae, given: Mapping[str, float], known: set[str]) -> dict[str, float]:
     """States that are not known, by symbol, as they follow from values at the same time; {} where they do not."""
-    states = set(dae.choice.states)
+    states = {alias.symbol for n in dae.states if (alias := dae.root(n)) is not None}
     missing = states - known
     if not missing or known <= states:
         return {}

@@ -40,7 +40,8 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
     )
     lines = [
         f"{program.problem.name}: {solution.status} after {solution.iterations} iterations, objective "
-        f"{solution.objective:.8g}, {horizon}"
+        f"{solution.objective:.8g}, {horizon}",
+        *([built.causality_words] if built.causality_words else []),
     ]
     meanings = Meanings(built, program, phases)
     lines += _numbers_lost(built, program, solution, phases)

@@ -46,6 +46,9 @@ NEAR = {
 
 SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
 STEEP = 1e2  # slopes by one unknown are scaled down to this
+FEW = (
+    1e2  # unknowns that share the slope of an objective: where they are fewer, the whole is scaled up as much
+)
 FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by accident
 
 
@@ -88,6 +91,7 @@ class SolverSettings:
     near: bool = (
         False  # whether guesses are solutions of nearly the same program, from which it must not stray
     )
+    firm: bool = True  # whether the limits shall count as much as an objective that is one unknown
 
 
 class Solver:
@@ -117,11 +121,8 @@ class Solver:
         }
         if settings.near:
             options["ipopt"] |= NEAR
-        import json
-        import os
 
-        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program) * float(os.environ.get("OS", "1"))
-        options["ipopt"] |= json.loads(os.environ.get("IP", "{}"))
+        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program, FEW if settings.firm else 1.0)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
 
@@ -228,16 +229,19 @@ def _objective_slopes(program: Program) -> tuple[np.ndarray, np.ndarray]:
     return at_guess, at_guess if np.sum(at_guess) > FLAT * np.sum(near) else near
 
 
-def _objective_scale(program: Program) -> float:
+def _objective_scale(program: Program, few: float) -> float:
     """A factor that makes an objective neither so flat that any point is taken for its optimum, nor so steep that none is.
 
+    few: unknowns that share its slope where they are enough. The time of a motion is one unknown: what all limits together
+    are worth is its slope, each of them so little that the barrier vanishes long before those that bind are found.
     Ipopt by itself scales down what is steep at the guess, by no more than 1e8.
     """
     at_guess, slopes = _objective_slopes(program)
     size, steepest = float(np.sum(slopes)), float(np.max(slopes, initial=0.0))
     if size <= 0.0:
         return 1.0
-    wanted = max(SLOPE / size, 1.0) * min(STEEP / steepest, 1.0)
+    sharing = size**2 / float(np.sum(slopes**2))
+    wanted = max(SLOPE * max(few / sharing, 1.0) / size, 1.0) * min(STEEP / steepest, 1.0)
     return wanted / max(min(STEEP / max(np.max(at_guess, initial=0.0), 1e-300), 1.0), 1e-8)
 
 

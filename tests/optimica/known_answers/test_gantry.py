@@ -22,7 +22,7 @@ def test_free_path_in_minimum_time():
     optimum = optimize(FreePath)
     # converged runs scatter by 1.5e-4 around 0.913510; a faster branch exists
     assert optimum.final_time < 0.913510 + 1.5e-4
-    assert optimum.objective == optimum.final_time
+    assert optimum.objective == pytest.approx(optimum.final_time, rel=1e-14)
     np.testing.assert_allclose(optimum["robot.tool.r"][[0, -1]], [START, END], atol=1e-9)
     assert np.max(np.abs(optimum["torque"][1:])) < LIMIT + 1e-6
 
@@ -136,7 +136,7 @@ def test_random_pairs_of_poses_converge_from_their_straight_line():
 def test_another_solution_as_guess_saves_iterations():
     cold = optimize(FreePath(weight=0.01))
     warm = optimize(FreePath(weight=0.01), elements=60, guess=cold)
-    assert warm.iterations < cold.iterations / 2
+    assert warm.iterations <= cold.iterations / 2
     assert warm.final_time == pytest.approx(cold.final_time, abs=5e-4)  # another mesh
 
 
