@@ -22,7 +22,7 @@ ORDER = {  # a room imports the rooms before it
     "gantrytau": "errors interruption whole_files progress language flattening compiler results inputs simulation writing "
     "answers dae ensembles __init__ kinematics mechanics blocks electrical commands cli",
     "gantrytau_models": "prototypes mechanisms control __init__",
-    "gantrytau_optimica": "problem control transcription solving failures answers refinement policy prepared optimize "
+    "gantrytau_optimica": "problem control transcription solving failures answers refinement policy given prepared optimize "
     "studies estimation paths calibration procedure __init__",
     "gantrytau_optimica.calibration": "data rods fitting design judging report calibration calibrate "
     "devices trust surveys __init__",

@@ -88,9 +88,8 @@ def build(
     ]
     draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
     check_symbols(draft, read.name)
-    names = [a.name for a in system.algebraics if a.closed is not None]
-    forms = with_values([a.closed for a in system.algebraics if a.closed is not None], read, {})
-    closed = dict(zip(names, forms, strict=True))
+    outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
+    closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)
     return replace(built, problem=with_sizes(with_guesses(built, guess)))
 
