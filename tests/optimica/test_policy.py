@@ -50,7 +50,8 @@ def test_keywords_of_other_verbs_are_refused(ask, keyword):
     "wrong",
     [
         dict(tolerance=2.0), dict(max_iterations=0), dict(max_time=-1.0), dict(progress="bar"), dict(refine=1),
-        dict(starts=True), dict(lengths="none"), dict(causality="acausal"), dict(elements=0), dict(points=10), dict(scheme="euler"),
+        dict(starts=True), dict(lengths="none"), dict(causality="both"),
+        dict(elements=0), dict(points=10), dict(scheme="euler"),
     ],
 )  # fmt: skip
 def test_an_error_names_its_argument(wrong):
