@@ -18,7 +18,7 @@ test: style
 pytest: $(VENV)/installed-dev
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
-bench: $(VENV)/installed-dev $(VENV)/installed-bench
+bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
 
 lint: style types
