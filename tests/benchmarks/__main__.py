@@ -1,6 +1,8 @@
 """`make bench`: every figure of the project as one table, measured now on this machine."""
 
 import sys
+import time
+from collections.abc import Iterator
 
 from tests.benchmarks import (
     answers,
@@ -15,10 +17,26 @@ from tests.benchmarks import (
     sampling,
     studies,
 )
-from tests.benchmarks.table import print_table
+from tests.benchmarks.peers import rows as peers
+from tests.benchmarks.table import Row, at_most, print_table
+
+LONGEST = 20.0  # min
+
+
+def _duration(begin: float) -> Iterator[Row]:
+    yield at_most("the whole table", (time.perf_counter() - begin) / 60, LONGEST, "min")
+
 
 if __name__ == "__main__":
-    mechanics = (engine.rows(), mechanisms.rows(), motion.rows(), kinematics.rows(), calibration.rows())
+    begin = time.perf_counter()
+    mechanics = (
+        engine.rows(),
+        mechanisms.rows(),
+        motion.rows(),
+        peers.rows(),
+        kinematics.rows(),
+        calibration.rows(),
+    )
     timed = (fmus.rows(), sampling.rows(), studies.rows())
-    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed)
+    parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))

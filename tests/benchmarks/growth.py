@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from tests.benchmarks.reference_collocation import Outcome
 
 from gantrytau import SolveError
 from gantrytau.commands.demo.motion_problems import FreePath
@@ -16,7 +17,6 @@ from gantrytau_optimica import prepare
 from tests.benchmarks import opti_reference, reference_collocation
 from tests.benchmarks.gta import Task
 from tests.benchmarks.pose_sweep import fastest, pairs, prepared
-from tests.benchmarks.reference_collocation import Outcome
 from tests.benchmarks.table import Row, at_most, print_table, shown
 
 ELEMENTS = (25, 50, 100, 200, 400)

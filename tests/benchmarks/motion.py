@@ -1,16 +1,11 @@
-"""The minimum-time motion GT-A from components, beside programs written by hand for this one robot."""
+"""Known answers: the minimum-time motion GT-A from components, and small problems."""
 
-import statistics
-import time
 from collections.abc import Iterator
 from typing import Any
 
 from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import optimize
-from gantrytau_optimica.problem.read_problem import read_problem
-from tests.benchmarks import reference_collocation
-from tests.benchmarks.gta import Task
-from tests.benchmarks.table import Row, at_most, shown
+from tests.benchmarks.table import Row, at_most
 from tests.optimica import problems
 
 KNOWN = {  # T + w * energy at 50 elements of 3 Radau points
@@ -23,7 +18,7 @@ TIMES = {("free path", 0.001): 0.92103, ("free path", 0.01): 0.97598}
 
 
 def rows() -> Iterator[Row]:
-    """Values of the four rows, and the time of the free row against its peers."""
+    """Values of the four rows, and of small problems."""
     free, line = FreePath, OnLine
     for (title, weight), value in KNOWN.items():
         problem: Any = (line if title == "straight line" else free)(weight=weight)
@@ -34,7 +29,6 @@ def rows() -> Iterator[Row]:
         error = max(found - expected, 0.0) if allowed > 1e-4 else abs(found - expected)
         yield at_most(f"GT-A {title}, w = {weight:g}: |T - {expected:g} s|", error, allowed, "s")
     yield from _small_problems()
-    yield from _against_peers(free)
 
 
 def _small_problems() -> Iterator[Row]:
@@ -46,31 +40,3 @@ def _small_problems() -> Iterator[Row]:
     }
     for name, error in found.items():
         yield at_most(f"small problem {name}, error", abs(error), 1e-6)
-
-
-def _against_peers(problem: Any) -> Iterator[Row]:
-    read = read_problem(problem)
-    times: dict[str, list[float]] = {}
-    details = ""
-    for _ in range(5):
-        begin = time.perf_counter()
-        optimum = optimize(read)
-        times.setdefault("model", []).append(time.perf_counter() - begin)
-        hand = reference_collocation.solve(Task())
-        times.setdefault("hand", []).append(hand.build + hand.solve)
-        details = f"{optimum.iterations} / {hand.iterations}"
-    medians = {name: statistics.median(found) for name, found in times.items()}
-    yield shown("GT-A free row, seconds: model / by hand", f"{medians['model']:.3f} / {medians['hand']:.3f}")
-    yield shown("GT-A free row, iterations: model / by hand", details)
-    yield at_most(
-        "GT-A free row, build and solve against by hand", medians["model"] / medians["hand"], 1.5, "x"
-    )
-    try:
-        from tests.benchmarks import rockit_reference
-    except ImportError:
-        yield shown("GT-A free row against rockit", "rockit is not installed")
-        return
-    begin = time.perf_counter()
-    rockit_reference.solve(Task())
-    peer = time.perf_counter() - begin
-    yield at_most("GT-A free row, build and solve against rockit", medians["model"] / peer, 0.25, "x")

@@ -19,9 +19,9 @@ from tests.benchmarks.table import Row, at_most, in_turn, print_table, shown
 
 SEEDS, STOP, PERIOD = 20, 16.0, 0.004  # of a noisy reference, held for a period of the controller, s
 
-PAIRS = 200  # minimum-time problems that are solved
+PAIRS = 40  # minimum-time problems that are solved
 MANY, WORKERS = 10_000, 32  # problems, and workers of a cluster, for which the time is told
-SMALL = 1000  # cases that do nothing, for what a case costs by itself
+SMALL = 300  # cases that do nothing, for what a case costs by itself
 
 
 def rows() -> Iterator[Row]:
