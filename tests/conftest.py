@@ -20,6 +20,11 @@ LONGEST = (  # fifteen seconds of one processor and more; test_compiling.py take
     "models/control/test_tracking.py",
     "commands/calibrate/test_calibrate_verdict.py",
     "models/mechanisms/test_six_link.py",
+    "fmu/runtime/test_sanitizers.py",
+    "fmu/runtime/test_switching.py",
+    "fmu/runtime/test_whens.py",
+    "fmu/runtime/test_delay.py",
+    "models/mechanisms/test_delta.py",
     "fmu/test_clients.py",
     "optimica/calibration/test_turning.py",
     "optimica/procedure/test_plan.py",
@@ -36,7 +41,6 @@ LONGEST = (  # fifteen seconds of one processor and more; test_compiling.py take
     "models/control/test_feedforward.py",
     "kinematics/test_kinematics_of_models.py",
     "optimica/known_answers/test_mechanisms.py",
-    "models/mechanisms/test_delta.py",
 )
 
 # a shell starts what runs in its background deaf to Ctrl-C, which some tests press
