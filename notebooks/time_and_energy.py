@@ -344,9 +344,9 @@ assert abs(slope.objective["weight"] / base.integral("square") - 1) < 1e-6  # d(
 # ## Is there a faster one?
 #
 # A solver finds the best motion around its first guess, here the straight line. With `starts` it begins from other
-# guesses, too, bent at random, and reports the branches. One limit is added, a speed of 8 m/s for the carts. Without it
-# a guess may end in a motion that drives cart 1 at more than 20 m/s right up to the pose in which its arm stands across the
-# guideway. That is singular: played back, such an answer ends more than a metre from B.
+# guesses, too, bent to both sides of it, and reports the branches. One limit is added, a speed of 8 m/s for the carts.
+# Without it a guess may end in a motion that drives cart 1 at more than 20 m/s right up to the pose in which its arm stands
+# across the guideway. That is singular: played back, such an answer ends more than a metre from B.
 
 
 # %%
@@ -368,7 +368,7 @@ assert other.playback.violation < 1e-3
 assert miss(other) < 5e-3
 
 # %% [markdown]
-# The branches are those of a coarse mesh; the best is then refined, here to what is needed to compare. On the new one the
+# The best branch is refined, here to what is needed to compare. On the new one the
 # tool swings to the other side, first down, not up. Cart 1 races forward to 0.3 m behind the pose in which its arm, 2 m
 # long, stands across the guideway, turns round, and comes back. Whether one wants that of a robot is another question;
 # who does not adds a limit, and searches again.

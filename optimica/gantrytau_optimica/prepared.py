@@ -17,33 +17,23 @@ from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
-from gantrytau_optimica.refinement.multistart import Guesses, searched
+from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
+from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
-from gantrytau_optimica.refinement.refinement import refined, with_ramps, without_ramps
-from gantrytau_optimica.solving.assembly import MOST_WIDER, assembled_near, rests_on
+from gantrytau_optimica.refinement.refinement import refined, without_ramps
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import (
-    NOT_BEGUN,
-    Pressed,
-    Solution,
-    Solver,
-    SolverSettings,
-    objective_size,
-)
-from gantrytau_optimica.solving.moving_points import settled
+from gantrytau_optimica.solving.ipopt import NOT_BEGUN, Solver, SolverSettings, objective_size
 from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
-from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe
 
-FEW = 30  # elements, from which on first guesses are tried on half as many
 STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh if its branch was lost
-MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
-MOST_TRIED = 300  # iterations from one of several first guesses
+MOST_FROM_COARSE = (
+    200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
+)
 MOST_FIRM = 300  # iterations of the first attempt
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
-LEAST_TIME = 1e-3  # s, that Ipopt is given where none is left
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
@@ -113,7 +103,11 @@ class Prepared:
         optimum = self._best(built, program, first, self.near if guess is None else solution_given(guess))
         if self.refine is None:
             return optimum
-        settings = self.solver.settings
+        return best_refined(optimum, lambda branch: self._refined(branch, self.refine or 0.0), reached)
+
+    def _refined(self, optimum: Optimum, accuracy: float) -> Optimum:
+        """The optimum on better and better meshes until it holds."""
+        settings, reached = self.solver.settings, self._reached
         again = replace(settings, max_iterations=min(settings.max_iterations, MOST_AGAIN))
 
         def solve(program: Program, first: np.ndarray) -> Optimum:
@@ -132,7 +126,7 @@ class Prepared:
             found = solve(program, first)
             return replace(found, left=optimum.left + found.left)
 
-        return refined(optimum, self.refine, told, reached)
+        return refined(optimum, accuracy, told, reached)
 
     @property
     def _reached(self) -> BestSoFar:
@@ -141,39 +135,24 @@ class Prepared:
 
     def _solver(self, program: Program, settings: SolverSettings) -> Solver:
         """A solver that ends with the call."""
-        return Solver(program, replace(settings, max_time=max(self._reached.clock.left, LEAST_TIME)))
+        return timed_solver(program, settings, self._reached.clock)
 
     def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
-
         if self.starts == 1:
             return solved_or_raise(self._alone(built, program, first, near))
-        settings = self.solver.settings
-        coarse = self._coarse(built)
-        most = min(settings.max_iterations, MOST_TRIED)
-        solver = self._solver(coarse, replace(settings, max_iterations=most))
-
-        clock = self._reached.clock
-        best = searched(_FromGuesses(self, built, coarse, solver), built, self.starts, clock)
-        if best.search is None:
-            return solved_or_raise(best)
-        self._reached.keep(best)
-        if coarse.assembled is program.assembled:
-            return solved_or_raise(best)
-        close = self._solver(program, replace(settings, near=True))
-        found: list[Optimum] = []
-        branches = best.search.branches[:MOST_BRANCHES]
-        for number, branch in enumerate(branches, 1):
-            clock.enter(f"branch {number} of {len(branches)}, on the whole mesh")
-            nearby = warm_start(list(branch.optimum.phases.values()), program)
-            for one in (close, self.solver):
-                found.append(self.solved(built, program, one, nearby))
-                if found[-1].success or not clock.left:
-                    break
-        if not clock.left and not any(o.success for o in found):
-            raise self._reached.stopped(LATE)
-        optimum = min((o for o in found if o.success), key=lambda o: o.objective, default=found[0])
-        return solved_or_raise(replace(optimum, search=best.search))
+        reached, settings = self._reached, self.solver.settings
+        most = min(settings.max_iterations, MOST_FROM_COARSE)
+        close = [replace(settings, near=near, max_iterations=most) for near in (True, False)]
+        whole = Attempts(built, program, close, reached, self.build_time)
+        best, search = searched(
+            lambda: self._alone(built, program, first, near), whole, self.starts, self.refine is not None
+        )
+        best = self._lowest(best, self.solver) if search is not None else best
+        best = replace(best, search=search) if search is None else best.with_notes(search=search)
+        if not best.success and search is not None and not reached.clock.left:
+            raise reached.stopped(LATE)
+        return solved_or_raise(best)
 
     def _alone(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """From one first guess, on its branch if it is a solution; with ramps, over the answer without if need be."""
@@ -245,22 +224,12 @@ class Prepared:
         again = self.solved(built, program, solver, warm_start(list(found.phases.values()), program))
         return replace(again, left=found.left + again.left) if again.success else found
 
-    def _coarse(self, built: Built) -> Program:
-        """The program on every other border, on which first guesses are tried, inputs as ramps: they hold their limits,
-        and the search is lost less often.
-        """
-        layouts = self.program.places.layouts
-        pieces = [u.pieces.kind for phase in built.problem.phases for u in phase.inputs]
-        own = any(layout.mesh.moving for layout in layouts) or {"constant", "linear"} & set(pieces)
-        few = min(layout.mesh.elements for layout in layouts) < FEW
-        if own or few or layouts[0].scheme.scheme == "shooting":
-            return self.program.with_numbers(built.problem)
-        meshes = [Mesh(np.unique(np.append(layout.mesh.borders[::2], 1.0))) for layout in layouts]
-        return transcribe(with_ramps(built.problem, meshes), meshes, layouts[0].scheme)
-
     def solved(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends from a first guess of the unknowns of a program, maxima and saddles left."""
-        found = self._ended(built, program, solver, beside_obstacles(program, first))
+        return self._lowest(self._ended(built, program, solver, beside_obstacles(program, first)), solver)
+
+    def _lowest(self, found: Optimum, solver: Solver) -> Optimum:
+        """A solution, or that to which it leads where the objective falls to a side."""
         for _ in range(MOST_LEFT):
             beside = list(places_aside(found.program, found.solution)) if found.success else []
             better = next(self._better(found, solver, beside), None)
@@ -283,33 +252,7 @@ class Prepared:
 
     def _ended(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Optimum:
         """Where the solver ends; what was reached knows it as well."""
-        clock = self._reached.clock
-        try:
-            solution = self._assembled(built, program, solver, first)
-            program, solution = settled(
-                program, solution, lambda p, w: self._solver(p, solver.settings).solve(p, w, clock)
-            )
-            built = replace(built, problem=program.problem)
-        except Pressed as pressed:
-            self._reached.keep(Optimum(built.read.name, built, program, pressed.solution, self.build_time))
-            raise
-        if solution.success:
-            program.require_points(solution.w)
-        optimum = Optimum(built.read.name, built, program, solution, self.build_time)
-        self._reached.keep(optimum)
-        return optimum
-
-    def _assembled(self, built: Built, program: Program, solver: Solver, first: np.ndarray) -> Solution:
-        """Where the solver ends with loops assembled as in the first guess."""
-        clock, loops = self._reached.clock, built.system.loops
-        narrow = assembled_near(program, loops, first) if loops else program
-        solution = solver.solve(narrow, first, clock)
-        for _ in range(MOST_WIDER):
-            if not (solution.success and clock.left and rests_on(narrow, program, solution.w)):
-                return solution
-            narrow = assembled_near(program, loops, solution.w)
-            solution = solver.solve(narrow, solution.w, clock)
-        return solution
+        return attempted(built, program, solver, first, self._reached, self.build_time)
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, float]:
         found: dict[str, float] = {}
@@ -332,41 +275,6 @@ class Prepared:
             return replace(number, guess=number_guess(number.name, guess, number.guess))
         value = values.get(number.name, self.built.read.dae.parameter_values[number.name])
         return replace(number, guess=value, min=value, max=value)
-
-
-class _FromGuesses:
-    """A program solved from first guesses; sent to another process it makes its solver there, for the time that is left."""
-
-    def __init__(self, prepared: Prepared, built: Built, program: Program, solver: Solver):
-        self.prepared, self.built, self.program, self.solver = prepared, built, program, solver
-
-    def __getstate__(self) -> tuple[Any, ...]:
-        clock = self.prepared.reached.clock if self.prepared.reached else None
-        settings = replace(self.solver.settings, progress=None)
-        return self.built, self.program, settings, clock.left if clock else settings.max_time
-
-    def __setstate__(self, state: tuple[Any, ...]) -> None:
-        built, program, settings, left = state
-        solver = Solver(program, settings)
-        prepared = Prepared(built, program, solver, {}, 0.0, reached=BestSoFar(Clock(left)))
-        self.__init__(prepared, built, program, solver)
-
-    def __call__(self, guesses: Guesses) -> tuple[Solution, Program | None]:
-        """Where the solver ended, and the program if points that move made it another one."""
-        program = guesses.on(self.program)
-        built = replace(self.built, problem=program.problem)
-        found = self.prepared.solved(built, program, self.solver, first_guess(program))
-        return found.solution, None if found.program is program else found.program
-
-    def optimum(self, guesses: Guesses, found: tuple[Solution, Program | None]) -> Optimum:
-        """The end of a solve, here or elsewhere, as an optimum that is taken note of."""
-        solution, other = found
-        program = guesses.on(self.program) if other is None else other
-        built = replace(self.built, problem=program.problem)
-        optimum = Optimum(built.read.name, built, program, solution, self.prepared.build_time)
-        if self.prepared.reached is not None:
-            self.prepared.reached.keep(optimum)
-        return optimum
 
 
 def solved_or_raise(optimum: Optimum) -> Optimum:

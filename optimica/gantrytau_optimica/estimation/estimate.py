@@ -35,7 +35,8 @@ from gantrytau_optimica.estimation.refined_fit import (
 from gantrytau_optimica.estimation.residuals import Residuals, check_determined, residuals
 from gantrytau_optimica.estimation.weights import Weighing, Weights
 from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
-from gantrytau_optimica.prepared import LEAST_TIME, Prepared
+from gantrytau_optimica.prepared import Prepared
+from gantrytau_optimica.refinement.attempts import LEAST_TIME
 from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import WORDS, Solver, SolverSettings

@@ -1,209 +1,195 @@
-"""`starts=`: several first guesses around the default one, and the branches of solutions they lead to."""
+"""`starts=`: several first guesses around the default one, and the branches of solutions they lead to.
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Protocol
+The default guess is solved as without a search, so that the answer is never worse. The others are solved on a coarse mesh
+to a loose tolerance, which takes a fraction of the time and leads to the same branches. The best of these are then solved
+on the whole mesh, each from its own solution, played back, and ranked by what holds.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from gantrytau.ensembles.each import each
-from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Phase, Signal
-from gantrytau_optimica.control.guesses import Guess, horizon, with_algebraics
-from gantrytau_optimica.control.limits import signal_limits
-from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.control.guesses import with_algebraics
+from gantrytau_optimica.control.input_rates import with_ramped_rates
+from gantrytau_optimica.refinement.attempts import Attempts
+from gantrytau_optimica.refinement.bends import bends
+from gantrytau_optimica.refinement.branches import SAME, Search, SolutionBranch, joined, ranked
+from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
+from gantrytau_optimica.refinement.refinement import without_ramps
+from gantrytau_optimica.solving.warm_start import warm_start
+from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.transcription.program import Program, first_guess
+from gantrytau_optimica.transcription.transcribe import transcribe
 
-SEED = 20121
-EXTENTS = (0.15, 0.6)  # of the way from start to end, between which it is drawn how far a guess is bent
-SAME = 1e-3  # relative: objectives that are closer count as one branch
-WAVES = 3  # half waves in the deviation of a guess
-
-
-@dataclass(frozen=True)
-class SolutionBranch:
-    """Solutions with the same objective: how many first guesses led there, and the best of them."""
-
-    objective: float
-    count: int
-    optimum: Optimum
-
-    def __str__(self) -> str:
-        times = "once" if self.count == 1 else f"{self.count} times"
-        return f"objective {self.objective:.8g}, found {times}"
+COARSE = 12  # elements, at least, of the mesh on which first guesses are tried
+LOOSE = 1e-4  # tolerance there
+MOST_TRIED = 150  # iterations there: GT-A takes 44 to 139
+MOST_ON_WHOLE = 300  # the same where the mesh of the caller is that of the search
+MOST_BRANCHES = 3  # the best ones, which are solved on the whole mesh
 
 
-@dataclass(frozen=True)
-class Search:
-    """All branches, the best first, and how many guesses did not lead to a solution."""
+class Searching:
+    """One search: what it has found so far."""
 
-    starts: int
-    branches: tuple[SolutionBranch, ...]
-    failures: int
-
-    def __str__(self) -> str:
-        lines = [
-            f"{self.starts} first guesses led to {len(self.branches)} branches, {self.failures} to no solution:"
-        ]
-        return "\n".join([*lines, *(f"  {branch}" for branch in self.branches[:8])])
-
-
-class Attempts(Protocol):
-    """Solves from first guesses: here or in another process by a call, then as an optimum of this one."""
-
-    def __call__(self, guesses: "Guesses") -> Any:
-        """Where the solver ends."""
-
-    def optimum(self, guesses: "Guesses", found: Any) -> Optimum:
-        """That as an optimum."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Guesses:
-    """First guesses of all signals by name, and of the free numbers."""
-
-    signals: Mapping[str, Guess]
-    free: tuple[float, ...]
-
-    @classmethod
-    def of(cls, problem: ControlProblem) -> "Guesses":
-        """Those of a problem."""
-        return cls({s.name: s.guess for s in problem.signals}, tuple(n.guess for n in problem.free))
-
-    def on(self, program: Program) -> Program:
-        """A program with these first guesses."""
-        same = program.problem.with_signals(lambda _, s: replace(s, guess=self.signals[s.name]))
-        free = tuple(
-            replace(n, guess=guess) for n, guess in zip(program.problem.free, self.free, strict=True)
-        )
-        return program.with_numbers(replace(same, free=free))
-
-
-def searched(attempts: Attempts, built: Built, starts: int, clock: Clock) -> Optimum:
-    """The best optimum from `starts` first guesses, the default one first; if none is found, where that one ended.
-
-    Every state that is not itself a derivative is bent by a few half waves, which vanish at the ends; those that are its
-    derivatives follow; free numbers and inputs are drawn from their limits or around their guess. The seed is fixed. Where
-    a solve takes its time the others run on all processors, with the same answers.
-    """
-    guesses: list[Guesses] = []
-
-    def drawn() -> Iterator[Guesses]:
-        random = np.random.default_rng(SEED)
-        for k in range(starts):
-            if k and not clock.left:
-                return
-            problem = with_algebraics(built, bent(built.problem, random)) if k else built.problem
-            guesses.append(Guesses.of(problem))
-            yield guesses[-1]
-
-    ended: dict[int, Optimum] = {}
-    clock.enter(f"first guess 1 of {starts}")
-    for k, found in each(attempts, drawn(), starts):
-        ended[k] = attempts.optimum(guesses[k], found)
-        if not clock.left:
-            break
-        if len(ended) < starts:
-            clock.enter(f"first guess {len(ended) + 1} of {starts}")
-    tried = [ended[k] for k in sorted(ended)]
-    found = sorted((o for o in tried if o.success), key=lambda o: o.objective)
-    if not found:
-        return tried[0]
-    branches: list[SolutionBranch] = []
-    for optimum in found:
-        if branches and optimum.objective - branches[-1].objective <= SAME * abs(optimum.objective):
-            branches[-1] = replace(branches[-1], count=branches[-1].count + 1)
+    def __init__(self, whole: Attempts, ramps_added: bool, starts: int):
+        """whole: solves the program of the caller from a solution nearby; ramps_added: whether its inputs are ramps because
+        it is to be refined.
+        """
+        self.whole, self.starts = whole, starts
+        self.built, self.program, self.reached = whole.built, whole.program, whole.reached
+        settings = whole.settings[-1]
+        coarse = coarse_program(self.program, self.built, ramps_added)
+        if coarse is None:
+            most = min(settings.max_iterations, MOST_ON_WHOLE)
+            tried = replace(settings, max_iterations=most)
+            self.attempts = Attempts(self.built, self.program, [tried], self.reached, whole.build_time)
         else:
-            branches.append(SolutionBranch(optimum.objective, 1, optimum))
-    return replace(found[0], search=Search(len(tried), tuple(branches), len(tried) - len(found)))
+            most = min(settings.max_iterations, MOST_TRIED)
+            loose = max(settings.tolerance, LOOSE)
+            tried = replace(settings, max_iterations=most, tolerance=loose)
+            built = replace(self.built, problem=coarse.problem)
+            self.attempts = Attempts(built, coarse, [tried], self.reached, whole.build_time)
+        self.coarse = coarse is not None
+        self.branches: list[SolutionBranch] = []
+        self.tried = self.failures = 0
+
+    def note(self, optimum: Optimum, whole: bool) -> None:
+        """Take note of where a first guess led to."""
+        self.tried += 1
+        if optimum.success:
+            self.branches = [*self.branches, SolutionBranch(optimum.objective, 1, optimum, whole)]
+        else:
+            self.failures += 1
+
+    def guesses(self) -> Iterator[np.ndarray]:
+        """First unknowns of all guesses but the default one, for as long as there is time."""
+        for problem in bends(self.built.problem, self.starts - 1):
+            if not self.reached.clock.left:
+                return
+            bent = with_algebraics(self.built, problem)
+            yield first_guess(self.attempts.program.with_numbers(bent))
+
+    def from_guesses(self) -> None:
+        """Solve from all other guesses."""
+        clock, ended = self.reached.clock, dict[int, Optimum]()
+        clock.enter(f"first guess 2 of {self.starts}")
+        self.attempts.solver(
+            0
+        )  # made now: what guesses take by themselves says whether processes are worth it
+        for k, found in each(self.attempts, self.guesses(), self.starts - 1):
+            ended[k] = self.attempts.optimum(found)
+            if not clock.left:
+                break
+            if len(ended) < self.starts - 1:
+                clock.enter(f"first guess {len(ended) + 2} of {self.starts}")
+        for k in sorted(ended):
+            self.note(ended[k], not self.coarse)
+
+    def on_whole_mesh(self) -> None:
+        """Solve the best branches that are known on the coarse mesh only on the whole one."""
+        self.branches = joined(self.branches)
+        waiting = [b for b in self.branches if not b.whole][:MOST_BRANCHES]
+        clock = self.reached.clock
+        if not waiting or not clock.left:
+            return
+        clock.enter(f"branch 1 of {len(waiting)}, on the whole mesh")
+        firsts = [warm_start(list(b.optimum.phases.values()), self.program) for b in waiting]
+        done = 0
+        for k, found in each(self.whole, firsts, len(firsts)):
+            optimum, done = self.whole.optimum(found), done + 1
+            if optimum.success:
+                place = next(i for i, b in enumerate(self.branches) if b is waiting[k])
+                self.branches[place] = SolutionBranch(optimum.objective, waiting[k].count, optimum)
+            if not clock.left:
+                break
+            if done < len(waiting):
+                clock.enter(f"branch {done + 1} of {len(waiting)}, on the whole mesh")
+        self.branches = joined(self.branches)
 
 
-def bent(problem: ControlProblem, random: np.random.Generator) -> ControlProblem:
-    """The problem with other first guesses, drawn around those it has."""
-    free = tuple(_drawn(number, random) for number in problem.free)
-    changed = replace(problem, free=free)
+def searched(
+    default: Callable[[], Optimum], whole: Attempts, starts: int, ramps_added: bool
+) -> tuple[Optimum, Search | None]:
+    """The best optimum from `starts` first guesses, and all branches; if there is none, where the default guess ended.
+
+    default: solves from the default guess on the whole mesh. The guesses are always the same; where a solve takes its time
+    they are solved on all processors, with the same answers.
+    """
+    reached = whole.reached
+    reached.clock.enter(f"first guess 1 of {starts}")
+    alone = default()
+    search = Searching(whole, ramps_added, starts)
+    search.note(alone, whole=True)
     try:
-        spans = [horizon(changed, phase) for phase in changed.phases]
-    except Exception:  # times out of order: keep those of the guess
-        changed, spans = problem, [horizon(problem, phase) for phase in problem.phases]
-    phases = tuple(
-        _bent(phase, span, problem.name, random) for phase, span in zip(changed.phases, spans, strict=True)
+        if reached.clock.left:
+            search.from_guesses()
+        _keep(reached, search, "")
+        search.on_whole_mesh()
+    except KeyboardInterrupt:
+        _keep(reached, search, INTERRUPTED)
+        raise
+    stopped = "" if search.tried == starts and reached.clock.left else LATE
+    if not search.branches:
+        return alone, None
+    found = Search(search.tried, ranked(search.branches), search.failures, stopped)
+    best = found.branches[0]
+    if not best.whole:
+        _keep(reached, search, stopped)
+        return alone, found
+    return best.optimum, found
+
+
+def best_refined(optimum: Optimum, refine: Callable[[Optimum], Optimum], reached: BestSoFar) -> Optimum:
+    """The best branch refined; where another one promises more than it then has, or it does not hold, that one as well."""
+    best = refine(optimum)
+    branches = optimum.search.branches if optimum.search is not None else ()
+    for branch in branches[1:MOST_BRANCHES]:
+        held = best.refinement is not None and best.refinement.reached
+        better = branch.objective < best.objective - SAME * abs(best.objective)
+        if not reached.clock.left or not (branch.whole and branch.holds) or (held and not better):
+            break
+        try:
+            other = refine(branch.optimum.with_notes(search=optimum.search))
+        except KeyboardInterrupt:
+            reached.best = best
+            raise
+        reached_it = other.refinement is not None and other.refinement.reached
+        if (not reached_it, other.objective) < (not held, best.objective):
+            best = other
+    reached.best = best
+    return best
+
+
+def _keep(reached: BestSoFar, search: Searching, stopped: str) -> None:
+    """What was reached knows of the branches found until now, which are not played back yet."""
+    if reached.best is not None and search.branches:
+        ordered = sorted(joined(search.branches), key=lambda b: b.objective)
+        notes = Search(search.tried, tuple(ordered), search.failures, stopped)
+        reached.best = reached.best.with_notes(search=notes)
+
+
+def coarse_program(program: Program, built: Built, ramps_added: bool) -> Program | None:
+    """The program on fewer elements, with inputs that are free in them, which find their branch more often than ramps; None
+    where the caller chose the pieces of inputs, or the mesh is coarse already.
+    """
+    layouts = program.places.layouts
+    problem: ControlProblem = (
+        with_ramped_rates(without_ramps(built.problem)) if ramps_added else built.problem
     )
-    return replace(changed, phases=phases)
-
-
-def _drawn(number: FreeNumber, random: np.random.Generator) -> FreeNumber:
-    if number.held:
-        return number
-    if np.isfinite(number.min) and np.isfinite(number.max) and random.uniform() < 0.5:
-        guess = random.uniform(number.min, number.max)
-    else:
-        sign = -1.0 if number.min < 0 < number.max and random.uniform() < 0.5 else 1.0
-        guess = sign * (number.guess or 1.0) * float(np.exp(random.normal(0.0, 0.7)))
-    return replace(number, guess=float(np.clip(guess, number.min, number.max)))
-
-
-def _bent(phase: Phase, span: tuple[float, float], name: str, random: np.random.Generator) -> Phase:
-    limits = signal_limits(phase, name)
-    states = {s.symbol.name(): s for s in phase.states}
-    extents = _extents(phase, limits, float(np.exp(random.uniform(*np.log(EXTENTS)))))
-    guesses: dict[str, Guess] = {}
-    for key, state in states.items():
-        base, order = split_derivative(key)
-        if order and derivative_name(base, order - 1) in states:
-            continue
-        weights = random.normal(size=WAVES) / (1 + np.arange(WAVES)) ** 2 * extents[state.name]
-        guesses[key] = _wave(state.guess, weights, limits[state.name])
-        above = derivative_name(base, order + 1)
-        if above in states:
-            guesses[above] = _slope(states[above].guess, weights / (span[1] - span[0]))
-    inputs = tuple(replace(u, guess=_level(u, limits[u.name], random)) for u in phase.inputs)
-    bent_states = tuple(replace(s, guess=guesses.get(s.symbol.name(), s.guess)) for s in phase.states)
-    return replace(phase, states=bent_states, inputs=inputs)
-
-
-def _extents(phase: Phase, limits: Mapping[str, tuple[float, float]], share: float) -> dict[str, float]:
-    """How far the guesses of states are bent: shares of the limits, else of the way that a whole vector goes."""
-    shares = np.linspace(0.0, 1.0, 21)
-    ways: dict[str, float] = {}
-    for state in phase.states:
-        vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
-        ways[vector] = float(np.hypot(ways.get(vector, 0.0), np.ptp(state.guess(shares))))
-    found = {}
-    longest = max(ways.values(), default=0.0)
-    for state in phase.states:
-        vector = state.name.split("[")[0] if state.name.endswith("]") else state.name
-        low, high = limits[state.name]
-        width = 0.25 * (high - low) if np.isfinite(low) and np.isfinite(high) else np.inf
-        found[state.name] = min(width, max(share * max(ways[vector], 0.5 * longest), 0.1 * state.nominal))
-    return found
-
-
-def _wave(guess: Guess, weights: np.ndarray, limits: tuple[float, float]) -> Guess:
-    def bent_guess(share: np.ndarray) -> np.ndarray:
-        share = np.asarray(share, dtype=float)
-        waves = np.sin(np.pi * np.outer(np.atleast_1d(share), 1 + np.arange(weights.size))) @ weights
-        return np.clip(guess(share) + waves, *limits)
-
-    return bent_guess
-
-
-def _slope(guess: Guess, weights: np.ndarray) -> Guess:
-    def bent_guess(share: np.ndarray) -> np.ndarray:
-        share = np.asarray(share, dtype=float)
-        k = np.pi * (1 + np.arange(weights.size))
-        return guess(share) + np.cos(np.outer(np.atleast_1d(share), k)) @ (k * weights)
-
-    return bent_guess
-
-
-def _level(signal: Signal, limits: tuple[float, float], random: np.random.Generator) -> Guess:
-    """A constant input between its limits, else the guess as it is."""
-    level = random.uniform(-0.5, 0.5)
-    if not np.isfinite(limits).all():
-        return signal.guess
-    value = 0.5 * (limits[0] + limits[1]) + level * (limits[1] - limits[0])
-    return lambda share: np.full(np.shape(share), value)
+    pieces = {u.pieces.kind for phase in problem.phases for u in phase.inputs}
+    own = any(layout.mesh.moving for layout in layouts) or pieces & {"constant", "linear"}
+    if own or layouts[0].scheme.scheme == "shooting":
+        return None
+    steps = [max(layout.mesh.elements // COARSE, 1) for layout in layouts]
+    if max(steps) == 1 and not ramps_added:
+        return None
+    meshes = [
+        Mesh(np.unique(np.append(layout.mesh.borders[::step], 1.0)))
+        for layout, step in zip(layouts, steps, strict=True)
+    ]
+    return transcribe(problem, meshes, layouts[0].scheme)

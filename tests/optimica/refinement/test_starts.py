@@ -1,11 +1,17 @@
 """`starts=`: several first guesses, and the branches to which they lead."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der
+from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der, sin
 from gantrytau.ensembles import each as parts
 from gantrytau_optimica import Free, Optimization, final, optimize
+from gantrytau_optimica.refinement import attempts
+from gantrytau_optimica.refinement.branches import PASSES, SolutionBranch, ranked
 from tests.optimica.control.test_controls import Effort, best_pieces
 from tests.optimica.control.test_phases import ThereAndBack
 from tests.optimica.problems import FastestMass
@@ -71,9 +77,10 @@ def test_branches_and_failures_add_up(around):
     assert [b.objective for b in search.branches] == sorted(b.objective for b in search.branches)
     text = around.report()
     assert f"10 first guesses led to 2 branches, {search.failures} to no solution:" in text
-    for branch in search.branches:
-        times = "once" if branch.count == 1 else f"{branch.count} times"
-        assert f"objective {branch.objective:.8g}, found {times}" in text
+    rows = [line.split() for line in text.splitlines()]
+    for number, branch in enumerate(search.branches, 1):
+        row = next(r for r in rows if r[:2] == [str(number), f"{branch.objective:.8g}"])
+        assert row[2:4] == [str(branch.count), "yes"]
 
 
 def test_a_search_is_reproducible(around):
@@ -98,7 +105,7 @@ def test_a_search_on_a_coarser_mesh_ends_on_the_mesh_asked_for():
     optimum = optimize(Around, elements=40, starts=8)
     assert optimum.breaks.size == 39
     assert optimum.objective == pytest.approx(string(True) ** 2, rel=5e-4)
-    assert optimum.search.branches[0].optimum.breaks.size == 19
+    assert all(branch.whole and branch.optimum.breaks.size == 39 for branch in optimum.search.branches)
 
 
 def test_a_search_may_be_refined():
@@ -107,6 +114,136 @@ def test_a_search_may_be_refined():
     assert optimum.search.starts == 4
     assert optimum.objective == pytest.approx(string(True) ** 2, rel=2e-5)
     assert "4 first guesses led to" in optimum.report()
+
+
+def test_words_say_on_which_side_a_branch_passes(around):
+    below, above = around.search.branches
+    assert below.words == "point.r passes 0.3 m beside the straight line, towards -point.r[1]"
+    assert above.words == "point.r passes 0.7 m beside the straight line, towards +point.r[1]"
+    assert below.holds
+    assert above.holds
+    # the arc is cut between the points by less than 1e-3 of the radius
+    assert max(below.passed, above.passed) < 1e-3
+
+
+def test_branches_with_the_same_objective_are_told_apart_by_their_sides():
+    optimum = optimize(Around(height=0.0), elements=20, starts=6)
+    one, other = optimum.search.branches
+    assert one.objective == pytest.approx(other.objective, rel=1e-6)
+    # a mesh of 20 may cut the corners of the arc a little
+    assert one.objective == pytest.approx(string(True, height=0.0) ** 2, rel=1e-3)
+    sides = {branch.words.split()[-1] for branch in (one, other)}
+    assert sides == {"-point.r[1]", "+point.r[1]"}
+    assert one.count + other.count + optimum.search.failures == 6
+
+
+def test_a_branch_that_cheats_between_points_is_ranked_after_one_that_holds():
+    """On 3 elements a motion below cuts through the disc between two points; on 20 one above it does not."""
+    above = {"point.r": lambda t: [2 * t, 3 * t * (1 - t)], "point.v": lambda t: [2.0, 3 - 6 * t]}
+    disc = Around(height=0.1, radius=0.3)
+    cheat, honest = optimize(disc, elements=3), optimize(disc, elements=20, guess=above)
+    assert cheat.objective < honest.objective
+    found = [SolutionBranch(optimum.objective, 1, optimum) for optimum in (cheat, honest)]
+    best, second = ranked(found)
+    assert best.optimum is honest
+    assert (best.holds, second.holds) == (True, False)
+    assert second.passed > PASSES > best.passed
+
+
+def test_a_guess_that_fails_is_counted_and_the_others_go_on(monkeypatch):
+    solve = attempts.Attempts._once
+    calls = []
+
+    def second_fails(self, solver, first):
+        calls.append(first)
+        found, program = solve(self, solver, first)
+        return (
+            (replace(found, success=False, status="stuck"), program) if len(calls) == 2 else (found, program)
+        )
+
+    monkeypatch.setattr(attempts.Attempts, "_once", second_fails)
+    search = optimize(Around, elements=20, starts=5).search
+    assert search.failures == 1
+    assert sum(branch.count for branch in search.branches) == 4
+    assert "5 first guesses led to 2 branches, 1 to no solution:" in str(search)
+
+
+class Pendulum(Model):
+    """A pendulum with a weak motor: it has to swing before it stands upright."""
+
+    phi = Real(unit="rad", start=0.0, fixed=True, description="angle, 0 hanging")
+    w = Real(unit="rad/s", start=0.0, fixed=True, description="angular velocity")
+    u = Input(unit="rad/s2", min=-0.6, max=0.6, description="torque by inertia, gravity being 1")
+    stiffness = Parameter(1.0, unit="1/s2", description="gravity by length")
+
+    def equations(self):
+        yield der(self.phi) == self.w
+        yield der(self.w) == self.u - self.stiffness * sin(self.phi)
+
+
+class SwingUp(Optimization):
+    """As fast as possible upright, on either side."""
+
+    pendulum = Pendulum()
+    final_time = Free(6.0, unit="s", min=1.0, max=40.0, description="duration")
+
+    def objective(self):
+        return self.final_time
+
+    def constraints(self):
+        yield final(self.pendulum.phi) == np.pi
+        yield final(self.pendulum.w) == 0
+
+
+def swing_up_time(limit: float) -> float:
+    """Least time in s of one swing back and one up: three arcs of constant torque, -, +, -, the first of which is varied.
+
+    The others follow from the energy: w^2 / 2 = cos(phi) + u phi + c on each of them, and the last ends upright at rest.
+    """
+
+    def arc(torque, start, span, backwards=1.0, until=None):
+        def there(_, x):
+            return x[0] - until if until is not None else 1.0
+
+        there.terminal = True
+
+        def rate(_, x):
+            return [backwards * x[1], backwards * (torque - np.sin(x[0]))]
+
+        return solve_ivp(rate, (0.0, span), start, events=there, rtol=1e-10, atol=1e-10)
+
+    def total(first):
+        phi, w = arc(-limit, [0.0, 0.0], first).y[:, -1]
+        change = (1 + limit * np.pi - (w**2 / 2 - np.cos(phi) - limit * phi)) / (2 * limit)
+        rise = arc(limit, [phi, w], 20.0, until=change)
+        last = arc(-limit, [np.pi - 1e-12, 0.0], 20.0, backwards=-1.0, until=change)
+        return first + rise.t[-1] + last.t[-1]
+
+    return float(minimize_scalar(total, bounds=(1.6, 1.8), method="bounded", options={"xatol": 1e-7}).fun)
+
+
+@pytest.fixture(scope="module")
+def swings():
+    return optimize(SwingUp, elements=50, starts=8, refine=1e-5)
+
+
+def test_a_pendulum_is_swung_up_in_the_least_time(swings):
+    assert swings.refinement.reached
+    # ten times the accuracy that was asked for
+    assert swings.final_time == pytest.approx(swing_up_time(0.6), rel=1e-4)
+    search = swings.search
+    assert sum(branch.count for branch in search.branches) + search.failures == 8
+
+
+@pytest.mark.parametrize("guessed", [2.0, 6.0, 20.0])
+def test_a_search_is_never_worse_than_the_single_start(guessed):
+    guess = {"final_time": guessed}
+    try:
+        alone = optimize(SwingUp, elements=30, guess=guess).objective
+    except SolveError:
+        alone = np.inf
+    searched = optimize(SwingUp, elements=30, guess=guess, starts=8)
+    assert searched.objective <= alone * (1 + 1e-6)  # a hundred times the solver's tolerance
 
 
 class Flat(Model):
