@@ -81,7 +81,7 @@ def load(source, folder, *names):
         "-std=c99",
         "-pedantic",
         "-Werror=implicit-function-declaration",
-        "-O1",
+        "-O0",  # rounds as -O1 does
         "-shared",
         "-fPIC",
     ]
