@@ -10,7 +10,7 @@ from gantrytau import ModelError
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.refinement.reached import BestSoFar
-from gantrytau_optimica.solving.assembly import MOST_WIDER, assembled_near, rests_on
+from gantrytau_optimica.solving.assembly import jumps, solved_assembled
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings
 from gantrytau_optimica.solving.moving_points import settled
@@ -35,7 +35,7 @@ def attempted(
     """
     clock = reached.clock
     try:
-        solution = _assembled(built, program, solver, first, clock)
+        solution = solved_assembled(solver, program, built.system.loops, first, clock)
         program, solution = settled(
             program, solution, lambda p, w: timed_solver(p, solver.settings, clock).solve(p, w, clock)
         )
@@ -46,21 +46,12 @@ def attempted(
     if solution.success:
         program.require_points(solution.w)
     optimum = Optimum(built.read.name, built, program, solution, build_time)
+    if solution.success:
+        jump = next(filter(None, (jumps(built, one) for one in optimum.phases.values())), "")
+        if jump:
+            optimum = replace(optimum, solution=replace(solution, success=False, status=jump))
     reached.keep(optimum)
     return optimum
-
-
-def _assembled(built: Built, program: Program, solver: Solver, first: np.ndarray, clock: Clock) -> Solution:
-    """Where the solver ends with loops assembled as in the first guess."""
-    loops = built.system.loops
-    narrow = assembled_near(program, loops, first) if loops else program
-    solution = solver.solve(narrow, first, clock)
-    for _ in range(MOST_WIDER):
-        if not (solution.success and clock.left and rests_on(narrow, program, solution.w)):
-            return solution
-        narrow = assembled_near(program, loops, solution.w)
-        solution = solver.solve(narrow, solution.w, clock)
-    return solution
 
 
 class Attempts:

@@ -1,6 +1,7 @@
 """Robots whose loops have no closed form, from cold, against times of programs written by hand."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from gantrytau import Fixed, simulate
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import optimize
+from gantrytau_optimica.solving.assembly import jumps
 from tests.optimica.known_answers.closed_loops import PAIRS, TIMES, carried, turned
 
 MORE = int(os.environ.get("GANTRYTAU_ROUTES", "0"))  # pairs of each robot, where all are wanted
@@ -40,6 +42,18 @@ def test_loops_stay_assembled():
     for k in range(3):
         assert np.max(np.abs(optimum[f"robot.turntables[{k}].phi"])) < 1.0
     assert np.all(np.abs(np.diff(optimum["robot.tool.q"], axis=0)) < 0.1)
+
+
+def test_a_jump_to_another_assembly_is_no_motion():
+    optimum = optimize(turned(0), elements=20)
+    (trajectory,) = optimum.phases.values()
+    assert jumps(optimum.built, trajectory) == ""
+    signals = [s.name for s in trajectory.phase.signals]
+    w = trajectory.w.copy()
+    w[trajectory.layout.of(signals.index("robot.rocker.phi"))[30:]] *= -1.0  # the other way to close the loop
+    said = jumps(optimum.built, replace(trajectory, w=w))
+    assert "no motion: robot.rocker.phi jumps from" in said
+    assert "where loops close in another way" in said
 
 
 def test_both_causalities_find_the_same():
