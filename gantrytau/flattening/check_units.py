@@ -19,7 +19,7 @@ from gantrytau.flattening.whens import when_units
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
-from gantrytau.language.units import ONE, Dimension, dimension, unit_text
+from gantrytau.language.units import ONE, Dimension, dimension, unit_text, whole
 
 NUMBER = "number"
 ANY = "any"
@@ -53,7 +53,7 @@ ANGLES = {
         "erf",
     ]
 }
-POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
+POWERS: dict[int, int | Fraction] = {ca.OP_SQ: 2, ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: -1}
 
 SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 
@@ -74,21 +74,20 @@ class Dimensioned(NamedTuple):
 
 def check_units(flat: FlatModel) -> None:
     """ModelError naming equation, the two terms and their units, for the first that disagree."""
-    units = symbol_units(flat)
-    symbols = [
-        flat.time,
-        *(
-            s
-            for v in (*flat.variables, *flat.parameters, *flat.propagated)
-            for s in v.symbol.elements()
-            if s.is_symbolic()
-        ),
-    ]
-    symbols += [*flat.derivatives.values(), *flat.before.values()]
     events = [*unit_equations(flat), *when_units(flat), *delay_equations(flat)]
-    for equations in (flat.equations, flat.initial_equations, events, _attributes(flat)):
-        sides = [side for e in equations for side in (e.left, e.right)]
-        terms = _terms(symbols, units, sides)
+    check_equations(flat, flat.equations, flat.initial_equations, events, _attributes(flat))
+
+
+def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
+    """The same for other equations in the symbols of a model, group after group."""
+    units = symbol_units(flat)
+    quantities = (*flat.variables, *flat.parameters, *flat.propagated)
+    symbols = [flat.time, *(s for v in quantities for s in v.symbol.elements() if s.is_symbolic())]
+    symbols += [*flat.derivatives.values(), *flat.before.values()]
+    clock, *_ = names = [s.name() for s in symbols]  # the time stands first
+    known = [Dimensioned(units[name], name, clock=name == clock) for name in names]
+    for equations in groups:
+        terms = _terms(symbols, known, [side for e in equations for side in (e.left, e.right)])
         for equation, *pair in zip(equations, terms[::2], terms[1::2], strict=True):
             fault = next((term.fault for term in pair if term.fault), "")
             if fault:
@@ -127,7 +126,7 @@ def symbol_units(flat: FlatModel) -> Mapping[str, Unit]:
     for name in flat.derivatives:
         base, order = split_derivative(name)
         unit = units.get(base, ANY)
-        units[name] = unit if isinstance(unit, str) else _times(unit, dimension("s"), Fraction(-order))
+        units[name] = unit if isinstance(unit, str) else _times(unit, dimension("s"), -order)
     units.update((symbol.name(), units[name]) for name, symbol in flat.before.items())
     return units
 
@@ -140,14 +139,12 @@ def _read(unit: str, path: str) -> Dimension:
 
 
 def _terms(
-    symbols: Sequence[ca.SX], units: Mapping[str, Unit], expressions: Sequence[ca.SX]
+    symbols: Sequence[ca.SX], known: Sequence[Dimensioned], expressions: Sequence[ca.SX]
 ) -> list[Dimensioned]:
-    """Scalar expressions with their units."""
-    clock = symbols[0].name()  # the time stands first
-    terms = [Dimensioned(units[s.name()], s.name(), clock=s.name() == clock) for s in symbols]
+    """Scalar expressions with their units, in symbols of which they are known."""
     function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
     found = computed(
-        function, lambda k, _: terms[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
+        function, lambda k, _: known[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
     )
     return [one[0] if one else Dimensioned(ANY, "0") for one in found]
 
@@ -178,7 +175,7 @@ def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:
 
 
 def _unit(
-    operation: int, units: list[Unit], words: list[str], power: Fraction | None
+    operation: int, units: list[Unit], words: list[str], power: int | Fraction | None
 ) -> tuple[Unit, str | None]:
     """Unit of one operation, and a message if its operands do not fit."""
     first, second = units[0], units[-1]
@@ -195,9 +192,9 @@ def _unit(
     if operation in KEEP:
         return first, None
     if operation == ca.OP_MUL:
-        return _product(first, second, Fraction(1)), None
+        return _product(first, second, 1), None
     if operation == ca.OP_DIV:
-        return _product(first, second, Fraction(-1)), None
+        return _product(first, second, -1), None
     if operation in POWERS:
         return _power(first, POWERS[operation]), None
     if operation in (ca.OP_POW, ca.OP_CONSTPOW):
@@ -210,14 +207,14 @@ def _unit(
         name = ANGLES[operation]
         return ONE, (
             f"the argument of {name}, `{words[0][:60]}`, is in {_text(first)}, expected 1 or rad; a number has no unit, so "
-            f"make its factor a Parameter(..., unit='{unit_text(_times(ONE, first, Fraction(-1)))}')"
+            f"make its factor a Parameter(..., unit='{unit_text(_times(ONE, first, -1))}')"
         )
     if operation == ca.OP_IF_ELSE_ZERO:
         return second, None
     return (ONE if operation in (ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN) else ANY), None
 
 
-def _product(first: Unit, second: Unit, sign: Fraction) -> Unit:
+def _product(first: Unit, second: Unit, sign: int) -> Unit:
     if ANY in (first, second):
         return ANY
     if first == NUMBER and second == NUMBER:
@@ -227,7 +224,7 @@ def _product(first: Unit, second: Unit, sign: Fraction) -> Unit:
     return _times(a, b, sign)
 
 
-def _times(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
+def _times(first: Dimension, second: Dimension, power: int) -> Dimension:
     if second == ONE:
         return first
     if power == 1:
@@ -235,8 +232,8 @@ def _times(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
     return tuple(a + power * b for a, b in zip(first, second, strict=True))
 
 
-def _power(unit: Unit, power: Fraction) -> Unit:
-    return unit if isinstance(unit, str) else tuple(power * exponent for exponent in unit)
+def _power(unit: Unit, power: int | Fraction) -> Unit:
+    return unit if isinstance(unit, str) else tuple(whole(power * exponent) for exponent in unit)
 
 
 def _agree(first: Unit, second: Unit) -> bool:

@@ -13,13 +13,20 @@ from functools import cache
 from gantrytau.errors import ModelError
 
 BASE = ("m", "kg", "s", "A", "K", "mol", "cd")
-ONE = (Fraction(0),) * len(BASE)
+Dimension = tuple[
+    int | Fraction, ...
+]  # whole exponents are int, which are many times as quick to add and compare
 
-Dimension = tuple[Fraction, ...]
+ONE: Dimension = (0,) * len(BASE)
 
 
 def _dimension(**powers: int) -> Dimension:
-    return tuple(Fraction(powers.get(base, 0)) for base in BASE)
+    return tuple(powers.get(base, 0) for base in BASE)
+
+
+def whole(exponent: int | Fraction) -> int | Fraction:
+    """The same exponent, as an int if it is one."""
+    return int(exponent) if exponent.denominator == 1 else exponent
 
 
 SYMBOLS: dict[str, Dimension] = {

@@ -14,6 +14,7 @@ Guess = Callable[[np.ndarray], np.ndarray]
 LEAST_ROOT = (
     0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
 )
+MOST_PLACES = 120  # at which Newton's method completes a guess; between them it is drawn straight
 SLOPE = 1e-4  # of the horizon: between values of which slopes of guesses are taken
 
 
@@ -171,6 +172,15 @@ class _Along:
         """Unknowns (n, m) at shares (n,); from where there are none those before."""
         if self.last is not None and np.array_equal(self.last[0], fraction):
             return self.last[1]
+        if fraction.size <= MOST_PLACES:
+            found = self._completed(fraction)
+        else:
+            places = np.linspace(np.min(fraction), np.max(fraction), MOST_PLACES)
+            found = np.column_stack([np.interp(fraction, places, y) for y in self._completed(places).T])
+        self.last = (fraction, found)
+        return found
+
+    def _completed(self, fraction: np.ndarray) -> np.ndarray:
         order = np.argsort(fraction, kind="stable")
         shares = fraction[order]
         start, stop = self.span
@@ -183,7 +193,6 @@ class _Along:
             values[first:] = values[first - 1] if first else self.completion.start
         found = np.empty_like(values)
         found[order] = values
-        self.last = (fraction, found)
         return found
 
 

@@ -4,11 +4,11 @@ Objective and integrand are not: a cost may add what is not alike, with weights 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.flattening.check_units import check_units
+from gantrytau.flattening.check_units import check_equations
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import time
@@ -46,4 +46,4 @@ def check_problem_units(
     equations = tuple(
         _Sides(elements[2 * k], elements[2 * k + 1], place, "", k) for k, (_, _, place) in enumerate(pairs)
     )
-    check_units(replace(flat, equations=equations, initial_equations=()))
+    check_equations(flat, equations)
