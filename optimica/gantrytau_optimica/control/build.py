@@ -25,7 +25,7 @@ from gantrytau_optimica.control.control_problem import (
     Signal,
 )
 from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess
-from gantrytau_optimica.control.input_rates import Rates, check_pieces, input_rates, lifted
+from gantrytau_optimica.control.input_rates import Rates, check_pieces, check_reached, input_rates, lifted
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
 from gantrytau_optimica.control.sizes import with_sizes
 from gantrytau_optimica.problem.model_words import algebraic_words
@@ -48,8 +48,7 @@ def build(
     chosen = _free_numbers(dae, guess, held)
     open_names = {n.name for n in chosen}
     numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
-    mentioned = [*system.to_system(_statements(read)), system.ode, system.residuals]
-    rates = input_rates(read, mentioned)
+    rates = input_rates(read, [*system.to_system(_statements(read)), system.ode, system.residuals])
     check_pieces(read, rates, controls or {})
     conditions = (start_conditions(dae), link_conditions(read, rates))
     points = (*read.points, *(p for more, _ in conditions for p in more))
@@ -88,6 +87,7 @@ def build(
     ]
     draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
     check_symbols(draft, read.name)
+    check_reached(draft, zip(limits, rows[::3], strict=True))
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)

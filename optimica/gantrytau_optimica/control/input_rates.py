@@ -15,7 +15,8 @@ import casadi as ca
 from gantrytau import Dae, ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
-from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
+from gantrytau_optimica.control.limits import known_states
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
 
 Rates = Mapping[str, tuple[ca.SX, ...]]
 
@@ -65,6 +66,61 @@ def check_pieces(read: SymbolicProblem, rates: Rates, controls: Mapping[str, Pie
                 f"controls: {name} is not part of the problem, expected '{top}'; a limit on {name} in constraints() makes "
                 "it what is chosen"
             )
+
+
+def check_reached(problem: ControlProblem, limits: Iterable[tuple[ConstraintRow, ca.SX]]) -> None:
+    """ModelError for a limit on the rate of what nothing that is chosen moves: it holds by itself, or never.
+
+    limits: constraints, and their expressions in the symbols of the problem, which knows its starts.
+    """
+    points = {e.element_hash() for p in (*problem.points, *problem.sums) for e in p.symbol.elements()}
+    for constraint, expression in limits:
+        names = [leaf.name() for leaf in ca.symvar(constraint.expression)]
+        of_rates = [name for name in names if split_derivative(name)[1]]
+        leaves = {leaf.element_hash() for leaf in ca.symvar(expression)}
+        if not of_rates or leaves & points:
+            continue
+        owners = [
+            k
+            for k, phase in enumerate(problem.phases)
+            if leaves & {s.symbol.element_hash() for s in phase.signals}
+        ]
+        number = owners[0] if owners else 0
+        phase = problem.phases[number]
+        fixed = known_states(problem).get((number, "initial"), {})
+        chosen = [*phase.inputs, *(s for s in phase.states if s.symbol.element_hash() not in fixed)]
+        moved = {s.symbol.element_hash() for s in chosen}
+        moved |= {n.symbol.element_hash() for n in problem.free if not n.held}
+        if _followed(phase, expression).isdisjoint(moved):
+            raise ModelError(_unreached(problem, phase, constraint.name, of_rates[0]))
+
+
+def _followed(phase: Phase, expression: ca.SX) -> set[int]:
+    """Hashes of all symbols from which an expression follows, by the equations of its phase."""
+    rates = dict(zip((s.symbol.element_hash() for s in phase.states), phase.ode.elements(), strict=True))
+    implicit = {s.symbol.element_hash() for s in phase.algebraics}
+    residuals = [{x.element_hash() for x in ca.symvar(e)} for e in phase.residuals.elements()]
+    found: set[int] = set()
+    open_ones = [x.element_hash() for x in ca.symvar(expression)]
+    while open_ones:
+        one = open_ones.pop()
+        if one in found:
+            continue
+        found.add(one)
+        if one in rates:
+            open_ones += [x.element_hash() for x in ca.symvar(rates[one])]
+        elif one in implicit:
+            open_ones += [x for leaves in residuals if one in leaves for x in leaves]
+    return found
+
+
+def _unreached(problem: ControlProblem, phase: Phase, text: str, rate: str) -> str:
+    inputs = ", ".join(f"der({split_derivative(s.name)[0]})" for s in phase.inputs)
+    return (
+        f"{problem.name}: `{text}` limits {rate}, which no chosen input and no free number moves: it follows from start, "
+        f"time and what `inputs` gives; limit the rate of what an input moves{f', as {inputs}' if inputs else ''}, or "
+        f"have what {rate} follows from chosen, as an Input that is not given, or as Free"
+    )
 
 
 def with_ramped_rates(problem: ControlProblem) -> ControlProblem:

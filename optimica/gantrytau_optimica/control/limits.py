@@ -206,7 +206,7 @@ def check_symbols(draft: ControlProblem, name: str) -> None:
             if order:
                 raise ModelError(
                     f"{name}: needs the derivative of the input {base}, of which there are samples only, expected a course "
-                    "that has one; give it in `inputs` as a function of time"
+                    "that has one; give it in `inputs` as a function of time, or leave it out there and it is chosen"
                 )
             raise ModelError(
                 f"{name}: {leaf.name()} is needed but not chosen by the optimiser; make it a variable, or give it a value"

@@ -271,6 +271,11 @@ def _constraint(place: str, statement: Any) -> list[ConstraintRow]:
         expression = ca.densify(ca.SX(statement.expression))
         limits = [_limit(place, bound, expression) for bound in (statement.lower, statement.upper)]
         refuse_calls(place, expression, *limits)
+        if expression.is_constant() and all(limit.is_constant() for limit in limits):
+            raise ModelError(
+                f"{place}: found limits of {expression}, which is a number whatever is chosen (as the rate of a parameter "
+                "is), expected a variable or the rate of one; limit what an input moves"
+            )
         rows = zip(expression.elements(), *(limit.elements() for limit in limits), strict=True)
         return [ConstraintRow(e, low, high, f"{low} <= {e} <= {high}", place) for e, low, high in rows]
     if isinstance(statement, (bool, ca.DM)) or (isinstance(statement, ca.SX) and statement.is_constant()):
