@@ -33,6 +33,7 @@ MOST_FROM_COARSE = (
     200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
 )
 MOST_FIRM = 300  # iterations of the first attempt
+MOST_HOT = 100  # iterations of one that follows the structure of a solution: most take less than half
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
@@ -110,8 +111,11 @@ class Prepared:
         settings, reached = self.solver.settings, self._reached
         again = replace(settings, max_iterations=min(settings.max_iterations, MOST_AGAIN))
 
-        def solve(program: Program, first: np.ndarray) -> Optimum:
-            """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none."""
+        def solve(program: Program, first: np.ndarray, hot: bool = False) -> Optimum:
+            """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none; `hot` only so."""
+            if hot:
+                most = replace(again, hot=True, max_iterations=min(again.max_iterations, MOST_HOT))
+                return self.solved(optimum.built, program, self._solver(program, most), first)
             found = self.solved(optimum.built, program, self._solver(program, again), first)
             worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
             if (found.success and not worse) or not reached.clock.left:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau_optimica.answers.archive.optimum_files import SUFFIX, save_optimum
+from gantrytau_optimica.answers.playback.arcs import Arc, arcs
 from gantrytau_optimica.answers.playback.playback import Playback, play_back
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
 from gantrytau_optimica.answers.second_order import SecondOrder, second_order
@@ -41,10 +42,17 @@ class Optimum(ProgramAnswer):
         """Whether it is a minimum, by the curvature of the objective."""
         return second_order(self.built, self.program, self.solution, list(self.phases.values()), self.left)
 
+    @cached_property
+    def arcs(self) -> tuple[Arc, ...]:
+        """Which inputs are at their limits or between them, and which other limits bind, from when to when in s."""
+        return tuple(arc for phase in self.phases.values() for arc in arcs(phase))
+
     def report(self) -> str:
         """How it ended, what remains violated or binds, and what becomes of it when played back, in the model's words."""
         found = report(self.built, self.program, self.solution, list(self.phases.values()))
         lines = [found, str(self.second_order), str(self.playback)] if self.success else [found]
+        if self.success and self.refinement is not None and self.arcs:
+            lines.append("\n".join(["Arcs:", *(f"  {arc}" for arc in self.arcs)]))
         more = [str(x) for x in (self.refinement, self.search) if x is not None]
         return "\n".join([*lines, *more])
 

@@ -21,7 +21,7 @@ class Pieces:
     kind: "free" at every point, "ramps" (a straight line in each element, which may jump at borders), or "constant" or
     "linear" (and continuous) over groups of elements; elements: in each group; borders: of the groups, shares of the
     horizon, instead; max_step: largest change from one value to the next; step_penalty: weight of the squares of these
-    changes in the objective.
+    changes in the objective. Ramps with borders jump at these only.
     """
 
     kind: Literal["free", "ramps", "constant", "linear"] = "free"

@@ -10,6 +10,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.switches import Switch
 from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
+from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
 from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh
 from gantrytau_optimica.solving.warm_start import warm_start
@@ -19,6 +20,8 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
 REPLAYED = 1e-7  # relative: what tolerances of solver and integration leave in an objective played back
+ZOOMS = 1  # rounds that look closer at where arcs end, before borders stand there
+WORSE = 1e-3  # relative: an objective by which another branch, or none, was found
 LEAST_CHANGE = 1e-12  # of the objective, by rounding: the mesh is as it was
 SMALL = (
     30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
@@ -129,7 +132,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
     """
     clock, search, best = reached.clock, optimum.search, optimum
     rounds: list[Round] = []
-    moving, moved, stopped, before = True, False, "", np.nan
+    moving, moved, stopped, before, by_arcs = True, False, "", np.nan, True
     try:
         while True:
             number = f"round {len(rounds) + 1} of at most {MOST_ROUNDS + 1}"
@@ -145,6 +148,12 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
             if moved and not moving:  # borders were moved to err more
                 optimum = best
             better, before, moved = None, optimum.objective, False
+            if by_arcs and clock.left:
+                better = _solved_by_arcs(optimum, accuracy, len(rounds), solve)
+                by_arcs = better is not None
+            if better is not None:
+                optimum = better
+                continue
             for how in [*(["moving"] if moving else []), "switches", "divided"]:
                 better = (
                     _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
@@ -165,6 +174,38 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
         reached.best = newest.with_notes(refinement=refinement, search=search)
         raise
     return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)
+
+
+def _solved_by_arcs(
+    optimum: Optimum, accuracy: float, number: int, solve: Callable[..., Optimum]
+) -> Optimum | None:
+    """After round `number`: on a mesh that shows the arcs, then with borders between them as unknowns.
+
+    None where there are no arcs, the program has no solution, or an input would rather leave the limit of its arc.
+    """
+    played = list(optimum.playback.phases.values())
+    if not all(_of_ramps(p.trajectory.phase) and _movable(p.trajectory.phase) for p in played):
+        return None
+    find = zoom_mesh if number <= ZOOMS else arc_mesh
+    meshes = [mesh for mesh in (find(one, accuracy) for one in played) if mesh is not None]
+    if len(meshes) < len(played):
+        return None
+    trajectories = [one.trajectory for one in played]
+    problem = with_ramps(optimum.program.problem, meshes)
+    if number > ZOOMS:
+        problem = with_arcs(problem, trajectories, meshes)
+    located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
+    program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+    held = held_at_limits(program, trajectories) if number > ZOOMS else program
+    better = solve(held, warm_start(trajectories, held), hot=True)
+    worse = better.objective - optimum.objective > WORSE * optimum.playback.objective_size
+    if not better.success or worse:
+        return None
+    if number <= ZOOMS or better.program is not held:
+        return better
+    if wrong_signs(held, trajectories, better.solution.bound_multipliers):
+        return None
+    return replace(better, program=program, built=replace(better.built, problem=problem))
 
 
 def _exhausted(rounds: Sequence[Round]) -> bool:

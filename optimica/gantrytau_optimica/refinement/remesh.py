@@ -46,6 +46,27 @@ def better_mesh(
     return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
 
 
+def at_knots(played: Replayed, accuracy: float, knots: np.ndarray) -> np.ndarray:
+    """Borders (n + 1,) with knots among them, and elements divided where they err, or to prove that they do not."""
+    trajectory = played.trajectory
+    borders = trajectory.mesh.borders
+    every = _with_knots(borders, _parts(played, accuracy), knots)
+    if every.size == borders.size and np.allclose(every, borders, atol=SAME):
+        return _with_knots(borders, np.where(_open(trajectory), 2, 1), knots)
+    return every
+
+
+def zoomed(played: Replayed, accuracy: float, places: np.ndarray) -> Mesh:
+    """A mesh finer where it errs, and finer still beside places (k,) at which the structure changes."""
+    borders = played.trajectory.mesh.borders
+    widths = np.diff(borders)
+    sides = [np.searchsorted(borders, places + step) - 1 for step in (-SAME, SAME)]  # a border has two
+    beside = np.unique(np.clip(np.concatenate(sides), 0, widths.size - 1))
+    parts = _parts(played, accuracy)
+    parts[beside] = np.where(widths[beside] > LEAST, np.maximum(parts[beside], MOST_PARTS), parts[beside])
+    return Mesh(_divided(borders, parts))
+
+
 def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Borders with elements divided, and with knots, to which borders close by give way."""
     kept = _divided(borders, parts)[1:-1]

@@ -44,6 +44,9 @@ NEAR = {
     "slack_bound_push": 1e-5,
 }
 
+# On a mesh that only follows the structure of a solution the barrier may begin lower still.
+HOT = NEAR | {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6, "slack_bound_push": 1e-6}
+
 SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
 STEEP = 1e2  # slopes by one unknown are scaled down to this
 FEW = (
@@ -92,6 +95,7 @@ class SolverSettings:
         False  # whether guesses are solutions of nearly the same program, from which it must not stray
     )
     firm: bool = True  # whether the limits shall count as much as an objective that is one unknown
+    hot: bool = False  # whether they are so close that limits which bind there will bind
 
 
 class Solver:
@@ -119,9 +123,8 @@ class Solver:
                 "compl_inf_tol": UNLIMITED,
             },
         }
-        if settings.near:
-            options["ipopt"] |= NEAR
-
+        if settings.near or settings.hot:
+            options["ipopt"] |= HOT if settings.hot else NEAR
         options["ipopt"]["obj_scaling_factor"] = _objective_scale(program, FEW if settings.firm else 1.0)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)

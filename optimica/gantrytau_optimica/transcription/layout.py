@@ -19,6 +19,7 @@ from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
 
 Sparse = Any  # a matrix of scipy.sparse
+SAME_BORDER = 1e-12  # of the horizon, by rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,10 +259,13 @@ def pieces_of(signal: Signal, mesh: Mesh, first: int) -> tuple[Track, np.ndarray
     """Track of an input made of pieces, and the shares of the horizon of its values: middles or ends of the pieces."""
     n, borders, pieces = mesh.elements, mesh.borders, signal.pieces
     if pieces.kind == "ramps":
-        unknowns = first + np.arange(2 * n).reshape(n, 2)
-        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), np.column_stack(
-            [borders[:-1], borders[1:]]
-        ).ravel()
+        jumps = np.ones(n - 1, bool)
+        if pieces.borders:
+            jumps = np.min(np.abs(borders[1:-1, None] - np.array(pieces.borders)), axis=1) < SAME_BORDER
+        begins = np.cumsum(np.concatenate([[0], 1 + jumps]))
+        ends = np.concatenate([borders[:1], np.repeat(borders[1:-1], 1 + jumps), borders[-1:]])
+        unknowns = first + np.column_stack([begins, begins + 1])
+        return Track(np.tile([0.0, 1.0], (n, 1)), unknowns), ends
     if pieces.borders:
         ends = np.array(pieces.borders)
         group = np.clip(np.searchsorted(ends, (borders[:-1] + borders[1:]) / 2) - 1, 0, ends.size - 2)

@@ -43,7 +43,7 @@ def _of_inputs(trajectory: Trajectory) -> list[Switch]:
             continue
         ends = trajectory.w[trajectory.layout.tracks[number].unknowns]
         side = sides(ends, low, high, input_range(ends, low, high))
-        found += _changes(signal.name, side, ends, (low, high), borders)
+        found += changes(signal.name, side, ends, (low, high), borders)
     return found
 
 
@@ -62,7 +62,7 @@ def sides(values: np.ndarray, low: float, high: float, width: float) -> np.ndarr
     return side
 
 
-def _changes(
+def changes(
     name: str, side: np.ndarray, ends: np.ndarray, limits: tuple[float, float], borders: np.ndarray
 ) -> list[Switch]:
     """Switches of one input. A few mixed elements between two opposite limits hold one switch: where their mean says."""
