@@ -33,7 +33,7 @@ MOST_FROM_COARSE = (
     200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
 )
 MOST_FIRM = 300  # iterations of the first attempt
-MOST_HOT = 100  # iterations of one that follows the structure of a solution: most take less than half
+MOST_HOT = 60  # iterations of one that follows the structure of a solution: most take less than half
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
@@ -126,8 +126,8 @@ class Prepared:
             closer = close.success and not (found.success and found.objective < close.objective)
             return close if closer else found
 
-        def told(program: Program, first: np.ndarray) -> Optimum:
-            found = solve(program, first)
+        def told(program: Program, first: np.ndarray, hot: bool = False) -> Optimum:
+            found = solve(program, first, hot)
             return replace(found, left=optimum.left + found.left)
 
         return refined(optimum, accuracy, told, reached)
