@@ -74,14 +74,23 @@ def optimize(
     )  # fmt: skip
     if record is not None:
         require_place(record)
-    begun, clock = datetime.now(UTC), Clock(max_time, progress)
-    reached = BestSoFar(clock)
-    with reached.kept():
-        read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem, guess=guess)
-        details = dict(problem=problem, options=policy.given, started=begun, read_time=max_time - clock.left)
+    return _optimized(problem, policy, record)
+
+
+def _optimized(problem: Problem, policy: Policy, record: Any) -> Optimum:
+    """`optimize` with its keywords as a record."""
+    begun, clock = datetime.now(UTC), Clock(policy.max_time, policy.progress)
+    reached = BestSoFar(clock, problem.name if isinstance(problem, SymbolicProblem) else class_name(problem))
+    with reached.within_time():
+        clock.enter("reading the problem")
+        read = problem if isinstance(problem, SymbolicProblem) else read_problem(problem, guess=policy.guess)
+        details = dict(problem=problem, options=policy.given, started=begun, read_time=clock.passed)
+        clock.enter("building the program")
         found: Optimum | None = None
         try:
-            found = reached.best = replace(prepare_with(read, (), policy), reached=reached).search()
+            prepared = replace(prepare_with(read, (), policy), reached=reached)
+            clock.enter("")
+            found = reached.finish(prepared.search())
             return found
         except SolveError as error:
             found = error.optimum
@@ -93,6 +102,12 @@ def optimize(
             if record is not None and found is not None:
                 clock.enter("writing the record")
                 write_record(found, record, **details)
+    return reached.answer  # which its clock has ended
+
+
+def class_name(problem: object) -> str:
+    """The name of a class, or of that of an instance."""
+    return (problem if isinstance(problem, type) else type(problem)).__name__
 
 
 def prepare(

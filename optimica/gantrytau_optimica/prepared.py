@@ -72,9 +72,10 @@ class Prepared:
     ) -> Optimum:
         """Solve with these values of the parameters named in `prepare`, others as declared; errors of `optimize`."""
         settings = self.solver.settings
-        reached = BestSoFar(Clock(settings.max_time, settings.progress))
-        with reached.kept():
-            return replace(self, reached=reached).search(parameters, guess)
+        reached = BestSoFar(Clock(settings.max_time, settings.progress), self.built.read.name)
+        with reached.within_time():
+            return reached.finish(replace(self, reached=reached).search(parameters, guess))
+        return reached.answer
 
     def search(
         self, parameters: Mapping[str, Any] | None = None, guess: GivenGuesses | None = None

@@ -20,10 +20,10 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from gantrytau.interruption import on_interrupt
 from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.failures.row_meanings import row_sizes
-from gantrytau_optimica.solving.ipopt import Watch
+from gantrytau_optimica.solving.attended import Watch, attended
+from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.transcription.assemble import to_dm
 from gantrytau_optimica.transcription.program import Program
 
@@ -31,6 +31,7 @@ START = 2.0  # price of a start against other conditions: it is a fact more ofte
 LATER = (
     0.02  # by which what is written later is cheaper, so that of two equals one gives way, not both by half
 )
+PATIENCE = 5.0  # s of waiting for a second of computing: other programs take their share
 LINKS = (" begins where ", " begins when ")  # conditions between phases belong to the model
 
 
@@ -206,17 +207,21 @@ class Elastic:
         most = np.zeros(m)
         most[list(which)] = [self.softs[k].most / self.softs[k].size for k in which]
         scaled = start / self.program.places.scale
-        with on_interrupt(watch.ask_to_stop):
-            found = solver(
+        watch.begin(Clock(PATIENCE * left))
+        found = attended(
+            solver,
+            watch,
+            dict(
                 x0=np.concatenate([scaled, self._needed(scaled)]),
                 lbx=np.concatenate([self.lbw, np.zeros(m)]),
                 ubx=np.concatenate([self.ubw, most]),
                 lbg=self.low,
                 ubg=self.high,
-            )
+            ),
+        )
         if watch.pressed:
             raise KeyboardInterrupt
-        if not solver.stats()["success"]:
+        if found is None or not solver.stats()["success"]:
             return None
         x, duals = np.array(found["x"]).ravel(), np.array(found["lam_g"]).ravel()
         worth = np.zeros(m)

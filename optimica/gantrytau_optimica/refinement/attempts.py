@@ -79,7 +79,7 @@ class Attempts:
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         built, program, settings, left = state
-        self.__init__(built, program, settings, BestSoFar(Clock(left)), 0.0)
+        self.__init__(built, program, settings, BestSoFar(Clock(left), built.read.name), 0.0)
 
     def __call__(self, first: np.ndarray) -> Ended:
         """Where the solver ended, and the program if times that move made it another one."""

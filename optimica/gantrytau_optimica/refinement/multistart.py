@@ -19,7 +19,7 @@ from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.refinement.attempts import Attempts
 from gantrytau_optimica.refinement.bends import bends
 from gantrytau_optimica.refinement.branches import SAME, Search, SolutionBranch, joined, ranked
-from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
+from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import without_ramps
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -81,14 +81,16 @@ class Searching:
         self.attempts.solver(
             0
         )  # made now: what guesses take by themselves says whether processes are worth it
-        for k, found in each(self.attempts, self.guesses(), self.starts - 1):
-            ended[k] = self.attempts.optimum(found)
-            if not clock.left:
-                break
-            if len(ended) < self.starts - 1:
-                clock.enter(f"first guess {len(ended) + 2} of {self.starts}")
-        for k in sorted(ended):
-            self.note(ended[k], not self.coarse)
+        try:
+            for k, found in each(self.attempts, self.guesses(), self.starts - 1):
+                ended[k] = self.attempts.optimum(found)
+                if not clock.left:
+                    break
+                if len(ended) < self.starts - 1:
+                    clock.enter(f"first guess {len(ended) + 2} of {self.starts}")
+        finally:  # by Ctrl-C and the end of time as well
+            for k in sorted(ended):
+                self.note(ended[k], not self.coarse)
 
     def on_whole_mesh(self) -> None:
         """Solve the best branches that are known on the coarse mesh only on the whole one."""
@@ -131,7 +133,7 @@ def searched(
         _keep(reached, search, "")
         search.on_whole_mesh()
     except KeyboardInterrupt:
-        _keep(reached, search, INTERRUPTED)
+        _keep(reached, search, reached.reason)
         raise
     stopped = "" if search.tried == starts and reached.clock.left else LATE
     if not search.branches:

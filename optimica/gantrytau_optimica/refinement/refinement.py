@@ -11,7 +11,7 @@ from gantrytau_optimica.answers.playback.switches import Switch
 from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
-from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
+from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -170,7 +170,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
             optimum = better
     except KeyboardInterrupt:
         newest = reached.best or best
-        refinement = replace(_record(best, rounds, accuracy), reached=False, stopped=INTERRUPTED)
+        refinement = replace(_record(best, rounds, accuracy), reached=False, stopped=reached.reason)
         reached.best = newest.with_notes(refinement=refinement, search=search)
         raise
     return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)

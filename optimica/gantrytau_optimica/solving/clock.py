@@ -13,7 +13,8 @@ class Clock:
     """Shared by all solves of one call: when it has to end, and its progress."""
 
     def __init__(self, max_time: float, progress: Progress | None = None):
-        self.end = time.perf_counter() + max_time
+        self.begun = time.perf_counter()
+        self.end = self.begun + max_time
         self.progress, self.stage = progress, ""
         self.last = (0, float("nan"))
         self._staged = progress is not None and "stage" in _parameters(progress)
@@ -22,6 +23,11 @@ class Clock:
     def left(self) -> float:
         """Time left in s, 0 when it is over."""
         return max(self.end - time.perf_counter(), 0.0)
+
+    @property
+    def passed(self) -> float:
+        """Time since it began, s."""
+        return time.perf_counter() - self.begun
 
     def enter(self, stage: str) -> None:
         """What comes next, as "round 2 of at most 13: solving"."""

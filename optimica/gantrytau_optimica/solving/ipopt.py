@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.interruption import on_interrupt
+from gantrytau_optimica.solving.attended import Watch, attended
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.transcription.program import Program, first_guess
 
@@ -104,9 +104,7 @@ class Solver:
     def __init__(self, program: Program, settings: SolverSettings):
         assembled = program.assembled
         self.settings = settings
-        self.watch = Watch(assembled.variables, assembled.rows)
         options = {
-            "iteration_callback": self.watch,
             "print_time": False,
             "show_eval_warnings": False,
             "calc_lam_p": False,
@@ -127,7 +125,14 @@ class Solver:
             options["ipopt"] |= HOT if settings.hot else NEAR
         options["ipopt"]["obj_scaling_factor"] = _objective_scale(program, FEW if settings.firm else 1.0)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
-        self.nlpsol = ca.nlpsol("optimum", "ipopt", assembled.nlp, options)
+        self.nlp, self.options = assembled.nlp, options
+        self._make(assembled.variables, assembled.rows)
+
+    def _make(self, variables: int, rows: int) -> None:
+        """Ipopt and its watch, anew where a solve was left that still uses the old ones."""
+        self.watch = Watch(variables, rows)
+        options = self.options | {"iteration_callback": self.watch}
+        self.nlpsol = ca.nlpsol("optimum", "ipopt", self.nlp, options)
 
     def unsolved(self, program: Program, guess: np.ndarray) -> Solution:
         """The guess as a solution that was not looked for, because there is none."""
@@ -154,46 +159,48 @@ class Solver:
         first = pushed(program, guess)
         if not finite(program, first):
             return replace(self.unsolved(program, first), status=NOT_BEGUN)
-        self.watch.begin(clock or Clock(self.settings.max_time, self.settings.progress))
-        with on_interrupt(self.watch.ask_to_stop):
-            found = self.nlpsol(
-                x0=guess / program.places.scale,
-                lbx=program.lbw,
-                ubx=program.ubw,
-                lbg=program.lbg,
-                ubg=program.ubg,
-            )
-        if self.watch.error is not None:
-            raise self.watch.error
-        stats: dict[str, Any] = self.nlpsol.stats()
-        word = str(stats["return_status"])
-        if word == "User_Requested_Stop" and not self.watch.pressed:
+        if self.watch.left:
+            self._make(program.assembled.variables, program.assembled.rows)
+        watch, scale = self.watch, program.places.scale
+        watch.begin(clock or Clock(self.settings.max_time, self.settings.progress))
+        limits = dict(lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg)
+        found: Mapping[str, Any] | None = attended(self.nlpsol, watch, dict(x0=guess / scale, **limits))
+        if watch.error is not None:
+            raise watch.error
+        if found is None:
+            stats: dict[str, Any] = dict(success=False, iter_count=watch.iteration)
+            word = "User_Requested_Stop"
+            found = watch.last
+        else:
+            stats = self.nlpsol.stats()
+            word = str(stats["return_status"])
+        if word == "User_Requested_Stop" and not watch.pressed:
             word = "Maximum_WallTime_Exceeded"
-        moved = np.abs(np.array(found["x"]).ravel() - first / program.places.scale)
+        status = WORDS.get(word, word.replace("_", " ").lower())
+        if not found:  # left before its first iteration
+            return self._ended(replace(self.unsolved(program, first), status=status), begin)
+        moved = np.abs(np.array(found["x"]).ravel() - first / scale)
         if word.startswith("Maximum") and np.max(moved, initial=0.0) > FAR:
-            word = "Diverging_Iterates"
+            status = WORDS["Diverging_Iterates"]
         solution = Solution(
-            w=np.array(found["x"]).ravel() * program.places.scale,
+            w=np.array(found["x"]).ravel() * scale,
             multipliers=np.array(found["lam_g"]).ravel(),
-            bound_multipliers=np.array(found["lam_x"]).ravel() / program.places.scale,
+            bound_multipliers=np.array(found["lam_x"]).ravel() / scale,
             constraints=np.array(found["g"]).ravel(),
-            objective=float(found["f"]),
+            objective=float(np.array(found["f"]).item()),
             success=bool(stats["success"]),
-            status=WORDS.get(word, word.replace("_", " ").lower()),
+            status=status,
             iterations=int(stats["iter_count"]),
-            solve_time=time.perf_counter() - begin,
-            upright=_upright(stats),
+            solve_time=0.0,
         )
+        return self._ended(solution, begin)
+
+    def _ended(self, solution: Solution, begin: float) -> Solution:
+        """The solution with its time; raises Pressed with it if Ctrl-C was."""
+        solution = replace(solution, solve_time=time.perf_counter() - begin)
         if self.watch.pressed:
             raise Pressed(solution)
         return solution
-
-
-def _upright(stats: Mapping[str, Any]) -> bool:
-    last = stats.get("iterations", {}).get("regularization_size", ())[1:][
-        -LAST:
-    ]  # the first tells of no step
-    return len(last) > 0 and not any(last)
 
 
 def pushed(program: Program, guess: np.ndarray) -> np.ndarray:
@@ -246,53 +253,3 @@ def _objective_scale(program: Program, few: float) -> float:
     sharing = size**2 / float(np.sum(slopes**2))
     wanted = max(SLOPE * max(few / sharing, 1.0) / size, 1.0) * min(STEEP / steepest, 1.0)
     return wanted / max(min(STEEP / max(np.max(at_guess, initial=0.0), 1e-300), 1.0), 1e-8)
-
-
-class Watch(ca.Callback):
-    """Called by Ipopt after every iteration: reports progress, and stops when Ctrl-C was pressed or time is over."""
-
-    def __init__(self, unknowns: int, constraints: int):
-        ca.Callback.__init__(self)
-        self.sizes = {
-            "x": unknowns,
-            "f": 1,
-            "g": constraints,
-            "lam_x": unknowns,
-            "lam_g": constraints,
-            "lam_p": 0,
-        }
-        self.begin(None)
-        self.construct("watch", {})
-
-    def begin(self, clock: Clock | None) -> None:
-        """Before a solve; without a clock nobody is told, and it takes the time that it takes."""
-        self.clock = clock
-        self.pressed = False
-        self.error: BaseException | None = None
-        self.iteration = 0
-
-    def get_n_in(self) -> int:
-        return ca.nlpsol_n_out()
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        size = self.sizes.get(ca.nlpsol_out(i), 0)
-        return ca.Sparsity.dense(size, 1) if size else ca.Sparsity(0, 1 if i else 0)
-
-    def eval(self, arg: Any) -> list[int]:
-        self.iteration += 1
-        try:
-            if self.clock is not None:
-                self.clock.tell(self.iteration, float(arg[1]))
-        except KeyboardInterrupt:
-            self.pressed = True
-        except BaseException as error:  # raised again once Ipopt has let go
-            self.error = error
-        late = self.clock is not None and not self.clock.left
-        return [1 if self.pressed or late or self.error is not None else 0]
-
-    def ask_to_stop(self) -> None:
-        """Let Ipopt finish its iteration and keep what it has."""
-        self.pressed = True

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -273,6 +274,66 @@ def test_no_time_for_all_first_guesses():
     assert "(time limit reached):" in str(optimum.search)
 
 
+@pytest.mark.parametrize(
+    ("module", "name", "stage"),
+    [
+        ("gantrytau_optimica.optimize", "read_problem", "reading the problem"),
+        ("gantrytau_optimica.optimize", "build", "building the program"),
+        ("gantrytau_optimica.optimize", "transcribe", "building the program"),
+    ],
+)
+def test_time_ends_while_there_is_nothing_yet(monkeypatch, module, name, stage):
+    monkeypatch.setattr(sys.modules[module], name, lambda *a, **k: time.sleep(30))
+    before, begin = signal.getsignal(signal.SIGINT), time.perf_counter()
+    with pytest.raises(SolveError) as caught:
+        optimize(FastestMass, max_time=0.5)
+    assert time.perf_counter() - begin < 0.5 + 1.5 + 2.0  # what is given beyond the time, and a busy machine
+    assert re.match(
+        f"FastestMass: time limit reached at {stage} after [0-9.]+ s, before there was anything to keep; allow more",
+        str(caught.value),
+    )
+    assert not caught.value.interrupted
+    assert signal.getsignal(signal.SIGINT) is before
+    time.sleep(0.2)  # no Ctrl-C of the clock comes after the call
+
+
+def test_time_ends_while_a_refinement_plays_back(monkeypatch):
+    """The second playback never ends: the round before is kept, and returned."""
+    measured, made = refinement_module._round, []
+
+    def stuck(optimum):
+        made.append(optimum)
+        if len(made) == 2:
+            time.sleep(60)
+        return measured(optimum)
+
+    monkeypatch.setattr(refinement_module, "_round", stuck)
+    optimum, taken = late(6.0, elements=20, refine=1e-9)
+    assert taken < 6.0 + 1.5 + 2.0
+    assert optimum.success
+    assert len(optimum.refinement.rounds) == 1
+    assert optimum.refinement.stopped == "time limit reached"
+    assert optimum.objective == pytest.approx(-0.0480557, abs=1e-4)
+
+
+def test_time_ends_while_it_is_asked_whether_there_is_a_minimum(monkeypatch):
+    monkeypatch.setattr(
+        sys.modules["gantrytau_optimica.prepared"], "places_aside", lambda *a, **k: time.sleep(60)
+    )
+    with pytest.raises(
+        SolveError, match="time limit reached; found until then: a solution on 20 elements"
+    ) as caught:
+        optimize(CatalystMixing, elements=20, max_time=6.0)
+    assert caught.value.optimum.success
+    assert not caught.value.interrupted
+
+
+def test_time_does_not_end_a_call_that_is_over():
+    optimum = optimize(FastestMass, elements=5, max_time=3.0)
+    time.sleep(5.0)
+    assert optimum.success
+
+
 def test_the_best_round_is_kept_where_the_accuracy_is_not_reached(monkeypatch):
     """The third round is made worse than the second: its playback misses the end by a hundredth."""
     measured = refinement_module._round
@@ -328,8 +389,8 @@ def test_progress_says_the_round():
     )
     count = len(optimum.refinement.rounds)
     named = list(dict.fromkeys(stages))
-    assert named[0] == ""
-    assert named[1:4] == [
+    assert named[:3] == ["reading the problem", "building the program", ""]
+    assert named[3:6] == [
         "round 1 of at most 13: playing back",
         "round 1 of at most 13: solving on the next mesh",
         "round 2 of at most 13: playing back",
