@@ -13,6 +13,7 @@ from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
+LITTLE = 1e-3  # of what moves most: less does not tell a direction
 Verdict = Literal["minimum", "flat", "saddle", "not known"]
 
 
@@ -62,7 +63,18 @@ def second_order(
         return SecondOrder("not known", np.nan, left=left)
     words = ""
     if found.direction is not None:
-        one = Meanings(built, program, phases).unknown(int(np.argmax(np.abs(found.direction))))
+        one = Meanings(built, program, phases).unknown(_moved_most(program, np.abs(found.direction)))
         words = f"{one.words}{one.when}"
     verdict: Verdict = "saddle" if found.falls else "flat" if found.flat else "minimum"
     return SecondOrder(verdict, found.least, words, found.flat, left)
+
+
+def _moved_most(program: Program, amounts: np.ndarray) -> int:
+    """The unknown that moves most along a direction, one that is chosen rather than one that follows from it."""
+    chosen = np.zeros(amounts.size, bool)
+    chosen[program.places.free] = True
+    for layout in program.places.layouts:
+        followers = len(layout.phase.states) + len(layout.phase.algebraics)
+        chosen[layout.first : layout.first + layout.size] = layout.owner >= followers
+    telling = np.where(chosen, amounts, 0.0)
+    return int(np.argmax(telling if np.max(telling) > LITTLE else amounts))

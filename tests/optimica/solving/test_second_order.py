@@ -232,7 +232,7 @@ def test_a_place_that_cannot_be_left_is_told():
     first = prepared.solve()
     assert first.status.startswith("stationary but no minimum")
     assert first.second_order.verdict == "saddle"
-    assert re.search(r"No minimum: the objective falls to both sides .* most with (phi|bend)", first.report())
+    assert re.search(r"No minimum: the objective falls to both sides .* most with bend", first.report())
 
 
 class Column(Optimization):
