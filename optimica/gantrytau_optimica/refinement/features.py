@@ -109,7 +109,8 @@ def _counted(
     if not counts:
         return
     states = {s.name for s in motions[0].phases[path].phase.states}
-    same = {name for name in counts for s in states if np.array_equal(signs[0][name], signs[0].get(s))}
+    told = [signs[0][name] for name in states & signs[0].keys()]
+    same = {name for name in counts if any(np.array_equal(signs[0][name], one) for one in told)}
 
     def telling(name: str) -> tuple[bool, bool, int, int]:
         """What differs, what is not told by the side on which a state passes, by how much, what has the shortest name."""
