@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
-from time import perf_counter
+from time import process_time
 from typing import Any, TypeVar
 
 from gantrytau.ensembles.cases import Case
@@ -10,7 +10,7 @@ from gantrytau.ensembles.workers.places import PROCESSES, outcomes
 from gantrytau.ensembles.workers.worker import within_a_case
 from gantrytau.errors import GantryTauError
 
-WORTH = 4.0  # s, twice what processes take to begin
+WORTH = 4.0  # s of a processor, twice what processes take to begin; by the wall a busy machine would begin more of them
 
 Argument = TypeVar("Argument")
 Value = TypeVar("Value")
@@ -25,10 +25,10 @@ def each(
     process as a GantryTauError with their words.
     """
     left = iter(enumerate(arguments))
-    begin = perf_counter()
+    begin = process_time()
     for place, argument in islice(left, 1):
         yield place, function(argument)
-    if within_a_case() or (perf_counter() - begin) * (count - 1) < WORTH:
+    if within_a_case() or (process_time() - begin) * (count - 1) < WORTH:
         for place, argument in left:
             yield place, function(argument)
         return
