@@ -1,4 +1,4 @@
-"""How the minimum-time motion GT-A grows with the number of elements, beside programs by hand and rockit."""
+"""How the minimum-time motion GT-A grows with the number of elements, beside programs by hand, with Opti and with rockit."""
 
 import json
 import statistics
@@ -7,15 +7,16 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from tests.benchmarks.reference_collocation import Outcome
 
 from gantrytau import SolveError
 from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_optimica import prepare
-from tests.benchmarks import opti_reference, reference_collocation
 from tests.benchmarks.gta import Task
+from tests.benchmarks.peers import by_hand, three_link, with_opti
+from tests.benchmarks.peers.written import Outcome
 from tests.benchmarks.pose_sweep import fastest, pairs, prepared
 from tests.benchmarks.table import Row, at_most, print_table, shown
 
@@ -23,7 +24,7 @@ ELEMENTS = (25, 50, 100, 200, 400)
 PEER_TIME = 15.0  # s that a peer may take for all of them
 LARGE = 2230  # elements: 100,000 variables
 LARGE_TIME = 30.0  # s for Ipopt
-PAIRS, COMPARED = 200, 20
+PAIRS, COMPARED = 60, 10
 
 Program = Callable[[int, float], Outcome]  # elements, s for Ipopt -> what it took
 
@@ -31,38 +32,33 @@ Program = Callable[[int, float], Outcome]  # elements, s for Ipopt -> what it to
 def rows() -> Iterator[Row]:
     """All figures of growth."""
     yield from _growth("model", from_components, 60.0)
-    yield from _growth("by hand", lambda n, _: reference_collocation.solve(Task(), n), PEER_TIME)
-    for title, program in (
-        ("Opti, collocation", opti_reference.collocation),
-        ("Opti, shooting", opti_reference.shooting),
-    ):
-        yield from _growth(title, lambda n, t, solve=program: solve(Task(), n, max_time=t), PEER_TIME)
+    peers = {"by hand": by_hand.solve, "Opti": with_opti.solve}
     try:
-        from tests.benchmarks import rockit_reference
+        from tests.benchmarks.peers import with_rockit
     except ImportError:
         yield shown("GT-A, rockit", "not installed")
     else:
-        yield from _growth("rockit", lambda n, t: rockit_reference.solve(Task(), n, max_time=t), PEER_TIME)
+        peers["rockit"] = with_rockit.solve
+    for title, solve in peers.items():
+        yield from _growth(title, lambda n, _, solve=solve: solve(three_link.motion, n), PEER_TIME)
     yield from _large()
     yield from _pose_pairs()
 
 
 def from_components(elements: int, max_time: float) -> Outcome:
     """The motion from components; building begins with the translation of the robot."""
-    free = FreePath
-    begin = time.perf_counter()
-    prepared = prepare(free, elements=elements, max_time=max_time)
-    built = time.perf_counter()
+    begin = time.process_time()
+    prepared = prepare(FreePath, elements=elements, max_time=max_time)
+    built = time.process_time()
     try:
         optimum = prepared.solve()
     except SolveError as error:
         optimum = error.optimum
     return Outcome(
         optimum.final_time,
-        float("nan"),
         optimum.iterations,
         built - begin,
-        time.perf_counter() - built,
+        time.process_time() - built,
         optimum.success,
         prepared.program.places.size,
     )
@@ -140,28 +136,29 @@ def measure_large(max_time: float = LARGE_TIME) -> None:
 
 
 def _pose_pairs() -> Iterator[Row]:
-    """Random pairs of poses, every tenth beside the program by hand for the same pair in the same minute."""
-    seconds, mine, by_hand, missed = [], [], [], 0
-    begin = time.perf_counter()
+    """Random pairs of poses, every sixth beside the program by hand in the same minute; times of the processor."""
+    seconds, mine, theirs, missed = [], [], [], 0
+    begin = time.process_time()
     prepared(50)  # the program is built before its first motion
-    build = time.perf_counter() - begin
+    build = time.process_time() - begin
     for k, (start, end) in enumerate(pairs(PAIRS, seed=0)):
-        begin = time.perf_counter()
+        begin = time.process_time()
         verdict = fastest(start, end)
-        spent = time.perf_counter() - begin
+        spent = time.process_time() - begin
         missed += not verdict.success
         seconds.append(spent)
         if k % (PAIRS // COMPARED) == 0:
             mine.append(spent)
-            by_hand.append(reference_collocation.solve(replace(Task(), start=verdict.start, end=verdict.end)))
+            task = replace(Task(), start=verdict.start, end=verdict.end)
+            theirs.append(by_hand.solve(partial(three_link.motion, task), 50))
     yield at_most(f"pose pairs that do not converge, of {PAIRS}", missed, 0)
     share = build / PAIRS
     yield shown("pose pairs, median time, built once", f"{share + statistics.median(seconds):.3f} s")
-    built_once = statistics.fmean(outcome.build for outcome in by_hand) / PAIRS
-    hand = built_once + statistics.median(outcome.solve for outcome in by_hand)
+    built_once = statistics.fmean(outcome.build for outcome in theirs) / PAIRS
+    hand = built_once + statistics.median(outcome.solve for outcome in theirs)
     figure = f"{COMPARED} of these pairs against by hand, both built once"
     yield at_most(figure, (share + statistics.median(mine)) / hand, 1.3, "x")
-    lost = sum(not outcome.success for outcome in by_hand)
+    lost = sum(not outcome.success for outcome in theirs)
     yield shown(f"of these {COMPARED}, by hand: median, not converged", f"{hand:.3f} s, {lost}")
 
 

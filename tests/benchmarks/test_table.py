@@ -1,5 +1,7 @@
 """Targets that are missed are told, whatever kind of number the figure is."""
 
+import importlib
+
 import numpy as np
 import pytest
 
@@ -33,3 +35,8 @@ def test_rows_are_printed_as_they_come_and_missed_ones_are_named(capsys):
 def test_a_table_whose_targets_are_met_says_so(capsys):
     assert print_table("Benchmarks", [[at_least("speed", 2.0, 1.0)]]) == 0
     assert "All targets are met." in capsys.readouterr().out
+
+
+def test_every_part_of_the_table_can_be_imported():
+    bench = importlib.import_module("tests.benchmarks.__main__")
+    assert 0 < bench.LONGEST <= 20  # min

@@ -36,7 +36,8 @@ def solve(write: Callable[[], Motion], elements: int, points: int = 3) -> Outcom
         lower.append(np.full(value.numel(), low))
         upper.append(np.full(value.numel(), high))
 
-    T = unknown(np.array([motion.guessed_time]), tuple(np.array([t]) for t in motion.times))
+    shortest, longest = (np.array([t]) for t in motion.times)
+    T = unknown(np.array([motion.guessed_time]), (shortest, longest))
     h = T / elements
     first = x0 = unknown(motion.guess(np.zeros(1))[0][:, 0], limits[0])
     for element in range(elements):

@@ -10,6 +10,7 @@ from typing import Any
 
 from gantrytau.commands.demo.motion_problems import FreePath, OnLine
 from gantrytau_optimica import prepare
+from tests.benchmarks.gta import Task
 from tests.benchmarks.peers import by_hand, crane, delta, six_link, three_link, with_opti
 from tests.benchmarks.peers.written import Motion, Outcome
 from tests.benchmarks.table import Row, at_most, print_table, shown
@@ -31,7 +32,7 @@ class Case:
 
 CASES = (
     Case("three links, free path", FreePath, three_link.motion, (50, 200), branches=True),
-    Case("three links, line", OnLine, partial(three_link.motion, line=True), (50, 200)),
+    Case("three links, line", OnLine, partial(three_link.motion, Task(line=True)), (50, 200)),
     Case("six links", six_link.SixLinkMotion, six_link.motion, (20, 200)),
     Case("delta robot", delta.DeltaMotion, delta.motion, (20, 200)),
     Case("crane with limited rates", crane.CraneMotion, crane.motion, (50, 200)),

@@ -13,13 +13,14 @@ from tests.benchmarks.gta import Task, reaches, trapezoid
 from tests.benchmarks.peers.written import Columns, Motion
 
 
-def motion(*, line: bool = False) -> Motion:
-    """On a free path, or along the straight line in its path coordinate."""
-    task, n = Task(line=line), 1 if line else 3
+def motion(task: Task | None = None) -> Motion:
+    """On a free path, or along the straight line in its path coordinate; without a task from A to B of GT-A."""
+    task = task or Task()
+    n = 1 if task.line else 3
     y, dy, ddy = (ca.SX.sym(name, n) for name in ("y", "dy", "ddy"))
     dX, torque = ca.SX.sym("dX", 3), ca.SX.sym("torque", 3)
     residual = residuals(task)(y, dy, ddy, dX, torque)
-    first, last = (np.zeros(1), np.ones(1)) if line else (np.array(task.start), np.array(task.end))
+    first, last = (np.zeros(1), np.ones(1)) if task.line else (np.array(task.start), np.array(task.end))
 
     def guess(shares: np.ndarray) -> Columns:
         position, speed, acceleration = trapezoid(shares)
