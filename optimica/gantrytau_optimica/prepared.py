@@ -13,6 +13,7 @@ from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
+from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
@@ -289,4 +290,5 @@ def solved_or_raise(optimum: Optimum) -> Optimum:
         return optimum
     remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
     ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
-    raise SolveError(f"{optimum.report()}{ways}\n{remedy}", optimum=optimum)
+    ends = "".join(f"\n{said}" for said in held_ends(optimum.built))
+    raise SolveError(f"{optimum.report()}{ways}{ends}\n{remedy}", optimum=optimum)
