@@ -13,6 +13,7 @@ from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
+from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
@@ -20,6 +21,7 @@ from gantrytau_optimica.given import parameter_names, read_guesses, solution_giv
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
 from gantrytau_optimica.refinement.multistart import best_refined, searched
+from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, without_ramps
 from gantrytau_optimica.solving.clock import Clock
@@ -39,6 +41,7 @@ MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
+MOST_CLOSER = 100  # iterations closer to zeros of square roots, where many more lead nowhere
 MOST_LEFT = 3  # places that are no minimum, which a solve leaves
 
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
@@ -88,7 +91,7 @@ class Prepared:
         free = tuple(self._number(n, values, given) for n in self.built.problem.free)
         built = replace(self.built, problem=replace(self.built.problem, free=free))
         if parameters or guess is not None:
-            built = replace(built, problem=with_guesses(built, given))
+            built = replace(built, problem=with_margins(with_guesses(built, given)))
         program = self.program.with_numbers(built.problem)
         lost = out_of_reach(built)
         if lost:
@@ -146,7 +149,7 @@ class Prepared:
     def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
         if self.starts == 1:
-            return solved_or_raise(self._alone(built, program, first, near))
+            return solved_or_raise(self._off_margins(self._alone(built, program, first, near), first))
         reached, settings = self._reached, self.solver.settings
         most = min(settings.max_iterations, MOST_FROM_COARSE)
         close = [replace(settings, near=near, max_iterations=most) for near in (True, False)]
@@ -154,7 +157,7 @@ class Prepared:
         best, search = searched(
             lambda: self._alone(built, program, first, near), whole, self.starts, self.refine is not None
         )
-        best = self._lowest(best, self.solver) if search is not None else best
+        best = self._off_margins(self._lowest(best, self.solver) if search is not None else best, first)
         best = replace(best, search=search) if search is None else best.with_notes(search=search)
         if not best.success and search is not None and not reached.clock.left:
             raise reached.stopped(LATE)
@@ -184,6 +187,17 @@ class Prepared:
             return optimum
         again = self.solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
         return again if again.success else optimum
+
+    def _off_margins(self, found: Optimum, first: np.ndarray) -> Optimum:
+        """An optimum that rests on no margins of square roots, if there is one nearby and time to look for it."""
+        settings = self.solver.settings
+        few = replace(settings, near=True, max_iterations=min(settings.max_iterations, MOST_CLOSER))
+
+        def solve(built: Built, program: Program, near: bool) -> Optimum:
+            solver = self._solver(program, few) if near else self.solver
+            return self.solved(built, program, solver, found.solution.w if near else first)
+
+        return off_margins(found, solve) if self._reached.clock.left else found
 
     def _twice(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
         """From one first guess, once with limits that count as much as the objective, and if need be once as it is."""

@@ -25,6 +25,7 @@ class Task:
     weight: float = 0.0  # s per (N.m)^2.s
     line: bool = False  # along the straight line
     guessed_time: float = 1.0  # s
+    least_reach: float = 0.0  # m by which the tool stays ahead of each cart
 
 
 ROWS = {  # 50 elements, 3 Radau points, tanh friction: time in s, energy in (N.m)^2.s

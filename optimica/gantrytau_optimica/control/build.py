@@ -27,6 +27,7 @@ from gantrytau_optimica.control.control_problem import (
 from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess
 from gantrytau_optimica.control.input_rates import Rates, check_pieces, check_reached, input_rates, lifted
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
+from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.control.sizes import with_sizes
 from gantrytau_optimica.problem.model_words import algebraic_words
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
@@ -91,7 +92,7 @@ def build(
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)
-    return replace(built, problem=with_sizes(with_guesses(built, guess)))
+    return replace(built, problem=with_margins(with_sizes(with_guesses(built, guess))))
 
 
 def _statements(read: SymbolicProblem) -> list[ca.SX]:

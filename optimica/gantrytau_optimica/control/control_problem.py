@@ -44,6 +44,11 @@ class Signal:
     words: str = ""  # what it is at a limit, where the name says nothing to the user
     pieces: Pieces = Pieces()
 
+    @property
+    def is_root(self) -> bool:
+        """Whether it is a square root: zero, or a margin above it, is a limit of its own; others have those of the user."""
+        return self.min >= 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Course:

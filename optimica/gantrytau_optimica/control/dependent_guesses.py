@@ -59,7 +59,7 @@ def _in_closed_form(
             function = ca.Function(
                 "closed", [built.problem.time, ca.vertcat(ca.SX(0, 1), *leaves)], [ca.densify(closed)]
             )
-            guess = _Closed(function, tuple(signals), span, root=algebraic.min == 0.0)
+            guess = _Closed(function, tuple(signals), span, root=algebraic.is_root)
         found[algebraic.name] = guess
         leaves.append(algebraic.symbol)
         signals.append(guess)
@@ -96,7 +96,7 @@ def _completed(
         span,
     )
     found: dict[str, Guess] = {
-        s.name: own.get(s.symbol.name(), _Unknown(along, k, s.min == 0.0)) for k, s in enumerate(unknowns)
+        s.name: own.get(s.symbol.name(), _Unknown(along, k, s.is_root)) for k, s in enumerate(unknowns)
     }
     for signal, slope in zip(moving.rates, along.speeds, strict=True):
         found[signal.name] = own.get(signal.symbol.name(), _Slope(slope, span[1] - span[0]))
@@ -121,7 +121,7 @@ def _completion(
         {
             k: numbered(built.closed[s.name])
             for k, s in enumerate(unknowns)
-            if s.min == 0.0 and s.name in built.closed
+            if s.is_root and s.name in built.closed
         },
         np.array([_at_start(built.read.dae.start, s, own) for s in unknowns]),
     )
@@ -132,7 +132,7 @@ def _at_start(start: Mapping[str, float], signal: Signal | Course, own: Mapping[
     name = signal.symbol.name()
     if name in own:
         return float(own[name](np.zeros(1))[0])
-    return start.get(name, 1.0 if isinstance(signal, Signal) and signal.min == 0.0 else 0.0)
+    return start.get(name, 1.0 if isinstance(signal, Signal) and signal.is_root else 0.0)
 
 
 def _driven(phase: Phase, own: Mapping[str, Guess]) -> Driven:

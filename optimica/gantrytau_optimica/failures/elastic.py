@@ -246,8 +246,8 @@ def _hard_bounds(program: Program, softs: Sequence[Soft]) -> tuple[np.ndarray, n
     for soft in softs:
         if not soft.of_rows:
             lower[soft.where], upper[soft.where] = -np.inf, np.inf
-    for layout in program.places.layouts:
-        for k, signal in enumerate(layout.phase.signals):
+    for layout, phase in zip(program.places.layouts, program.problem.phases, strict=True):
+        for k, signal in enumerate(phase.signals):
             where = layout.of(k)
             lower[where] = np.maximum(lower[where], signal.min / program.places.scale[where])
             upper[where] = np.minimum(upper[where], signal.max / program.places.scale[where])

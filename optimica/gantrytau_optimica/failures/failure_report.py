@@ -204,8 +204,10 @@ def _binding(program: Program, solution: Solution, trajectory: Trajectory) -> li
         for word, bound in (("lower", lower[places]), ("upper", upper[places])):
             reached = _reached(value, bound)
             if np.any(reached):
+                kept = signal.is_root and bound[reached][0] > 0
+                off = f" but for a margin of {bound[reached][0]:.3g}" if kept else ""
                 found.append(
-                    f"{signal.words} {intervals(reached, when)}"
+                    f"{signal.words}{off} {intervals(reached, when)}"
                     if signal.words and signal.words != signal.name
                     else f"{signal_words(trajectory.phase, number)} at its {word} limit {bound[reached][0]:.6g} "
                     f"{intervals(reached, when)}"

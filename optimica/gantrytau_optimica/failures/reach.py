@@ -48,7 +48,7 @@ def out_of_reach(built: Built) -> list[OutOfReach]:
         radicands: list[ca.SX] = []
         lost: list[OutOfReach] = []
         for k, algebraic in enumerate(phase.algebraics):
-            if algebraic.name not in built.closed or algebraic.min != 0.0:
+            if algebraic.name not in built.closed or not algebraic.is_root:
                 continue
             radicand = ca.substitute(-phase.residuals[k], algebraic.symbol, 0)
             leaves = ca.symvar(radicand)

@@ -14,6 +14,7 @@ from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.point_functions import Place, places_of_points, share_of, single_term
 
 FEW = 1e-5  # of an element, by which a moving point may stand outside of it
+CLOSE = 1e-2  # of its margin: what is closer rests on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +49,17 @@ class Program:
     points: tuple[Place, ...] = field(default=())
 
     def with_numbers(self, problem: ControlProblem) -> "Program":
-        """The same program with other free numbers and first guesses."""
+        """The same program with other free numbers, first guesses and margins of square roots."""
         lower, upper, places = self.lbw.copy(), self.ubw.copy(), self.places
         for place, number in zip(places.free, problem.free, strict=True):
             lower[place], upper[place] = number.min / places.scale[place], number.max / places.scale[place]
+        for layout, before, phase in zip(places.layouts, self.problem.phases, problem.phases, strict=True):
+            for k, (old, new) in enumerate(
+                zip(before.algebraics, phase.algebraics, strict=True), len(phase.states)
+            ):
+                mine = layout.of(k)
+                mine = mine[lower[mine] == old.min / places.scale[mine]]  # others have limits of the user
+                lower[mine] = new.min / places.scale[mine]
         return replace(self, problem=problem, lbw=lower, ubw=upper)
 
     def astray(self, w: np.ndarray) -> bool:
@@ -90,6 +98,15 @@ class Program:
         for number, group in enumerate(self.groups):
             found[group.rows] = number
         return found
+
+
+def on_margins(program: Program, w: np.ndarray) -> bool:
+    """Whether a square root that is kept off zero rests on its margin at unknowns w (unscaled)."""
+    return any(
+        root.min > 0 and bool(np.any(w[layout.of(k)] < (1 + CLOSE) * root.min))
+        for layout, phase in zip(program.places.layouts, program.problem.phases, strict=True)
+        for k, root in enumerate(phase.algebraics, len(phase.states))
+    )
 
 
 def first_guess(program: Program) -> np.ndarray:

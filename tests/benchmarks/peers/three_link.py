@@ -30,12 +30,12 @@ def motion(task: Task | None = None) -> Motion:
         z = np.vstack([span * acceleration / T**2, reaches(task.robot, tool).T])
         return x, z, np.zeros((3, shares.size))
 
-    free, limit = np.full(3 * n, np.inf), np.full(3, task.torque_limit)
+    free, limit, least = np.full(3 * n, np.inf), np.full(3, task.torque_limit), np.full(3, task.least_reach)
     return Motion(
         x=ca.vertcat(y, dy), z=ca.vertcat(ddy, dX), u=torque,
         ode=ca.vertcat(dy, ddy), residual=residual, path=ca.SX(0, 1), path_limits=(0.0, 0.0),
         # an upper limit of the reaches would lead to other branches
-        limits=(np.concatenate([-free, np.zeros(3), -limit]), np.concatenate([free, np.full(3, np.inf), limit])),
+        limits=(np.concatenate([-free, least, -limit]), np.concatenate([free, np.full(3, np.inf), limit])),
         start=np.append(first, np.zeros(n)), end=np.append(last, np.zeros(n)),
         guess=guess, guessed_time=task.guessed_time, times=(0.1, 5.0),
     )  # fmt: skip
