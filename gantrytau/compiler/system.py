@@ -1,6 +1,6 @@
 """The sorted blocks put together as one semi-explicit system, with what has no closed form left implicit."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -59,9 +59,14 @@ class System:
     forward: tuple[str, ...]
 
     @property
+    def orders(self) -> Mapping[str, int]:
+        """Orders of the highest derivatives, by variable."""
+        return self.dae.indexed.orders
+
+    @property
     def loops(self) -> tuple[str, ...]:
         """Positions among the algebraics that close loops without closed form, and may do so in several ways."""
-        orders = self.dae.indexed.orders
+        orders = self.orders
         torn = (
             y.name() for b in self.dae.blocks if b.kind == "nonlinear" and b.solution is None for y in b.tears
         )

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.dulmage_mendelsohn import decompose
+from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import Phase, Signal
 
 MOST_CORRECTIONS = 12
@@ -36,11 +37,17 @@ class Driven:
     inputs: tuple[Signal, ...] = ()
 
 
-def driven(phase: Phase) -> Driven:
-    """What moves a phase, where all its inputs could follow from as many accelerations; else nothing."""
+def driven(phase: Phase, orders: Mapping[str, int]) -> Driven:
+    """What moves a phase, where all its inputs could follow from as many accelerations; else nothing.
+
+    orders: of the highest derivatives, by variable; lower ones, as rates of quaternions, are no accelerations.
+    """
     algebraics = {a.symbol.element_hash(): a for a in phase.algebraics}
-    rates = [(k, algebraics.get(e.element_hash())) for k, e in enumerate(phase.ode.elements())]
-    found = [(k, a) for k, a in rates if a is not None]
+    found: list[tuple[int, Signal]] = []
+    for k, (state, rate) in enumerate(zip(phase.states, phase.ode.elements(), strict=True)):
+        base, order = split_derivative(state.symbol.name())
+        if orders.get(base, 0) == order + 1 and rate.element_hash() in algebraics:
+            found.append((k, algebraics[rate.element_hash()]))
     if len(found) != len(phase.inputs):
         return Driven()
     return Driven(tuple(a for _, a in found), tuple(k for k, _ in found), phase.inputs)

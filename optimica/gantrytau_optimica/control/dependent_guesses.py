@@ -1,7 +1,7 @@
 """First guesses of what depends on states and inputs: from closed forms, else by Newton's method along the guess."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -15,6 +15,7 @@ LEAST_ROOT = (
     0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
 )
 MOST_PLACES = 120  # at which Newton's method completes a guess; between them it is drawn straight
+MOST_KEPT = 4  # answers that are remembered: at places, and beside them for slopes
 SLOPE = 1e-4  # of the horizon: between values of which slopes of guesses are taken
 
 
@@ -74,70 +75,110 @@ def _completed(
     span: tuple[float, float],
 ) -> dict[str, Guess]:
     """Algebraics from the equations of the phase along the guess of the rest; the caller's own stay as they are."""
-    dae, problem = built.read.dae, built.problem
-    old = ca.vertcat(*(dae.parameter_symbols[n] for n in built.numbers), problem.numbers)
-    values = ca.DM([*built.numbers.values(), *(n.guess for n in problem.free)])
-
-    def numbered(expression: ca.SX) -> ca.SX:
-        return ca.substitute(expression, old, values) if old.numel() else expression
-
-    moving = _driven(phase, own)
-    completion, known, unknowns = _completion(built, phase, own, moving, numbered)
-    if not completion.determined and moving.rates:
+    moving = _driven(built, phase, own)
+    whole = _Whole(built, phase, dict(symbols), own, span, moving)
+    speeds = whole.turning()
+    whole.symbols.update(speeds)
+    along = whole.along()
+    if along is None and moving.rates:
         moving = Driven()
-        completion, known, unknowns = _completion(built, phase, own, moving, numbered)
-    if not completion.determined:
+        along = _Whole(built, phase, whole.symbols, own, span, moving).along()
+    if along is None:
         return _in_closed_form(built, phase, symbols, own, span)
-    along = _Along(
-        completion,
-        tuple(symbols[s.symbol.name()] for s in known),
-        tuple(symbols[phase.states[k].symbol.name()] for k in moving.speeds),
-        np.array([span[0], *(_at_start(dae.start, s, {}) for s in known), *(0.0 for _ in moving.rates)]),
-        span,
-    )
-    found: dict[str, Guess] = {
-        s.name: own.get(s.symbol.name(), _Unknown(along, k, s.is_root)) for k, s in enumerate(unknowns)
-    }
+    found = {s.name: own.get(s.symbol.name(), guess) for s, guess in along.guesses()}
     for signal, slope in zip(moving.rates, along.speeds, strict=True):
         found[signal.name] = own.get(signal.symbol.name(), _Slope(slope, span[1] - span[0]))
-    return found
+    return found | {s.name: speeds[s.symbol.name()] for s in phase.states if s.symbol.name() in speeds}
 
 
-def _completion(
-    built: Built,
-    phase: Phase,
-    own: Mapping[str, Guess],
-    moving: Driven,
-    numbered: Callable[[ca.SX], ca.SX],
-) -> tuple[Completion, list[Signal | Course], list[Signal]]:
-    """What solves the equations of a phase, and the signals that it needs and finds; those of the accelerations apart."""
-    fixed, chosen = ({s.name for s in part} for part in (moving.rates, moving.inputs))
-    unknowns = [*(a for a in phase.algebraics if a.name not in fixed), *moving.inputs]
-    known = [*phase.states, *(u for u in phase.inputs if u.name not in chosen), *phase.courses]
-    completion = Completion(
-        numbered(phase.residuals),
-        ca.vertcat(built.problem.time, *(s.symbol for s in (*known, *moving.rates))),
-        ca.vertcat(*(s.symbol for s in unknowns)),
-        {
-            k: numbered(built.closed[s.name])
-            for k, s in enumerate(unknowns)
-            if s.is_root and s.name in built.closed
-        },
-        np.array([_at_start(built.read.dae.start, s, own) for s in unknowns]),
-    )
-    return completion, known, unknowns
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """A phase with guesses of what is known, by symbol, and what moves it."""
+
+    built: Built
+    phase: Phase
+    symbols: dict[str, Guess]
+    own: Mapping[str, Guess]
+    span: tuple[float, float]
+    moving: Driven
+
+    def turning(self) -> dict[str, Guess]:
+        """Speeds that are no rates of states, as angular velocities are, from the slopes of the other states."""
+        phase, places = self.phase, {s.symbol.element_hash() for s in self.phase.states}
+        odes = phase.ode.elements()
+        direct = {e.element_hash() for e in odes} & places
+        speeds = [phase.states[k] for k in self.moving.speeds]
+        turning = [
+            s for s in speeds if s.symbol.element_hash() not in direct and s.symbol.name() not in self.own
+        ]
+        moved = [
+            k for k, e in enumerate(odes) if k not in self.moving.speeds and e.element_hash() not in places
+        ]
+        if not turning or len(turning) != len(moved):
+            return {}
+        found = self.along(turning, moved)
+        return {s.symbol.name(): guess for s, guess in found.guesses()[-len(turning) :]} if found else {}
+
+    def along(self, turning: Sequence[Signal] = (), moved: Sequence[int] = ()) -> "_Along | None":
+        """What gives the unknowns along the guess, None where the equations do not determine them.
+
+        turning: states that are unknown as well, in the rates of the states `moved`; forces do not matter then.
+        """
+        phase, moving, problem = self.phase, self.moving, self.built.problem
+        fixed, chosen = ({s.name for s in part} for part in (moving.rates, (*moving.inputs, *turning)))
+        unknowns = [*(a for a in phase.algebraics if a.name not in fixed), *moving.inputs, *turning]
+        known = [s for s in (*phase.states, *phase.inputs, *phase.courses) if s.name not in chosen]
+        slopes = ca.SX.sym("slope", len(moved))
+        completion = Completion(
+            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved)] - slopes)),
+            ca.vertcat(problem.time, *(s.symbol for s in (*known, *moving.rates)), slopes),
+            ca.vertcat(*(s.symbol for s in unknowns)),
+            {
+                k: self._numbered(self.built.closed[s.name])
+                for k, s in enumerate(unknowns)
+                if s.is_root and s.name in self.built.closed
+            },
+            np.array([self._at_start(s, self.own) for s in unknowns]),
+        )
+        if not completion.determined:
+            return None
+        still = _Constant(0.0)
+        guesses = [self.symbols[s.symbol.name()] for s in known]
+        rates = [self.symbols[phase.states[k].symbol.name()] for k in (moved or moving.speeds)]
+        return _Along(
+            completion,
+            tuple(unknowns),
+            (*guesses, *((still,) * len(moving.rates) if moved else ())),
+            tuple(rates),
+            np.array(
+                [
+                    self.span[0],
+                    *(self._at_start(s, {}) for s in known),
+                    *(0.0 for _ in (*moving.rates, *moved)),
+                ]
+            ),
+            self.span,
+        )
+
+    def _numbered(self, expression: ca.SX) -> ca.SX:
+        """An expression with the numbers of parameters and the guesses of free ones."""
+        dae, problem, numbers = self.built.read.dae, self.built.problem, self.built.numbers
+        old = ca.vertcat(*(dae.parameter_symbols[n] for n in numbers), problem.numbers)
+        values = ca.DM([*numbers.values(), *(n.guess for n in problem.free)])
+        return ca.substitute(expression, old, values) if old.numel() else expression
+
+    def _at_start(self, signal: Signal | Course, own: Mapping[str, Guess]) -> float:
+        """A value near which the model starts."""
+        name = signal.symbol.name()
+        if name in own:
+            return float(own[name](np.zeros(1))[0])
+        otherwise = 1.0 if isinstance(signal, Signal) and signal.is_root else 0.0
+        return self.built.read.dae.start.get(name, otherwise)
 
 
-def _at_start(start: Mapping[str, float], signal: Signal | Course, own: Mapping[str, Guess]) -> float:
-    name = signal.symbol.name()
-    if name in own:
-        return float(own[name](np.zeros(1))[0])
-    return start.get(name, 1.0 if isinstance(signal, Signal) and signal.is_root else 0.0)
-
-
-def _driven(phase: Phase, own: Mapping[str, Guess]) -> Driven:
+def _driven(built: Built, phase: Phase, own: Mapping[str, Guess]) -> Driven:
     """What moves the phase, where the caller guesses none of it."""
-    found = driven(phase)
+    found = driven(phase, built.system.orders)
     return Driven() if any(s.symbol.name() in own for s in (*found.rates, *found.inputs)) else found
 
 
@@ -156,28 +197,36 @@ class _Slope:
 
 @dataclass(eq=False)
 class _Along:
-    """All unknowns along the guess; remembers the last answer, for which their parts ask one after another.
+    """All unknowns along the guess; remembers the last answers, for which their parts ask one after another.
 
     known: guesses of what is known; speeds: those whose slopes are known; begin: all that where the model starts.
     """
 
     completion: Completion
+    unknowns: tuple[Signal, ...]
     known: tuple[Guess, ...]
     speeds: tuple[Guess, ...]
     begin: np.ndarray
     span: tuple[float, float]
-    last: tuple[np.ndarray, np.ndarray] | None = None
+    last: dict[bytes, np.ndarray] = field(default_factory=dict)
+
+    def guesses(self) -> list[tuple[Signal, Guess]]:
+        """All unknowns with their guesses."""
+        return [(s, _Unknown(self, k, s.is_root)) for k, s in enumerate(self.unknowns)]
 
     def __call__(self, fraction: np.ndarray) -> np.ndarray:
         """Unknowns (n, m) at shares (n,); from where there are none those before."""
-        if self.last is not None and np.array_equal(self.last[0], fraction):
-            return self.last[1]
+        asked = fraction.tobytes()
+        if asked in self.last:
+            return self.last[asked]
         if fraction.size <= MOST_PLACES:
             found = self._completed(fraction)
         else:
             places = np.linspace(np.min(fraction), np.max(fraction), MOST_PLACES)
             found = np.column_stack([np.interp(fraction, places, y) for y in self._completed(places).T])
-        self.last = (fraction, found)
+        if len(self.last) == MOST_KEPT:
+            del self.last[next(iter(self.last))]
+        self.last[asked] = found
         return found
 
     def _completed(self, fraction: np.ndarray) -> np.ndarray:

@@ -9,6 +9,8 @@ from gantrytau_optimica.control.limits import value_at
 from gantrytau_optimica.problem.optimization import Point
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
+ROUNDING = 1e-12  # what is left of a rate that is zero
+
 
 def values_at_ends(
     dae: Dae, points: Sequence[Point], constraints: Sequence[ConstraintRow], chosen: Mapping[str, float]
@@ -43,7 +45,7 @@ def values_at_ends(
 
 
 def _following(dae: Dae, given: Mapping[str, float], known: set[str]) -> dict[str, float]:
-    """States that are not known, by symbol, as they follow from values at the same time; {} where they do not."""
+    """States that are not known, with their rates, by symbol, as they follow from values at the same time; or {}."""
     states = {alias.symbol for n in dae.states if (alias := dae.root(n)) is not None}
     missing = states - known
     if not missing or known <= states:
@@ -52,7 +54,9 @@ def _following(dae: Dae, given: Mapping[str, float], known: set[str]) -> dict[st
         point = dae.evaluate(given)
     except (InitializationError, StructureError):
         return {}  # told when the problem is solved
-    return {name: float(point[name]) for name in missing if name in point}
+    names = [*missing, *(f"der({n})" for n in missing if f"der({n})" not in known)]
+    found = {name: float(point[name]) for name in names if name in point}
+    return {name: 0.0 if abs(x) < ROUNDING else x for name, x in found.items()}
 
 
 def _number(dae: Dae, bound: ca.SX, chosen: Mapping[str, float]) -> float | None:

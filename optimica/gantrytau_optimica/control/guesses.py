@@ -49,12 +49,12 @@ def with_algebraics(built: Built, problem: ControlProblem) -> ControlProblem:
         symbols = {s.symbol.name(): s.guess for s in (*phase.states, *phase.inputs)}
         symbols |= {c.symbol.name(): _course(c, span) for c in phase.courses}
         own = {a.symbol.name(): a.guess for a in phase.algebraics if a.name not in built.closed}
-        found = dependent_guesses(built, phase, symbols, own, span)
-        algebraics, inputs = (
+        found = dependent_guesses(built, phase, symbols, {} if built.system.loops else own, span)
+        states, algebraics, inputs = (
             tuple(replace(s, guess=found.get(s.name, s.guess)) for s in part)
-            for part in (phase.algebraics, phase.inputs)
+            for part in (phase.states, phase.algebraics, phase.inputs)
         )
-        phases.append(replace(phase, algebraics=algebraics, inputs=inputs))
+        phases.append(replace(phase, states=states, algebraics=algebraics, inputs=inputs))
     return replace(problem, phases=tuple(phases))
 
 
