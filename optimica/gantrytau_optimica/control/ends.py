@@ -54,7 +54,7 @@ def _following(dae: Dae, given: Mapping[str, float], known: set[str]) -> dict[st
         point = dae.evaluate(given)
     except (InitializationError, StructureError):
         return {}  # told when the problem is solved
-    names = [*missing, *(f"der({n})" for n in missing if f"der({n})" not in known)]
+    names = [*missing, *(f"der({n})" for n in states if f"der({n})" not in known)]
     found = {name: float(point[name]) for name in names if name in point}
     return {name: 0.0 if abs(x) < ROUNDING else x for name, x in found.items()}
 
