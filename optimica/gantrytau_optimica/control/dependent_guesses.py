@@ -130,7 +130,7 @@ class _Whole:
         known = [s for s in (*phase.states, *phase.inputs, *phase.courses) if s.name not in chosen]
         slopes = ca.SX.sym("slope", len(moved))
         completion = Completion(
-            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved)] - slopes)),
+            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved), 0] - slopes)),
             ca.vertcat(problem.time, *(s.symbol for s in (*known, *moving.rates)), slopes),
             ca.vertcat(*(s.symbol for s in unknowns)),
             {
