@@ -208,10 +208,12 @@ class Prepared:
         found = self.solved(
             built, program, self._solver(program, replace(settings, max_iterations=most)), first
         )
-        if found.success or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
+        free = found.success and not found.solution.held
+        if free or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
             return found
         again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
-        return again if again.success or not found.success else found
+        better = again.objective < found.objective if found.success else True
+        return again if again.success and better else found if found.success else again
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""

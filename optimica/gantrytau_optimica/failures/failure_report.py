@@ -62,6 +62,10 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
     if solution.status != NOT_BEGUN:
         binding = [line for phase in phases for line in _binding(program, solution, phase)]
         lines += _list("At their limits:", binding + _binding_numbers(program, solution), 12)
+    if solution.held:
+        lines.append(
+            "Positions of loops rest where they are kept near the first guess: another way may be better, try starts=."
+        )
     if solution.success and not _objective_free(program):
         lines.append(
             "The objective depends on nothing that is free: any motion that keeps the limits is as good as this one."

@@ -19,7 +19,7 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 
 BESIDE = 0.5  # of the largest value, and of the way that is gone: how far beside the guess positions may be
 ANGLE = 1.0  # rad, or of a number without unit, the least of that
-MOST_CLOSE = 100  # iterations from a solution on
+MOST_CLOSE = 300  # iterations from a solution on
 MOST_WIDER = 5  # times that limits which bind are laid around the solution anew
 FASTER = 4.0  # times the way by its rates at two times: a position that goes farther between them has jumped
 LEAST_JUMP = 0.1  # of the largest value of a position, or rad
@@ -41,7 +41,7 @@ def solved_assembled(
         close = Solver(program, replace(solver.settings, near=True, max_iterations=MOST_CLOSE))
         wider = close.solve(narrow, solution.w, clock)
         if not wider.success:
-            break  # the motion that keeps to the narrower limits is one all the same
+            return replace(solution, held=True)  # a motion all the same
         solution = wider
     return solution
 

@@ -60,7 +60,7 @@ class Solution:
     """Unknowns w and multipliers as Ipopt left them; status in words; times in s.
 
     upright: whether its last steps were made without regularisation, so that curvature was positive in all directions
-    that conditions leave free.
+    that conditions leave free; held: whether positions rest on the limits that keep loops assembled as they are guessed.
     """
 
     w: np.ndarray
@@ -73,6 +73,7 @@ class Solution:
     iterations: int
     solve_time: float
     upright: bool = False
+    held: bool = False
 
 
 class Pressed(KeyboardInterrupt):

@@ -44,6 +44,13 @@ def test_loops_stay_assembled():
     assert np.all(np.abs(np.diff(optimum["robot.tool.q"], axis=0)) < 0.1)
 
 
+def test_what_rests_on_its_assembly_goes_on():
+    # the first answer, 0.278 s, rests where turntables are kept within 1 rad of the guess
+    optimum = optimize(carried("f1", 3), elements=20)
+    assert not optimum.solution.held
+    assert optimum.final_time < 0.2
+
+
 def test_a_jump_to_another_assembly_is_no_motion():
     optimum = optimize(turned(0), elements=20)
     (trajectory,) = optimum.phases.values()
