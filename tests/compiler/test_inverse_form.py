@@ -49,7 +49,7 @@ def test_both_ways_give_the_same_accelerations(name):
     forces = np.random.default_rng(3).uniform(-50.0, 50.0, len(dae.inputs))
     forwards, backwards = (rates(dae, way, forces) for way in ("forward", "inverse"))
     assert np.linalg.norm(forwards) > 1.0
-    np.testing.assert_allclose(backwards, forwards, atol=1e-8 * np.linalg.norm(forwards))
+    np.testing.assert_allclose(backwards, forwards, atol=1e-8 * float(np.linalg.norm(forwards)))
 
 
 def test_what_is_found_together_decides():

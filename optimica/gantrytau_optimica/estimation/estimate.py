@@ -78,7 +78,7 @@ def estimate(
     known = next(iter(trials[0].measured.values())).weighted
     read = plan(model, parameters, trials, {} if known else expected_noise(trials))
     _check_amount(read, known)
-    reached = BestSoFar(Clock(asked.max_time - (time.perf_counter() - begin), asked.progress), read.name)
+    reached = BestSoFar(Clock(asked.max_time - (time.perf_counter() - begin), asked.progress), read.read.name)
     built = _built(read)
     spent = time.perf_counter() - begin
     work = _Work(read, built, known, loss, asked, "elements" in policy, reached, spent)

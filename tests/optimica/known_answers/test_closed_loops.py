@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,7 +86,7 @@ def test_played_through_the_model_the_tool_arrives():
 
 
 def test_forces_in_costs_and_in_blocks():
-    problem = carried("six_D1", 2)
+    problem: Any = carried("six_D1", 2)
 
     class Gentle(problem):
         def integrand(self):

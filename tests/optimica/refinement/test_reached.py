@@ -43,7 +43,7 @@ def pressing(where: str, count: int = 1, press=lambda: signal.raise_signal(signa
     return progress, after
 
 
-def interrupted(problem=FastestMass, **policy) -> SolveError:
+def interrupted(problem: Any = FastestMass, **policy) -> SolveError:
     """The error of a call that was interrupted."""
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(SolveError) as caught:
