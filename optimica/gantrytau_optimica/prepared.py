@@ -36,6 +36,7 @@ MOST_FROM_COARSE = (
     200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
 )
 MOST_FIRM = 300  # iterations of the first attempt
+MOST_RAMPS = 100  # of one with inputs as ramps
 MOST_HOT = 60  # iterations of one that follows the structure of a solution: most take less than half
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 
@@ -173,20 +174,27 @@ class Prepared:
             if optimum.success:
                 return optimum
         optimum = self._twice(built, program, first)
-        if optimum.success:
-            return self._resized(optimum)
-        if self.refine is None or not self._reached.clock.left:
-            return optimum
-        layouts = program.places.layouts
+        return self._resized(optimum) if optimum.success else optimum
+
+    def _over_free(self, built: Built, program: Program) -> Optimum | None:
+        """With inputs as ramps, from the answer with inputs that are free at every point; None where either is not found."""
+        settings, layouts = self.solver.settings, program.places.layouts
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        solver = self._solver(plain, self.solver.settings)
+        solver = self._solver(
+            plain, replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
+        )
         free = self.solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
-            return optimum
-        again = self.solved(built, program, self.solver, warm_start(list(free.phases.values()), program))
-        return again if again.success else optimum
+            return None
+        first = warm_start(list(free.phases.values()), program)
+        for near in (True, False):
+            more = replace(settings, near=near, max_iterations=min(settings.max_iterations, MOST_FIRM))
+            again = self.solved(built, program, self._solver(program, more), first)
+            if again.success or not self._reached.clock.left:
+                return again if again.success else None
+        return None
 
     def _off_margins(self, found: Optimum, first: np.ndarray) -> Optimum:
         """An optimum that rests on no margins of square roots, if there is one nearby and time to look for it."""
@@ -200,20 +208,24 @@ class Prepared:
         return off_margins(found, solve) if self._reached.clock.left else found
 
     def _twice(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
-        """From one first guess, once with limits that count as much as the objective, and if need be once as it is."""
+        """From one first guess, once with limits that count as much as the objective, and if need be once as it is; where
+        inputs are to be ramps, over the answer without in between.
+        """
         settings = self.solver.settings
         if not settings.firm:
             return self.solved(built, program, self.solver, first)
-        most = min(settings.max_iterations, MOST_FIRM)
+        most = min(settings.max_iterations, MOST_FIRM if self.refine is None else MOST_RAMPS)
         found = self.solved(
             built, program, self._solver(program, replace(settings, max_iterations=most)), first
         )
         free = found.success and not found.solution.held
         if free or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
             return found
-        again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
-        better = again.objective < found.objective if found.success else True
-        return again if again.success and better else found if found.success else again
+        again = self._over_free(built, program) if self.refine is not None else None
+        if again is None:
+            again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
+        better = again.success and (not found.success or again.objective < found.objective)
+        return again if better or not found.success else found
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
