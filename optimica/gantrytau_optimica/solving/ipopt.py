@@ -188,7 +188,8 @@ class Solver:
             multipliers=np.array(found["lam_g"]).ravel(),
             bound_multipliers=np.array(found["lam_x"]).ravel() / scale,
             constraints=np.array(found["g"]).ravel(),
-            objective=float(np.array(found["f"]).item()),
+            # Ipopt has it with a last bit lost: scaled, and divided by the factor again
+            objective=float(self.nlp(found["x"], ca.DM(0, 1))[0]),
             success=bool(stats["success"]),
             status=status,
             iterations=int(stats["iter_count"]),
