@@ -7,6 +7,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from tests.families import NIGHTLY
+
 TESTS = Path(__file__).parent
 LONGEST = (  # fifteen seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/building/test_compiling.py",
@@ -54,7 +56,10 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("any machine")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not NIGHTLY:
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("nightly")])
+        items[:] = [item for item in items if not item.get_closest_marker("nightly")]
     place = {TESTS / file: k for k, file in enumerate(LONGEST)}
     # a stable sort: the others keep their order
     items.sort(key=lambda item: place.get(item.path, len(place)))

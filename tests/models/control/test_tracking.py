@@ -16,6 +16,7 @@ from gantrytau_models import (
     PidController,
     prototypes,
 )
+from tests.families import first_of
 
 CENTRE, RADIUS, ROUND = (0.5, 2.8, -0.8), 0.1, 1.0  # m, m, s
 HEAVIER = 12.0  # kg, of the plate; the controller knows of 9.13 kg
@@ -41,7 +42,7 @@ def largest_error(control, parameters):
     return np.linalg.norm(motion["error"], axis=1).max()
 
 
-@pytest.mark.parametrize("control", [CascadedController, PidController])
+@pytest.mark.parametrize("control", first_of([CascadedController, PidController]))
 @pytest.mark.parametrize(("mass", "ratio", "bound"), [(9.13, 30.0, 0.4e-3), (HEAVIER, 8.0, 2.5e-3)])
 def test_feedforward_makes_tracking_several_times_better(control, mass, ratio, bound):
     fed = largest_error(control, {"robot.plate_mass": mass})

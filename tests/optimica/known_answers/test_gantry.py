@@ -8,8 +8,10 @@ from gantrytau.commands.demo.motion_problems import LIMIT, FreePath, OnLine
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import final, initial, optimize
 from tests.benchmarks.pose_sweep import pairs, reach, sweep
+from tests.families import NIGHTLY
 
 START, END = np.array([0.0, 2.51, -1.03]), np.array([1.711, 3.46, -0.24])
+PAIRS = 4 if NIGHTLY else 2  # of poses
 
 
 @pytest.fixture(scope="module")
@@ -124,9 +126,9 @@ def test_an_unfinished_motion_can_be_looked_at(tmp_path):
 
 
 def test_random_pairs_of_poses_converge_from_their_straight_line():
-    verdicts = sweep(4, seed=7, elements=30).values
-    assert [v.status for v in verdicts] == ["solved"] * 4
-    for verdict, (start, end) in zip(verdicts, pairs(4, seed=7), strict=True):
+    verdicts = sweep(PAIRS, seed=7, elements=30).values
+    assert [v.status for v in verdicts] == ["solved"] * PAIRS
+    for verdict, (start, end) in zip(verdicts, pairs(PAIRS, seed=7), strict=True):
         assert verdict.start == tuple(start)
         assert verdict.end == tuple(end)
         assert min(reach(start), reach(end)) > 0.5

@@ -116,8 +116,13 @@ class Pick(Optimization):
             yield end(self.robot.tool.v) == 0
 
 
-def test_a_delta_robot_replays():
-    optimum = optimize(Pick, elements=12)
+@pytest.fixture(scope="module")
+def picked():
+    return optimize(Pick, elements=12)
+
+
+def test_a_delta_robot_replays(picked):
+    optimum = picked
     assert 0.05 < optimum.final_time < 0.6
     t = np.linspace(0.0, optimum.final_time, 1001)
     inputs = {f"arms[{k}].tau": (t, optimum.signal(f"robot.arms[{k}].tau")(t)) for k in range(3)}
@@ -127,7 +132,7 @@ def test_a_delta_robot_replays():
     np.testing.assert_allclose(found.final("tool.r"), [0.05, 0.0, -0.75], atol=5e-3)
 
 
-def test_a_mirror_image_of_a_move_takes_as_long():
+def test_a_mirror_image_of_a_move_takes_as_long(picked):
     class Back(Pick):
         def constraints(self):
             for arm in self.robot.arms:
@@ -139,5 +144,4 @@ def test_a_mirror_image_of_a_move_takes_as_long():
 
     # the limits are symmetric and there is no friction: time reversed, a motion is one as well; what is left is the
     # mesh, whose points are not symmetric
-    there, back = optimize(Pick, elements=15).final_time, optimize(Back, elements=15).final_time
-    assert back == pytest.approx(there, rel=5e-3)
+    assert optimize(Back, elements=12).final_time == pytest.approx(picked.final_time, rel=5e-3)
