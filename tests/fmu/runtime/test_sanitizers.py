@@ -5,19 +5,20 @@ import shutil
 
 import pytest
 
+from tests.families import first_of
 from tests.fmu.runtime.robust_models import SANITIZERS, compiler, driver, has_sanitizers, run, unpacked
 
 MODELS = (
     "parallelogram",
     "sledge",
     "juggled",
+    "stiffly_late",
     "stiffly_juggled",
     "late",
-    "stiffly_late",
 )  # implicit blocks; friction and samples; whens; delays
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", first_of(MODELS, 4))
 def test_addresses_undefined_behaviour_and_leaks(model):
     if not has_sanitizers():
         pytest.skip("gcc has no sanitizers")
@@ -25,7 +26,7 @@ def test_addresses_undefined_behaviour_and_leaks(model):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", first_of(MODELS, 4))
 def test_valgrind_finds_nothing(model):
     """Uninitialised values too, which the sanitizers do not see."""
     if shutil.which("valgrind") is None:

@@ -8,6 +8,7 @@ import pytest
 
 from gantrytau import Input, Model, Output, Real, der, fabs, floor, fmin, if_else, sin, sqrt, time
 from gantrytau_fmu import check_fmu, cosimulate, export_fmu
+from tests.families import first_of
 from tests.fmu.exported import export
 
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
@@ -119,8 +120,17 @@ def test_a_switch_is_located_whatever_the_step(fmus, model, solver, step):
     assert found.final(f"m.{name}") == pytest.approx(exact(3.0), abs=3e-9)  # thirty times the tolerance
 
 
-@pytest.mark.parametrize("model", [Relay, Pulses, Stairs, Diode], ids=lambda model: model.__name__)
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize(
+    ("fmi", "model"),
+    first_of(
+        [
+            *(("2.0", Relay), ("3.0", Pulses), ("2.0", Stairs), ("3.0", Diode)),
+            *(("3.0", Relay), ("2.0", Pulses), ("3.0", Stairs), ("2.0", Diode)),
+        ],
+        4,
+    ),
+    ids=lambda one: getattr(one, "__name__", one),
+)
 def test_model_exchange_turns_at_the_same_instants(tmp_path, model, fmi):
     import fmpy
 
