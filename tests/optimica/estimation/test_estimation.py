@@ -11,6 +11,7 @@ from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from tests.families import NIGHTLY
 from tests.optimica.estimation.estimation_data import (
     HOLES,
     NOISE,
@@ -108,6 +109,9 @@ def test_covariance_of_the_tanks_by_finite_differences_of_an_integrator(tanks):
     np.testing.assert_allclose(tanks.errors, errors(best), atol=1e-3)
 
 
+SEEDS = 30 if NIGHTLY else 12
+
+
 def misses(seed: int) -> dict[str, float]:
     """How far an estimate from noisy data is from the truth, in its own deviations."""
     fit = estimate(QuadrupleTank, BOTH, tank_experiment(seed), elements=20)
@@ -115,14 +119,14 @@ def misses(seed: int) -> dict[str, float]:
 
 
 def test_deviations_are_those_of_repeated_experiments():
-    found = study(misses, seeds=30)
+    found = study(misses, seeds=SEEDS)
     assert not found.failures
     assert found.result(seed=7) == misses(7)  # in another process, bit by bit
     for name in HOLES:
         apart = found.to_xarray()[name].values
-        # 99.9 % bands of the mean and of the standard deviation of 30 normal numbers
-        assert abs(apart.mean()) < 3.3 / np.sqrt(30)
-        low, high = np.sqrt(stats.chi2.ppf([5e-4, 1 - 5e-4], 29) / 29)
+        # 99.9 % bands of the mean and of the standard deviation of SEEDS normal numbers
+        assert abs(apart.mean()) < 3.3 / np.sqrt(SEEDS)
+        low, high = np.sqrt(stats.chi2.ppf([5e-4, 1 - 5e-4], SEEDS - 1) / (SEEDS - 1))
         assert low < apart.std(ddof=1) < high
 
 

@@ -8,11 +8,12 @@ from gantrytau import Input, Model, Parameter, Real, der
 from gantrytau_optimica import Free, Samples
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from tests.families import NIGHTLY
 from tests.optimica.estimation.estimation_data import Decay
 
 ROWS = np.linspace(1.0, 2.0, 20)
 TIMES = np.linspace(0.0, 3.0, 13)
-SEEDS = 25
+SEEDS = 25 if NIGHTLY else 12
 
 
 class Gauges(Model):

@@ -72,7 +72,7 @@ def test_a_motion_that_leads_where_the_model_ends():
         def constraints(self):
             yield final(self.root.x) <= -0.5
 
-    text = said(Beyond)
+    text = said(Beyond, elements=10)
     assert "root (Root), equation 1" in text or "`final(root.x) <= -0.5` is off by 0.5" in text
 
 
