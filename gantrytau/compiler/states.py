@@ -21,6 +21,10 @@ from gantrytau.language.symbols import derivative_name, split_derivative
 
 GOOD_PIVOT = 0.05  # of the column before elimination: smaller ones wait for a better preferred variable
 LEAST_PIVOT = 1e-9
+ILL = 1e3  # condition of a choice from which on it is gone through once more: those of most robots are below 600
+MOST_WORSE = 10.0  # times the condition: what a better preferred state may cost
+SCALINGS = 20
+LAST = StateSelect.ALWAYS + 1  # the weight of what the caller asks for
 
 
 @dataclass(frozen=True)
@@ -76,10 +80,10 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
     matrix = sizes_of_rows * matrix * sizes_of_columns
     matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
     asked = {split_derivative(n)[0] for n in wanted}
+    weights = [LAST if n in asked else int(preference.get(n, StateSelect.DEFAULT)) for n in columns]
     groups: dict[int, list[int]] = {}
-    for place, name in enumerate(columns):
-        weight = StateSelect.ALWAYS + 1 if name in asked else preference.get(name, StateSelect.DEFAULT)
-        groups.setdefault(int(weight), []).append(place)
+    for place in range(len(columns)):
+        groups.setdefault(weights[place], []).append(place)
     rest = matrix.copy()
     norms = np.linalg.norm(matrix, axis=0)
     chosen: list[int] = []
@@ -98,5 +102,46 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
             chosen.append(column)
     if len(chosen) < len(rows):
         raise dependent(title, [reduced.equations[i] for i in rows], matrix, LEAST_PIVOT)
-    singular_values = np.linalg.svd(matrix[:, chosen], compute_uv=False)
-    return [columns[j] for j in sorted(chosen)], float(singular_values[0] / singular_values[-1])
+    if _condition(matrix[:, chosen]) > ILL:
+        chosen = _exchanged(matrix, chosen, weights)
+    return [columns[j] for j in sorted(chosen)], _condition(matrix[:, chosen])
+
+
+def _exchanged(matrix: np.ndarray, chosen: Sequence[int], weights: Sequence[int]) -> list[int]:
+    """The dependent columns, where each that is more preferred than a state has changed places with it if it could.
+
+    In a basis B a column a = B c stands in for the one with the largest of c, by which det(B) is multiplied. Which columns
+    were left when others had been gone through depends on their order and sizes: a state that is hardly wanted may stay
+    where one that is would do as well. Each change makes a state more preferred, so that they end.
+    """
+    basis = list(chosen)
+    most = MOST_WORSE * _scaled_condition(matrix[:, basis])
+    changed = True
+    while changed:
+        changed = False
+        for state in sorted(set(range(len(weights))) - set(basis), key=lambda j: weights[j]):
+            better = [k for k, j in enumerate(basis) if weights[j] > weights[state]]
+            if not better:
+                continue
+            sizes = np.abs(np.linalg.lstsq(matrix[:, basis], matrix[:, state])[0])
+            sizes *= np.linalg.norm(matrix[:, basis], axis=0)
+            trial = list(basis)
+            trial[max(better, key=lambda k: sizes[k])] = state
+            if _scaled_condition(matrix[:, trial]) < most:
+                basis, changed = trial, True
+    return basis
+
+
+def _condition(matrix: np.ndarray) -> float:
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return float(values[0] / values[-1]) if values.size else 1.0
+
+
+def _scaled_condition(matrix: np.ndarray) -> float:
+    """The condition where the largest entries of rows and columns are brought to one (Ruiz, RAL-TR-2001-034)."""
+    for _ in range(SCALINGS):
+        rows, columns = (np.sqrt(np.max(np.abs(matrix), axis=k, keepdims=True)) for k in (1, 0))
+        if not (np.all(rows) and np.all(columns)):
+            return np.inf
+        matrix = matrix / rows / columns
+    return float(np.linalg.cond(matrix))
