@@ -1,7 +1,11 @@
 """Exported FMUs, each made once in a session, with libraries that may have been compiled before."""
 
+import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import pytest
 
@@ -9,6 +13,24 @@ from gantrytau import translate
 from gantrytau_fmu.building.platforms import Platform
 from tests.fmu.binaries_kept import libraries, remove_old
 from tests.fmu.exported import MODELS, Exported, export
+
+HERE = Path(__file__).parent
+
+
+VERSION = re.compile(r"(?<![\w.])(fmi)?[23](\.0)?(?![\w.])")  # of FMI, in the name of a case
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A case in both versions of FMI is one family: some run in FMI 2, the others in FMI 3, nightly all in both."""
+    families = defaultdict(list)
+    for item in items:
+        case = getattr(item, "callspec", None)
+        if case and {"version", "fmi", "fmu"} & case.params.keys() and item.path.is_relative_to(HERE):
+            families[VERSION.sub("", item.nodeid.rpartition("::")[2], count=1), item.path.name].append(item)
+    for case, family in families.items():
+        if len(family) == 2 and not any(item.get_closest_marker("nightly") for item in family):
+            family[crc32(repr(case).encode()) % 2].add_marker("nightly")
 
 
 @pytest.fixture(scope="session")
