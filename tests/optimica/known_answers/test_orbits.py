@@ -160,6 +160,7 @@ def test_the_largest_circle():
     assert -optimize(OrbitRaising, elements=100, guess=TWO_HALVES).objective == pytest.approx(value, abs=1e-7)
 
 
+@pytest.mark.nightly
 @pytest.mark.xfail(
     strict=True, reason="from a constant direction the search diverges on 100 elements, though not on 50"
 )

@@ -20,10 +20,11 @@ from gantrytau_optimica import (
     sensitivities,
     sum_of_squares,
 )
+from tests.families import first_of
 from tests.optimica.known_answers.known_problems import zero
 from tests.optimica.problems import Mass
 
-SCALES = [(1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]  # m, s
+SCALES = [(1e-6, 1e6), (1e6, 1e-6), (1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1e-6, 1e-6), (1e6, 1e6)]  # m, s
 
 
 def fastest(length: float, time: float, guess: float = 5.0) -> list[float]:
@@ -265,12 +266,12 @@ PROBLEMS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("length", "time"), SCALES)
+@pytest.mark.parametrize(("length", "time"), first_of(SCALES, 2))
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_units_do_not_change_the_answer(problem: Callable, length: float, time: float):
     # g of 1e18 is refused by the model itself, whose sums must not vanish beside it
-    scales = (length, 1.0) if problem is brachistochrone else (length, time)
-    assert problem(*scales) == pytest.approx([1.0] * len(problem(*scales)), abs=1e-6)
+    found = problem(length, 1.0 if problem is brachistochrone else time)
+    assert found == pytest.approx([1.0] * len(found), abs=1e-6)
 
 
 @pytest.mark.parametrize("guess", [1e-3, 1e3, 1e6])

@@ -11,6 +11,7 @@ from gantrytau import Fixed, Input, Model, Parameter, Real, between, cos, der, s
 from gantrytau_optimica import Free, Optimization, final, load_optimum, optimize, prepare
 from gantrytau_optimica.solving.curvature import least_curvature
 from gantrytau_optimica.solving.ipopt import objective_size
+from tests.families import NIGHTLY
 from tests.optimica.problems import Mass
 
 N, ROWS = 6, 2
@@ -46,10 +47,10 @@ def drawn(random, wanted):
 
 
 @pytest.mark.parametrize("kind", ["up", "down", "flat", "any"])
-def test_two_hundred_random_quadratics(kind):
+def test_random_quadratics(kind):
     random = np.random.default_rng(["up", "down", "flat", "any"].index(kind))
     prepared = prepare(Quadratic, parameters=["Q", "A", "c"])
-    for _ in range(50):
+    for _ in range(50 if NIGHTLY else 15):
         wanted = random.uniform(0.1, 3.0, N - ROWS)
         if kind == "down":
             wanted *= -1
