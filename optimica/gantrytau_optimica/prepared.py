@@ -15,6 +15,7 @@ from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.failures.held_ends import held_ends
+from gantrytau_optimica.failures.open_ends import open_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
@@ -95,11 +96,12 @@ class Prepared:
             built = replace(built, problem=with_margins(with_guesses(built, given)))
         program = self.program.with_numbers(built.problem)
         lost = out_of_reach(built)
-        if lost:
+        opened = "" if lost else open_ends(built)
+        if lost or opened:
             unsolved = self.solver.unsolved(program, first_guess(program))
             reached.keep(Optimum(read.name, built, program, unsolved, self.build_time))
             raise SolveError(
-                f"{read.name}: no solution: {reach_text(lost)}. Correct these conditions, or the "
+                f"{read.name}: no solution: {opened or reach_text(lost)}. Correct these conditions, or the "
                 "parameters of the model.",
                 equations=[x.equation for x in lost],
                 optimum=reached.best,

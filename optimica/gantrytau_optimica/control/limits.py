@@ -176,15 +176,25 @@ def value_at(expression: ca.SX, numbers: Mapping[int, float]) -> float:
     return float(ca.evalf(ca.substitute(expression, ca.vertcat(*leaves), values) if leaves else expression))
 
 
+def values_demanded(problem: ControlProblem) -> dict[Moment, list[tuple[ca.SX, Limit]]]:
+    """What is to have a number at the start or at the end of a phase, as an expression of signals, with its condition."""
+    meaning = _meanings(problem)
+    found: dict[Moment, list[tuple[ca.SX, Limit]]] = {}
+    for row in problem.boundary:
+        when, value = meaning.get(row.expression.element_hash(), (None, row.expression))
+        if when is not None and row.lower == row.upper:
+            found.setdefault(when, []).append((value, row))
+    return found
+
+
 def known_states(problem: ControlProblem) -> dict[Moment, dict[int, Limit]]:
     """Conditions that give a state a number at the start or at the end of a phase, by the hash of its symbol."""
     states = {s.symbol.element_hash() for phase in problem.phases for s in phase.states}
-    meaning = _meanings(problem)
     found: dict[Moment, dict[int, Limit]] = {}
-    for row in problem.boundary:
-        when, value = meaning.get(row.expression.element_hash(), (None, row.expression))
-        if when is not None and row.lower == row.upper and value.element_hash() in states:
-            found.setdefault(when, {})[value.element_hash()] = row
+    for when, demanded in values_demanded(problem).items():
+        for value, row in demanded:
+            if value.element_hash() in states:
+                found.setdefault(when, {})[value.element_hash()] = row
     return found
 
 
