@@ -196,11 +196,11 @@ print(f"slowest after breaking away: {np.min(faster['axis.carriage.v'][moving]) 
 # %% [markdown]
 # ## What the noise of the sensor does
 #
-# The speed sensor is noisy, with 0.3 rad/s from sample to sample. `study` runs both motions with four seeds each, on all
+# The speed sensor is noisy, with 0.3 rad/s from sample to sample. `study` runs both motions with two seeds each, on all
 # processors. Each seed is another stream of numbers, and gives the same answer whenever it is run again.
 
 # %%
-SEEDS = 4
+SEEDS = 2
 cases = study(
     Servo(),
     stop=1.2,
