@@ -38,7 +38,8 @@ MOST_FROM_COARSE = (
 )
 MOST_FIRM = 300  # iterations of the first attempt
 MOST_RAMPS = 100  # of one with inputs as ramps
-MOST_HOT = 60  # iterations of one that follows the structure of a solution: most take less than half
+MOST_HOT = 30  # iterations of one that follows the structure of a solution: those that find it take 1 to 20
+MOST_NEAR = 150  # of one on the next mesh, before the barrier begins high: three links take 30 to 40, on many elements 90
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
@@ -120,19 +121,16 @@ class Prepared:
         again = replace(settings, max_iterations=min(settings.max_iterations, MOST_AGAIN))
 
         def solve(program: Program, first: np.ndarray, hot: bool = False) -> Optimum:
-            """On the next mesh; with a low barrier where the high one leads to a worse branch, or to none; `hot` only so."""
-            if hot:
-                most = replace(again, hot=True, max_iterations=min(again.max_iterations, MOST_HOT))
-                return self.solved(optimum.built, program, self._solver(program, most), first)
-            found = self.solved(optimum.built, program, self._solver(program, again), first)
+            """On the next mesh; with a high barrier where the low one leads to a worse branch, or none; `hot` never so."""
+            few = MOST_HOT if hot else MOST_NEAR
+            close = replace(again, hot=hot, near=not hot, max_iterations=min(again.max_iterations, few))
+            found = self.solved(optimum.built, program, self._solver(program, close), first)
             worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
-            if (found.success and not worse) or not reached.clock.left:
+            if hot or (found.success and not worse) or not reached.clock.left:
                 return found
-            close = self.solved(
-                optimum.built, program, self._solver(program, replace(again, near=True)), first
-            )
-            closer = close.success and not (found.success and found.objective < close.objective)
-            return close if closer else found
+            high = self.solved(optimum.built, program, self._solver(program, again), first)
+            higher = high.success and not (found.success and found.objective < high.objective)
+            return high if higher else found
 
         def told(program: Program, first: np.ndarray, hot: bool = False) -> Optimum:
             found = solve(program, first, hot)

@@ -145,14 +145,14 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                 break
             clock.enter(f"{number}: solving on the next mesh")
             moving = moving and rounds[-1].defect < SMALL * accuracy
-            if moved and not moving:  # borders were moved to err more
-                optimum = best
+            if moved and not moving and kept < len(rounds) - 1:  # borders were moved to err more
+                optimum, by_arcs = best, False
             better, before, moved = None, optimum.objective, False
             if by_arcs and clock.left:
                 better = _solved_by_arcs(optimum, accuracy, len(rounds), solve)
                 by_arcs = better is not None
             if better is not None:
-                optimum = better
+                optimum, moved = better, _moves(better)
                 continue
             for how in [*(["moving"] if moving else []), "switches", "divided"]:
                 better = (
@@ -161,7 +161,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                     else None
                 )
                 if better is not None:
-                    moved = how == "moving"
+                    moved = _moves(better)
                     break
                 moving = False
             if better is None:
@@ -174,6 +174,11 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
         reached.best = newest.with_notes(refinement=refinement, search=search)
         raise
     return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)
+
+
+def _moves(optimum: Optimum) -> bool:
+    """Whether borders of its mesh move."""
+    return any(layout.mesh.moving for layout in optimum.program.places.layouts)
 
 
 def _solved_by_arcs(
@@ -197,7 +202,7 @@ def _solved_by_arcs(
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
     held = held_at_limits(program, trajectories) if number > ZOOMS else program
-    better = solve(held, warm_start(trajectories, held), hot=True)
+    better = solve(held, warm_start(trajectories, held), hot=number > ZOOMS)
     worse = better.objective - optimum.objective > WORSE * optimum.playback.objective_size
     if not better.success or worse:
         return None
@@ -227,16 +232,18 @@ def _kept(rounds: Sequence[Round], accuracy: float) -> int:
     last = len(rounds) - 1
     if last < 0:  # interrupted in the first
         return 0
-    return last if _holds(rounds, accuracy) else int(np.argmin([_off(rounds, k) for k in range(last + 1)]))
+    if _holds(rounds, accuracy):
+        return last
+    return min(range(last, -1, -1), key=lambda k: _off(rounds, k))  # of equals the last
 
 
 def _off(rounds: Sequence[Round], k: int) -> float:
     """By how much a round fails, relative: by what limits, conditions and objective are off, and by how much the objective
     differs from that of the round before, or after the first.
     """
-    one = rounds[k]
-    other = one.before if k else rounds[min(1, len(rounds) - 1)].objective
-    moved = abs(one.objective - other) / one.size
+    one, after = rounds[k], rounds[max(k, min(1, len(rounds) - 1))]
+    other = one.before if k else after.objective
+    moved = abs(one.objective - other) / after.size
     off = max(one.violation, one.defect, abs(one.error) / one.size, moved)
     return off if np.isfinite(off) else np.inf
 
