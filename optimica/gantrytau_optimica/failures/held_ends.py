@@ -15,7 +15,8 @@ import numpy as np
 from gantrytau import ModelError, StructureError
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Phase
-from gantrytau_optimica.control.limits import known_states, signal_limits
+from gantrytau_optimica.control.ends import values_at_ends
+from gantrytau_optimica.control.limits import signal_limits
 
 WORDS = {"initial": "start", "final": "end"}
 SLIGHT = 1e-6  # of a limit: what passes it by less is rounding
@@ -35,11 +36,12 @@ def held_ends(built: Built) -> list[str]:
     if inverse is None:
         return []
     found: list[str] = []
-    for (_, when), rows in known_states(problem).items():
-        values = [rows.get(s.symbol.element_hash()) for s in phase.states]
-        if any(row is None for row in values):
+    ends = values_at_ends(dae, built.points, built.constraints, {n.name: n.guess for n in problem.free})
+    for when in WORDS:
+        values = [ends.get(s.symbol.name(), {}).get(when) for s in phase.states]
+        if any(value is None for value in values):
             continue
-        x = np.array([row.lower for row in values if row is not None])
+        x = np.array([value for value in values if value is not None])
         names = ", ".join(f"{s.name} = {value:.6g}" for s, value in zip(phase.states, x, strict=True))
         needed = _inputs(inverse, x)
         if np.all(np.isfinite(needed)):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import SolveError, between
-from gantrytau_models import DeltaRobot, FourBar
+from gantrytau_models import DeltaRobot, FourBar, StewartPlatform
 from gantrytau_optimica import Free, Optimization, final, initial, optimize, prepare
 from gantrytau_optimica.failures.held_ends import held_ends
 
@@ -99,6 +99,44 @@ def test_what_holds_the_linkage_leaves_it_at_rest():
         )
         moved, free = (abs(float(forward(phi, 0.0, torque))) for torque in (float(found[1]), 0.0))
         assert moved < 1e-3 * free  # four digits are printed
+
+
+class Lift(Optimization):
+    """A Stewart platform from rest to rest, whose rates of quaternions are states that no condition names."""
+
+    robot: Any = StewartPlatform()
+    final_time = Free(0.5, unit="s", min=0.02)
+    most = 150.0
+
+    def objective(self):
+        return self.final_time
+
+    def constraints(self):
+        platform = self.robot.platform
+        for leg in self.robot.legs:
+            yield between(-self.most, leg.f, self.most)
+        for point, z in ((initial, 0.8), (final, 0.85)):
+            yield point(platform.r) == [0.0, 0.0, z]
+            yield point(platform.q[1:4]) == [0.0, 0.0, 0.0]
+            yield point(platform.v) == 0
+            yield point(platform.w) == 0
+
+
+def test_what_holds_a_platform_leaves_it_at_rest():
+    assert said(Lift) == []
+    prepared = prepare(type("Weak", (Lift,), dict(most=3.0)), elements=2)
+    start, _ = held_ends(prepared.built)
+    legs = [f"robot.legs[{k}].f" for k in range(6)]
+    forces = [float(value) for value in re.findall(f"legs.. = {NUMBER} N".replace("..", r"\[\d\]\.f"), start)]
+    dae = prepared.built.read.dae
+
+    pose = [0.8 if name == "robot.platform.r[2]" else 0.0 for name in dae.states]
+    function = dae.function([*dae.states, *legs], ["der(robot.platform.v[2])"])
+
+    def falling(values) -> float:
+        return abs(float(function(*pose, *values)))
+
+    assert falling(forces) < 2e-3 * falling([0.0] * 6)  # four digits are printed
 
 
 def test_the_error_of_a_solve_says_it():
