@@ -24,7 +24,7 @@ from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_so
 from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
-from gantrytau_optimica.refinement.refinement import refined, without_ramps
+from gantrytau_optimica.refinement.refinement import refined, solved_by_arcs, without_ramps
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import NOT_BEGUN, Solver, SolverSettings, objective_size
 from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
@@ -158,7 +158,9 @@ class Prepared:
         best, search = searched(
             lambda: self._alone(built, program, first, near), whole, self.starts, self.refine is not None
         )
-        best = self._off_margins(self._lowest(best, self.solver) if search is not None else best, first)
+        if search is not None and best.program.assembled is self.program.assembled:  # else it was looked at
+            best = self._lowest(best, self.solver)
+        best = self._off_margins(best, first)
         best = replace(best, search=search) if search is None else best.with_notes(search=search)
         if not best.success and search is not None and not reached.clock.left:
             raise reached.stopped(LATE)
@@ -177,21 +179,30 @@ class Prepared:
         return self._resized(optimum) if optimum.success else optimum
 
     def _over_free(self, built: Built, program: Program) -> Optimum | None:
-        """With inputs as ramps, from the answer with inputs that are free at every point; None where either is not found."""
+        """With inputs as ramps, from the answer with inputs that are free at every point: by its arcs if they tell all,
+        else on its mesh; None where either is not found.
+        """
         settings, layouts = self.solver.settings, program.places.layouts
+        settings = replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        solver = self._solver(
-            plain, replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
+        free = self.solved(
+            replace(built, problem=plain.problem), plain, self._solver(plain, settings), first_guess(plain)
         )
-        free = self.solved(replace(built, problem=plain.problem), plain, solver, first_guess(plain))
         if not free.success:
             return None
+
+        def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
+            few = replace(settings, hot=hot, max_iterations=min(settings.max_iterations, MOST_HOT))
+            return self.solved(built, program, self._solver(program, few), first)
+
+        by_arcs = solved_by_arcs(free, self.refine or 0.0, True, solve) if self._reached.clock.left else None
+        if by_arcs is not None:
+            return by_arcs
         first = warm_start(list(free.phases.values()), program)
         for near in (True, False):
-            more = replace(settings, near=near, max_iterations=min(settings.max_iterations, MOST_FIRM))
-            again = self.solved(built, program, self._solver(program, more), first)
+            again = self.solved(built, program, self._solver(program, replace(settings, near=near)), first)
             if again.success or not self._reached.clock.left:
                 return again if again.success else None
         return None
@@ -214,6 +225,11 @@ class Prepared:
         settings = self.solver.settings
         if not settings.firm:
             return self.solved(built, program, self.solver, first)
+        over = self.refine is not None
+        if over and built.system.loops:  # where ramps do not come quickly
+            again, over = self._over_free(built, program), False
+            if again is not None:
+                return again
         most = min(settings.max_iterations, MOST_FIRM if self.refine is None else MOST_RAMPS)
         found = self.solved(
             built, program, self._solver(program, replace(settings, max_iterations=most)), first
@@ -221,7 +237,7 @@ class Prepared:
         free = found.success and not found.solution.held
         if free or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
             return found
-        again = self._over_free(built, program) if self.refine is not None else None
+        again = self._over_free(built, program) if over else None
         if again is None:
             again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
         better = again.success and (not found.success or again.objective < found.objective)

@@ -149,7 +149,8 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                 optimum, by_arcs = best, False
             better, before, moved = None, optimum.objective, False
             if by_arcs and clock.left:
-                better = _solved_by_arcs(optimum, accuracy, len(rounds), solve)
+                known = len(rounds) > ZOOMS or _moves(optimum)
+                better = solved_by_arcs(optimum, accuracy, known, solve)
                 by_arcs = better is not None
             if better is not None:
                 optimum, moved = better, _moves(better)
@@ -181,32 +182,32 @@ def _moves(optimum: Optimum) -> bool:
     return any(layout.mesh.moving for layout in optimum.program.places.layouts)
 
 
-def _solved_by_arcs(
-    optimum: Optimum, accuracy: float, number: int, solve: Callable[..., Optimum]
+def solved_by_arcs(
+    optimum: Optimum, accuracy: float, known: bool, solve: Callable[..., Optimum]
 ) -> Optimum | None:
-    """After round `number`: on a mesh that shows the arcs, then with borders between them as unknowns.
+    """On a mesh that shows the arcs, or if they are `known` with borders between them as unknowns.
 
     None where there are no arcs, the program has no solution, or an input would rather leave the limit of its arc.
     """
     played = list(optimum.playback.phases.values())
-    if not all(_of_ramps(p.trajectory.phase) and _movable(p.trajectory.phase) for p in played):
-        return None
-    find = zoom_mesh if number <= ZOOMS else arc_mesh
+    find = arc_mesh if known else zoom_mesh
     meshes = [mesh for mesh in (find(one, accuracy) for one in played) if mesh is not None]
     if len(meshes) < len(played):
         return None
     trajectories = [one.trajectory for one in played]
     problem = with_ramps(optimum.program.problem, meshes)
-    if number > ZOOMS:
+    if not all(_of_ramps(phase) and _movable(phase) for phase in problem.phases):
+        return None
+    if known:
         problem = with_arcs(problem, trajectories, meshes)
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
-    held = held_at_limits(program, trajectories) if number > ZOOMS else program
-    better = solve(held, warm_start(trajectories, held), hot=number > ZOOMS)
+    held = held_at_limits(program, trajectories) if known else program
+    better = solve(held, warm_start(trajectories, held), hot=known)
     worse = better.objective - optimum.objective > WORSE * optimum.playback.objective_size
     if not better.success or worse:
         return None
-    if number <= ZOOMS or better.program is not held:
+    if not known or better.program is not held:
         return better
     if wrong_signs(held, trajectories, better.solution.bound_multipliers):
         return None
