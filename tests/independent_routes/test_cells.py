@@ -13,7 +13,7 @@ from gantrytau import GantryTauError, translate
 from tests.independent_routes.cells import GRAMMARS, Cell
 from tests.independent_routes.routes import answers
 
-MODELS = int(os.environ.get("GANTRYTAU_ROUTES", "100"))
+MODELS = int(os.environ.get("GANTRYTAU_ROUTES", "40"))
 SHARES = {"piecewise": 0.4, "scaled": 0.3, "curved": 0.3}
 EVERY = 4  # model as an FMU, which takes as long as all other routes together
 CLOSE = 1e-7  # of the size of an unknown

@@ -13,6 +13,7 @@ import pytest
 
 import gantrytau_optimica
 from gantrytau.commands.optimize_command import optimize
+from tests.families import first_of
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 
@@ -114,7 +115,7 @@ def test_the_motion_is_saved_and_drawn(run, move, tmp_path):
     assert len(np.unique(plt.imread(picture).reshape(-1, 4), axis=0)) > 20  # paper, axes, the lines' colours
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+@pytest.mark.parametrize("suffix", first_of([".csv", ".nc"]))
 def test_phases_are_saved_drawn_and_gone_on_from(run, answer, moves, tmp_path, suffix, monkeypatch):
     table, picture = tmp_path / f"moves{suffix}", tmp_path / "moves.png"
     problem, drawn = f"{moves}:ThereAndBack", "out.cart.x,back.cart.x,der(back.cart.v[0]),back.final_time"
