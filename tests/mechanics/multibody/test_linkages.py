@@ -17,6 +17,7 @@ from gantrytau.mechanics.multibody import (
     Universal,
     World,
 )
+from tests.families import first_of
 
 
 def test_a_loop_of_slides():
@@ -142,7 +143,7 @@ def test_bennett_linkage_moves():
     np.testing.assert_allclose([phi[2], phi[3]], [-phi[0], -phi[1]], atol=1e-10)
 
 
-@pytest.mark.parametrize("w", [2.0, 9.0])
+@pytest.mark.parametrize("w", first_of([2.0, 9.0]))
 def test_bennett_linkage_stays_closed_through_its_flat_pose(w):
     motion = simulate(bennett(1.0, w), stop=1.5, tolerance=1e-9, points=31)
     phi = motion["links[0].hinge.phi"]
