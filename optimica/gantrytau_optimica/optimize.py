@@ -143,7 +143,7 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
         else transcribe(built.problem, meshes, policy.collocation)
     )
     check_freedom(program)
-    solver = Solver(program, policy.solver)
+    solver = Solver(program, replace(policy.solver, loops=bool(built.system.loops)))
     return Prepared(
         built, program, solver, guess, time.perf_counter() - begin, policy.refine, policy.starts, near
     )
