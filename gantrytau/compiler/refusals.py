@@ -29,12 +29,12 @@ def unbalanced(reduced: Reduced, rows: list[dict[int, int]], flat: FlatModel) ->
             [reduced.unknowns[j] for j in found.undetermined], len(found.free), reduced, flat
         )
     if found.surplus:
-        causes = "".join(f" {words}." for words in _causes(reduced, flat))
+        causes = "".join(f" {words}." for words in _causes(reduced, flat, len(found.surplus)))
         text += causes + _overdetermined(found.overdetermined, len(found.surplus), reduced, rows, not causes)
     return StructureError(text)
 
 
-def _causes(reduced: Reduced, flat: FlatModel) -> list[str]:
+def _causes(reduced: Reduced, flat: FlatModel, surplus: int) -> list[str]:
     """What makes equations too many, in words: modifications, inputs and given names without which they are fewer."""
     inputs = set(flat.inputs)
     bound: dict[str, list[Equation]] = {}
@@ -66,7 +66,9 @@ def _causes(reduced: Reduced, flat: FlatModel) -> list[str]:
     known = [n for n in reduced.known if n not in flat.event_names]
     given = [n for n in known if n not in inputs and _helps(reduced, flat, open=n)]
     if given:
-        found.append(f"More is given than can be chosen; leave out {' or '.join(sorted(given)[:6])}")
+        rest = surplus - len(given)
+        more = f", and {rest} of the equations named below" if rest > 0 else ""
+        found.append(f"More is given than can be chosen; leave out {' or '.join(sorted(given)[:6])}{more}")
     inner = [
         v.name
         for v in flat.variables
