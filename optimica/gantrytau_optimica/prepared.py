@@ -38,7 +38,8 @@ MOST_FROM_COARSE = (
 )
 MOST_FIRM = 300  # iterations of the first attempt
 MOST_RAMPS = 100  # of one with inputs as ramps
-MOST_HOT = 30  # iterations of one that follows the structure of a solution: those that find it take 1 to 20
+MOST_HOT = 60  # iterations of one that looks closer at the structure of a solution: most take less than half
+MOST_HELD = 30  # with inputs held at limits on arcs: those that have a solution take 1 to 20
 MOST_NEAR = 150  # of one on the next mesh, before the barrier begins high: three links take 30 to 40, on many elements 90
 MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another mesh
 
@@ -122,7 +123,8 @@ class Prepared:
 
         def solve(program: Program, first: np.ndarray, hot: bool = False) -> Optimum:
             """On the next mesh; with a high barrier where the low one leads to a worse branch, or none; `hot` never so."""
-            few = MOST_HOT if hot else MOST_NEAR
+            moves = any(layout.knots.size for layout in program.places.layouts)
+            few = (MOST_HELD if moves else MOST_HOT) if hot else MOST_NEAR
             close = replace(again, hot=hot, near=not hot, max_iterations=min(again.max_iterations, few))
             found = self.solved(optimum.built, program, self._solver(program, close), first)
             worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
@@ -194,7 +196,7 @@ class Prepared:
             return None
 
         def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
-            few = replace(settings, hot=hot, max_iterations=min(settings.max_iterations, MOST_HOT))
+            few = replace(settings, hot=hot, max_iterations=min(settings.max_iterations, MOST_HELD))
             return self.solved(built, program, self._solver(program, few), first)
 
         by_arcs = solved_by_arcs(free, self.refine or 0.0, True, solve) if self._reached.clock.left else None

@@ -203,7 +203,7 @@ def solved_by_arcs(
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
     held = held_at_limits(program, trajectories) if known else program
-    better = solve(held, warm_start(trajectories, held), hot=known)
+    better = solve(held, warm_start(trajectories, held), hot=True)
     worse = better.objective - optimum.objective > WORSE * optimum.playback.objective_size
     if not better.success or worse:
         return None
