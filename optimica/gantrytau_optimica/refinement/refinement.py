@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
-from gantrytau_optimica.refinement.remesh import better_mesh
+from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -39,6 +39,7 @@ class Round:
     iterations: int
     error: float  # of the objective as played back
     size: float  # of the objective
+    told: bool = False  # whether limits tell all inputs, between borders that move: no mesh approximates them
     before: float = np.nan  # the objective of the round from which this one was made, NaN for the first
 
     def __str__(self) -> str:
@@ -70,11 +71,16 @@ class Refinement:
         if not self.rounds:
             return f"{word} {self.accuracy:g}{why}"
         first, last = self.rounds[0], self.rounds[-1]
-        change = abs(last.objective - last.before) if len(self.rounds) > 1 else 0.0
+        stands = "the first round is the last"
+        if last.told:
+            off = abs(last.error) / last.size
+            stands = f"the objective is off by {off:.2g} of its size, as all inputs stay at limits"
+        elif len(self.rounds) > 1:
+            stands = f"the last round changed the objective by {abs(last.objective - last.before):.2g}"
         held = "" if self.reached else f"; round {self.kept + 1} is kept, {self.rounds[self.kept]}"
         return (
             f"{word} {self.accuracy:g} in {len(self.rounds)} rounds{why}, {first.elements} to {last.elements} elements, "
-            f"{len(self.switches)} switches; the last round changed the objective by {change:.2g}{held}"
+            f"{len(self.switches)} switches; {stands}{held}"
         )
 
 
@@ -279,17 +285,18 @@ def _round(optimum: Optimum) -> Round:
     elements = sum(layout.mesh.elements for layout in optimum.program.places.layouts)
     defect = max((d.relative for d in played.defects), default=0.0) if played.complete else np.inf
     error, size = played.objective_error, played.objective_size
-    return Round(elements, optimum.objective, played.violation, defect, optimum.iterations, error, size)
+    told = _moves(optimum) and not any(open_elements(t).any() for t in optimum.phases.values())
+    return Round(elements, optimum.objective, played.violation, defect, optimum.iterations, error, size, told)
 
 
 def _holds(rounds: Sequence[Round], accuracy: float) -> bool:
-    """Whether limits and conditions hold and the objective stands still."""
-    if len(rounds) < 2:
+    """Whether limits and conditions hold and the objective stands still, or is known by playing back alone."""
+    if not rounds or (len(rounds) < 2 and not rounds[-1].told):
         return False
     last = rounds[-1]
     if max(last.violation, last.defect) > accuracy:
         return False
-    unmoved = abs(last.objective - last.before) <= accuracy * last.size
+    unmoved = last.told or abs(last.objective - last.before) <= accuracy * last.size
     return unmoved and abs(last.error) <= max(accuracy, REPLAYED) * last.size
 
 

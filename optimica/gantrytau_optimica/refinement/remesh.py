@@ -40,7 +40,7 @@ def better_mesh(
     every = _with_knots(borders, parts, knots)
     same = every.size == borders.size and np.allclose(every, borders, atol=1e-9)
     if same and trajectory.mesh.elements < PROVEN:  # only a finer mesh shows that this one was fine enough
-        every = _with_knots(borders, np.where(_open(trajectory), 2, 1), knots)
+        every = _with_knots(borders, np.where(open_elements(trajectory), 2, 1), knots)
     jumps = _apart(np.array([s.share for s in changes if "between" not in (s.before, s.after)]))
     jumps = np.array([k for k in jumps if np.any(np.abs(knots - k) < 1e-12)]) if movable else jumps[:0]
     return Mesh(every, tuple(int(k) for k in np.searchsorted(every, jumps)))
@@ -52,7 +52,7 @@ def at_knots(played: Replayed, accuracy: float, knots: np.ndarray) -> np.ndarray
     borders = trajectory.mesh.borders
     every = _with_knots(borders, _parts(played, accuracy), knots)
     if every.size == borders.size and np.allclose(every, borders, atol=SAME):
-        return _with_knots(borders, np.where(_open(trajectory), 2, 1), knots)
+        return _with_knots(borders, np.where(open_elements(trajectory), 2, 1), knots)
     return every
 
 
@@ -79,14 +79,14 @@ def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np
 
 def _at_junctions(trajectory: Trajectory) -> np.ndarray:
     """Elements at a limit beside one that is not, or at an end of the horizon: the input may leave it inside, (n,)."""
-    free = _open(trajectory)
+    free = open_elements(trajectory)
     if not np.any(free) and trajectory.mesh.elements > 2:
         return np.zeros(free.size, bool)
     beside = np.append(free[1:], True) | np.insert(free[:-1], 0, True)
     return ~free & beside & (trajectory.mesh.widths > 4 * LEAST)
 
 
-def _open(trajectory: Trajectory) -> np.ndarray:
+def open_elements(trajectory: Trajectory) -> np.ndarray:
     """Elements in which an input is nowhere at a limit: there it may be curved, (n,)."""
     phase = trajectory.phase
     limits = signal_limits(phase, trajectory.problem.name)

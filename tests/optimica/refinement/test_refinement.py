@@ -308,7 +308,7 @@ def test_the_record_of_a_refinement():
     assert all(r.violation >= 0 and r.defect >= 0 and r.iterations >= 0 for r in record.rounds)
     text = str(record)
     assert text.startswith(f"Refined to 1e-06 in {len(record.rounds)} rounds, 7 to ")
-    assert "1 switches; the last round changed the objective by" in text
+    assert "1 switches; the objective is off by" in text  # between limits there is nothing left to divide
     assert text in optimum.report()
     assert optimize(FastestMass, elements=7).refinement is None
 
