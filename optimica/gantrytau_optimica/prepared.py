@@ -37,7 +37,7 @@ MOST_FROM_COARSE = (
     200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
 )
 MOST_FIRM = 300  # iterations of the first attempt
-MOST_RAMPS = 100  # of one with inputs as ramps
+MOST_RAMPS = 150  # of one with inputs as ramps: GT-A takes 86 to 118
 MOST_HOT = 60  # iterations of one that looks closer at the structure of a solution: most take less than half
 MOST_HELD = 30  # with inputs held at limits on arcs: those that have a solution take 1 to 20
 MOST_NEAR = 150  # of one on the next mesh, before the barrier begins high: three links take 30 to 40, on many elements 90
