@@ -36,7 +36,7 @@ STRAYED = 1e-2  # relative: by how much an objective is worse on the next mesh i
 MOST_FROM_COARSE = (
     200  # iterations from a branch on a coarse mesh: GT-A takes 31 to 98; more leads to one known
 )
-MOST_FIRM = 300  # iterations of the first attempt
+MOST_FIRM = 300  # iterations of attempts before the last
 MOST_RAMPS = 150  # of one with inputs as ramps: GT-A takes 86 to 118
 MOST_HOT = 60  # iterations of one that looks closer at the structure of a solution: most take less than half
 MOST_HELD = 30  # with inputs held at limits on arcs: those that have a solution take 1 to 20
@@ -125,7 +125,8 @@ class Prepared:
             """On the next mesh; with a high barrier where the low one leads to a worse branch, or none; `hot` never so."""
             moves = any(layout.knots.size for layout in program.places.layouts)
             few = (MOST_HELD if moves else MOST_HOT) if hot else MOST_NEAR
-            close = replace(again, hot=hot, near=not hot, max_iterations=min(again.max_iterations, few))
+            barrier = "hot" if hot else "near"
+            close = replace(again, barrier=barrier, max_iterations=min(again.max_iterations, few))
             found = self.solved(optimum.built, program, self._solver(program, close), first)
             worse = found.objective - optimum.objective > STRAYED * optimum.playback.objective_size
             if hot or (found.success and not worse) or not reached.clock.left:
@@ -155,7 +156,8 @@ class Prepared:
             return solved_or_raise(self._off_margins(self._alone(built, program, first, near), first))
         reached, settings = self._reached, self.solver.settings
         most = min(settings.max_iterations, MOST_FROM_COARSE)
-        close = [replace(settings, near=near, max_iterations=most) for near in (True, False)]
+        few = replace(settings, max_iterations=most)
+        close = [replace(few, barrier="near"), few]
         whole = Attempts(built, program, close, reached, self.build_time)
         best, search = searched(
             lambda: self._alone(built, program, first, near), whole, self.starts, self.refine is not None
@@ -173,11 +175,11 @@ class Prepared:
         if near:
             settings = self.solver.settings
             most = min(settings.max_iterations, MOST_AGAIN)
-            nearby = self._solver(program, replace(settings, near=True, max_iterations=most))
+            nearby = self._solver(program, replace(settings, barrier="near", max_iterations=most))
             optimum = self.solved(built, program, nearby, first)
             if optimum.success:
                 return optimum
-        optimum = self._twice(built, program, first)
+        optimum = self._in_turn(built, program, first)
         return self._resized(optimum) if optimum.success else optimum
 
     def _over_free(self, built: Built, program: Program) -> Optimum | None:
@@ -196,15 +198,15 @@ class Prepared:
             return None
 
         def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
-            few = replace(settings, hot=hot, max_iterations=min(settings.max_iterations, MOST_HELD))
+            few = replace(settings, barrier="hot" if hot else "adaptive", max_iterations=min(settings.max_iterations, MOST_HELD))
             return self.solved(built, program, self._solver(program, few), first)
 
         by_arcs = solved_by_arcs(free, self.refine or 0.0, True, solve) if self._reached.clock.left else None
         if by_arcs is not None:
             return by_arcs
         first = warm_start(list(free.phases.values()), program)
-        for near in (True, False):
-            again = self.solved(built, program, self._solver(program, replace(settings, near=near)), first)
+        for way in (replace(settings, barrier="near"), settings):
+            again = self.solved(built, program, self._solver(program, way), first)
             if again.success or not self._reached.clock.left:
                 return again if again.success else None
         return None
@@ -212,7 +214,7 @@ class Prepared:
     def _off_margins(self, found: Optimum, first: np.ndarray) -> Optimum:
         """An optimum that rests on no margins of square roots, if there is one nearby and time to look for it."""
         settings = self.solver.settings
-        few = replace(settings, near=True, max_iterations=min(settings.max_iterations, MOST_CLOSER))
+        few = replace(settings, barrier="near", max_iterations=min(settings.max_iterations, MOST_CLOSER))
 
         def solve(built: Built, program: Program, near: bool) -> Optimum:
             solver = self._solver(program, few) if near else self.solver
@@ -220,30 +222,29 @@ class Prepared:
 
         return off_margins(found, solve) if self._reached.clock.left else found
 
-    def _twice(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
-        """From one first guess, once with limits that count as much as the objective, and if need be once as it is; where
-        inputs are to be ramps, over the answer without in between.
+    def _in_turn(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
+        """From one first guess: with limits that count as much as the objective, then with a barrier that falls no faster
+        than step by step, at last with the objective as it is; each one only where those before leave to be desired.
+        Inputs as ramps, where loops keep them from coming quickly, over the answer without.
         """
         settings = self.solver.settings
-        if not settings.firm:
-            return self.solved(built, program, self.solver, first)
-        over = self.refine is not None
-        if over and built.system.loops:  # where ramps do not come quickly
-            again, over = self._over_free(built, program), False
-            if again is not None:
-                return again
-        most = min(settings.max_iterations, MOST_FIRM if self.refine is None else MOST_RAMPS)
-        found = self.solved(
-            built, program, self._solver(program, replace(settings, max_iterations=most)), first
-        )
-        free = found.success and not found.solution.held
-        if free or found.solution.status == NOT_BEGUN or not self._reached.clock.left:
-            return found
-        again = self._over_free(built, program) if over else None
-        if again is None:
-            again = self.solved(built, program, self._solver(program, replace(settings, firm=False)), first)
-        better = again.success and (not found.success or again.objective < found.objective)
-        return again if better or not found.success else found
+        if settings.firm and self.refine is not None and built.system.loops:
+            over = self._over_free(built, program)
+            if over is not None or not self._reached.clock.left:
+                return over or self._reached.best
+        most = MOST_FIRM if self.refine is None else MOST_RAMPS
+        few = replace(settings, max_iterations=min(settings.max_iterations, most))
+        ways = [few, replace(few, barrier="patient"), replace(settings, firm=False)]
+        best: Optimum | None = None
+        for way in ways if settings.firm else [settings]:
+            found = self.solved(built, program, self._solver(program, way), first)
+            better = found.success and not (best and best.success and best.objective <= found.objective)
+            best = found if best is None or better or not best.success else best
+            free = best.success and not best.solution.held
+            if free or best.solution.status == NOT_BEGUN or not self._reached.clock.left:
+                break
+        assert best is not None
+        return best
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""
@@ -272,7 +273,7 @@ class Prepared:
             [layout.placed(found.solution.w).borders for layout in layouts],
         )
         program = transcribe(built.problem, meshes, layouts[0].scheme, located)
-        solver = self._solver(program, replace(self.solver.settings, near=True))
+        solver = self._solver(program, replace(self.solver.settings, barrier="near"))
         again = self.solved(built, program, solver, warm_start(list(found.phases.values()), program))
         return replace(again, left=found.left + again.left) if again.success else found
 

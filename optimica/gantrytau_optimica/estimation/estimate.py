@@ -274,7 +274,7 @@ class _Work:
     def solve(self, found: Residuals, w: np.ndarray, weights: Weights) -> np.ndarray | None:
         """Unknowns by Ipopt from unknowns near them; None where it finds none. Raises TimeOver."""
         program = _weighted(found.program, weights)
-        solver = Solver(program, replace(self.settings, near=True))
+        solver = Solver(program, replace(self.settings, barrier="near"))
         solution = solver.solve(program, w, self.reached.clock)
         if not self.reached.clock.left:
             raise TimeOver

@@ -38,7 +38,7 @@ def solved_assembled(
         if not (solution.success and clock.left and rests_on(narrow, program, solution.w)):
             break
         narrow = assembled_near(program, loops, solution.w)
-        close = Solver(program, replace(solver.settings, near=True, max_iterations=MOST_CLOSE))
+        close = Solver(program, replace(solver.settings, barrier="near", max_iterations=MOST_CLOSE))
         wider = close.solve(narrow, solution.w, clock)
         if not wider.success:
             return replace(solution, held=True)  # a motion all the same

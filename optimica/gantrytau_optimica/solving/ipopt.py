@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -43,7 +43,6 @@ LEAST_PIVOT = 1e-4
 LAST = 3  # steps that tell whether a solution is a minimum
 FAR = 1e5  # typical sizes that an unknown moves from its guess when it runs away
 
-# From a solution nearby the barrier begins low: begun high, it may lead to another branch.
 NEAR = {
     "mu_strategy": "monotone",
     "mu_init": 1e-4,
@@ -51,9 +50,16 @@ NEAR = {
     "bound_frac": 1e-5,
     "slack_bound_push": 1e-5,
 }
-
-# On a mesh that only follows the structure of a solution the barrier may begin lower still.
-HOT = NEAR | {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6, "slack_bound_push": 1e-6}
+Barrier = Literal["adaptive", "patient", "near", "hot"]
+BARRIERS: dict[Barrier, dict[str, Any]] = {
+    "adaptive": {"mu_strategy": "adaptive"},
+    # lowered by one law it cannot vanish long before the limits that bind are found
+    "patient": {"mu_strategy": "monotone", "mu_init": 0.1},
+    # from a solution nearby it begins low: begun high, it may lead to another branch
+    "near": NEAR,
+    # on a mesh that only follows the structure of a solution it may begin lower still
+    "hot": NEAR | {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6, "slack_bound_push": 1e-6},
+}
 
 SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
 STEEP = 1e2  # slopes by one unknown are scaled down to this
@@ -100,11 +106,8 @@ class SolverSettings:
     max_iterations: int = 1000
     max_time: float = 300.0
     progress: Progress | None = None
-    near: bool = (
-        False  # whether guesses are solutions of nearly the same program, from which it must not stray
-    )
+    barrier: Barrier = "adaptive"
     firm: bool = True  # whether the limits shall count as much as an objective that is one unknown
-    hot: bool = False  # whether they are so close that limits which bind there will bind
     loops: bool = False  # whether unknowns are found by iteration, so that pivots matter
 
 
@@ -121,7 +124,7 @@ class Solver:
             "ipopt": {
                 "print_level": 0,
                 "sb": "yes",
-                "mu_strategy": "adaptive",
+                **BARRIERS[settings.barrier],
                 "linear_solver": "mumps",
                 "mumps_pivot_order": LEAST_DEGREE,
                 "tol": settings.tolerance,
@@ -132,8 +135,6 @@ class Solver:
                 "compl_inf_tol": UNLIMITED,
             },
         }
-        if settings.near or settings.hot:
-            options["ipopt"] |= HOT if settings.hot else NEAR
         if settings.loops:
             options["ipopt"]["mumps_pivtol"] = LEAST_PIVOT
         options["ipopt"]["obj_scaling_factor"] = _objective_scale(program, FEW if settings.firm else 1.0)

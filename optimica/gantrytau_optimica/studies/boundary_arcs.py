@@ -50,7 +50,7 @@ def with_free_ends(optimum: Optimum) -> tuple[Program, Solution] | None:
     program = transcribe(without_ramps(optimum.program.problem), meshes, scheme, located)
     first = warm_start(trajectories, program)
     program = _held(program, first)
-    solution = Solver(program, SolverSettings(near=True, max_iterations=MOST)).solve(program, first)
+    solution = Solver(program, SolverSettings(barrier="near", max_iterations=MOST)).solve(program, first)
     near = abs(solution.objective - optimum.objective) <= SAME * abs(optimum.objective)
     return (program, solution) if solution.success and near and _holds(program, solution) else None
 
