@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
-from gantrytau_optimica.control.guesses import guess_of, number_guess
+from gantrytau_optimica.control.guessing.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.open_ends import open_ends
@@ -198,7 +198,11 @@ class Prepared:
             return None
 
         def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
-            few = replace(settings, barrier="hot" if hot else "adaptive", max_iterations=min(settings.max_iterations, MOST_HELD))
+            few = replace(
+                settings,
+                barrier="hot" if hot else "adaptive",
+                max_iterations=min(settings.max_iterations, MOST_HELD),
+            )
             return self.solved(built, program, self._solver(program, few), first)
 
         by_arcs = solved_by_arcs(free, self.refine or 0.0, True, solve) if self._reached.clock.left else None
@@ -230,8 +234,8 @@ class Prepared:
         settings = self.solver.settings
         if settings.firm and self.refine is not None and built.system.loops:
             over = self._over_free(built, program)
-            if over is not None or not self._reached.clock.left:
-                return over or self._reached.best
+            if over is not None:
+                return over
         most = MOST_FIRM if self.refine is None else MOST_RAMPS
         few = replace(settings, max_iterations=min(settings.max_iterations, most))
         ways = [few, replace(few, barrier="patient"), replace(settings, firm=False)]

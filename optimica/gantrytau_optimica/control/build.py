@@ -24,7 +24,8 @@ from gantrytau_optimica.control.control_problem import (
     PointValue,
     Signal,
 )
-from gantrytau_optimica.control.guesses import first_guesses, horizon, number_guess
+from gantrytau_optimica.control.guessing.guesses import first_guesses, horizon, number_guess
+from gantrytau_optimica.control.guessing.pace import at_pace
 from gantrytau_optimica.control.input_rates import Rates, check_pieces, check_reached, input_rates, lifted
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
 from gantrytau_optimica.control.root_margins import with_margins
@@ -91,7 +92,7 @@ def build(
     check_reached(draft, zip(limits, rows[::3], strict=True))
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
-    built = Built(read, draft, system, numbers, points, constraints, closed, causality)
+    built = at_pace(Built(read, draft, system, numbers, points, constraints, closed, causality), guess)
     return replace(built, problem=with_margins(with_sizes(with_guesses(built, guess))))
 
 

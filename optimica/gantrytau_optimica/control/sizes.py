@@ -4,9 +4,11 @@
 
 slope_rj: steepest slope of a row by an unknown along the first guess; known_r: what stands in it beside the unknowns, as a
 bound. A row of a state is T x' over the horizon T, in which the state itself has the slope 1. Sizes are those declared,
-else those of limits, else those of the guess; what is zero there has the size that balances its rows.
+else those of limits, else those of the guess, where the elements of a vector share the largest; what is zero there has the
+size that balances its rows.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
-from gantrytau_optimica.control.guesses import horizon
+from gantrytau_optimica.control.guessing.guesses import horizon
 from gantrytau_optimica.control.limits import signal_limits
 
 LOOSE = 1e4  # times the size that the rest tells: a limit that is farther away says nothing of the size
@@ -122,12 +124,26 @@ def _said(
     signals = np.array(rows, dtype=float).reshape(-1, 3)
     noise = NOISE * np.max(signals[:, 2], initial=0.0)
     signals[~(signals[:, 2] > noise), 2] = np.nan
+    signals[:, 2] = _largest_of_vectors([_vector(s.name) for s in problem.signals], signals[:, 2])
     numbers = [
         (n.nominal or np.nan, np.nan if n.guess else _largest((n.min, n.max)), abs(n.guess) or np.nan)
         for n in problem.free
     ]
     declared, limits, guesses = np.vstack([signals, np.array(numbers, dtype=float).reshape(-1, 3)]).T
     return declared, limits, np.fmax(guesses, _measured(problem))
+
+
+def _vector(name: str) -> str:
+    """The vector of which this is an element, or its rate."""
+    return re.sub(r"\[\d+\](\)*)$", r"\1", name)
+
+
+def _largest_of_vectors(vectors: Sequence[str], sizes: np.ndarray) -> np.ndarray:
+    """For each element the largest size of its vector: where it is zero along one axis the others tell how it moves."""
+    largest: dict[str, float] = {}
+    for vector, size in zip(vectors, sizes, strict=True):
+        largest[vector] = float(np.fmax(largest.get(vector, np.nan), size))
+    return np.array([largest[vector] for vector in vectors], dtype=float)
 
 
 def _largest(bounds: Sequence[float]) -> float:
@@ -168,12 +184,8 @@ def _ways(
 
 def _like_siblings(problem: ControlProblem, sizes: np.ndarray) -> np.ndarray:
     """Sizes with those that are missing like the largest of their vector, if one of it is known."""
-    vectors = [s.name.split("[")[0] if s.name.endswith("]") else s.name for s in problem.signals]
-    vectors += [n.name for n in problem.free]
-    largest: dict[str, float] = {}
-    for name, size in zip(vectors, sizes, strict=True):
-        largest[name] = float(np.fmax(largest.get(name, np.nan), size))
-    return np.where(np.isnan(sizes), [largest[name] for name in vectors], sizes)
+    names = [*(s.name for s in problem.signals), *(n.name for n in problem.free)]
+    return np.where(np.isnan(sizes), _largest_of_vectors([_vector(n) for n in names], sizes), sizes)
 
 
 def _balance(problem: ControlProblem, around: np.ndarray) -> Balance:
