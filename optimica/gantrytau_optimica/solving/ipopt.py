@@ -63,9 +63,8 @@ BARRIERS: dict[Barrier, dict[str, Any]] = {
 
 SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
 STEEP = 1e2  # slopes by one unknown are scaled down to this
-FEW = (
-    1e2  # unknowns that share the slope of an objective: where they are fewer, the whole is scaled up as much
-)
+FEW = 1e2  # times an objective of few unknowns is scaled up
+ALONE = 3.0  # unknowns that share its slope: fewer are few
 FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by accident
 
 
@@ -257,7 +256,7 @@ def _objective_slopes(program: Program) -> tuple[np.ndarray, np.ndarray]:
 def _objective_scale(program: Program, few: float) -> float:
     """A factor that makes an objective neither so flat that any point is taken for its optimum, nor so steep that none is.
 
-    few: unknowns that share its slope where they are enough. The time of a motion is one unknown: what all limits together
+    few: what an objective of few unknowns is scaled up by. The time of a motion is one unknown: what all limits together
     are worth is its slope, each of them so little that the barrier vanishes long before those that bind are found.
     Ipopt by itself scales down what is steep at the guess, by no more than 1e8.
     """
@@ -266,5 +265,5 @@ def _objective_scale(program: Program, few: float) -> float:
     if size <= 0.0:
         return 1.0
     sharing = size**2 / float(np.sum(slopes**2))
-    wanted = max(SLOPE * max(few / sharing, 1.0) / size, 1.0) * min(STEEP / steepest, 1.0)
+    wanted = max(SLOPE * (few / sharing if sharing < ALONE else 1.0) / size, 1.0) * min(STEEP / steepest, 1.0)
     return wanted / max(min(STEEP / max(np.max(at_guess, initial=0.0), 1e-300), 1.0), 1e-8)
