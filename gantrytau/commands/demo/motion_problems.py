@@ -1,11 +1,13 @@
-"""The minimum-time motions of thesis Table 3.1 as problems."""
+"""The minimum-time motions of thesis Table 3.1, and one of the robot with six links, as problems."""
 
-from gantrytau import Input, Parameter, Real
-from gantrytau_models import GantryTau, prototypes
+from gantrytau import Input, Parameter, Real, between
+from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial
 
 START, END = (0.0, 2.51, -1.03), (1.711, 3.46, -0.24)  # m
 LIMIT = 6.337  # N.m, of each motor
+SIX_LINK_START, SIX_LINK_END = (-0.381, -4.235, -0.014), (0.318, -4.682, 0.154)  # m
+FORCE = 1200.0  # N, of each cart of the robot with six links
 
 
 class RobotOnLine(GantryTau):
@@ -51,3 +53,21 @@ class OnLine(FreePath):
 
     robot = RobotOnLine(prototypes.GT_A)
     given = ("torque[2]",)
+
+
+class SixLinks(Optimization):
+    """Carry the plate of the robot D1 as fast as its carts allow: six rods hold it, and no closed form knows how."""
+
+    robot = SixLinkGantryTau(prototypes.D1)
+    final_time = Free(1.0, unit="s", min=0.05, max=5.0, description="duration of the motion")
+
+    def objective(self):
+        return self.final_time
+
+    def constraints(self):
+        for cart in self.robot.carts:
+            yield between(-FORCE, cart.f, FORCE)
+        yield initial(self.robot.tool.r) == SIX_LINK_START
+        yield final(self.robot.tool.r) == SIX_LINK_END
+        yield initial(self.robot.tool.v) == 0
+        yield final(self.robot.tool.v) == 0
