@@ -24,7 +24,6 @@ from gantrytau.commands.demo.thesis_table import (
     table,
 )
 from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, MISUSE, as_json
-from gantrytau.ensembles.each import each
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -100,50 +99,26 @@ def save_trajectory(optimum: "Optimum", file: Path) -> None:
 
 
 def _solve(screen: "Console") -> "tuple[dict[str, Optimum], dict[str, float]]":
-    """All motions and the seconds that each took: the first with progress on the screen, the rest on all processors."""
-    titles = {row.key: row.title for row in ROWS} | {BRANCH: BRANCH_TITLE, SIX_LINK: SIX_LINK_TITLE}
-    first = ROWS[0].key
-    keys = [first, SIX_LINK, BRANCH, *(row.key for row in ROWS[1:])]  # what takes longest begins first
+    """All motions, with progress on the screen, and the seconds that each took."""
+    from gantrytau.commands.demo.motion_problems import FreePath, OnLine, SixLinks
+    from gantrytau_optimica import optimize
+
+    motions: list[tuple[str, str, Any, dict[str, Any]]] = [
+        (row.key, row.title, (OnLine if row.line else FreePath)(weight=row.weight), {}) for row in ROWS
+    ]
+    motions.append((BRANCH, BRANCH_TITLE, FreePath, {"starts": STARTS}))
+    motions.append((SIX_LINK, SIX_LINK_TITLE, SixLinks, {"elements": 20}))
     optima: dict[str, Optimum] = {}
     seconds: dict[str, float] = {}
-    with screen.status(f"{titles[first]}: translating and building") as status:
-        for place, (optimum, took) in each(_Solving(status.update), keys, len(keys)):
-            key = keys[place]
-            optima[key], seconds[key] = optimum, took
-            screen.print(f"solved {titles[key]}: T = {optimum.final_time:.5f} s")
-            left = [title for key, title in titles.items() if key not in optima]
-            status.update(f"solving {', '.join(left)}")
+    with screen.status("translating the robot") as status:
+
+        def reporter(title: str) -> Callable[[int, float], None]:
+            return lambda iteration, cost: status.update(f"{title}: iteration {iteration}, cost {cost:.4f}")
+
+        for key, title, problem, policy in motions:
+            status.update(f"{title}: translating and building")
+            begun = time.perf_counter()
+            optima[key] = optimize(problem, refine=ACCURACY, progress=reporter(title), **policy)
+            seconds[key] = time.perf_counter() - begun
+            screen.print(f"solved {title}: T = {optima[key].final_time:.5f} s")
     return optima, seconds
-
-
-class _Solving:
-    """Solves the motion of a key; progress is shown where the screen is, not in other processes."""
-
-    def __init__(self, show: Callable[[str], None]):
-        self.show = show
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"show": _unseen}
-
-    def __call__(self, key: str) -> "tuple[Optimum, float]":
-        from gantrytau.commands.demo.motion_problems import FreePath, OnLine, SixLinks
-        from gantrytau_optimica import optimize
-
-        def report(iteration: int, objective: float) -> None:
-            self.show(f"iteration {iteration}, cost {objective:.4f}")
-
-        begun = time.perf_counter()
-        if key == SIX_LINK:  # straight lines as forces are found from a solution, not from a first guess
-            plain = optimize(SixLinks, elements=20, progress=report)
-            optimum = optimize(SixLinks, elements=20, guess=plain, refine=ACCURACY, progress=report)
-        elif key == BRANCH:
-            optimum = optimize(FreePath, starts=STARTS, refine=ACCURACY, progress=report)
-        else:
-            row = next(row for row in ROWS if row.key == key)
-            problem = (OnLine if row.line else FreePath)(weight=row.weight)
-            optimum = optimize(problem, refine=ACCURACY, progress=report)
-        return optimum, time.perf_counter() - begun
-
-
-def _unseen(text: str) -> None:
-    """Shows nothing."""

@@ -31,16 +31,18 @@ def at_pace(built: Built, given: Mapping[str, Any]) -> Built:
     if place is None or built.problem.free[place].name in given:
         return built
     number = built.problem.free[place]
-    duration = number.guess
+    found = built
     for _ in range(MOST_PACES):
-        share = _share(_lasting(built, place, duration), given)
+        share = _share(found, given)
         if share is None:
             return built
         if NEAR[0] <= share <= NEAR[1]:
-            break
+            return found
         change = float(np.clip(np.sqrt(share), 1 / MOST_CHANGE, MOST_CHANGE))
-        duration = float(np.clip(duration * change, number.min, number.max))
-    return _lasting(built, place, duration) if FAIR[0] <= share <= FAIR[1] else built
+        duration = float(np.clip(found.problem.free[place].guess * change, number.min, number.max))
+        found = _lasting(built, place, duration)
+    share = _share(found, given)
+    return found if share is not None and FAIR[0] <= share <= FAIR[1] else built
 
 
 def _duration(problem: ControlProblem) -> int | None:
