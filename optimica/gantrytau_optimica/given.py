@@ -7,7 +7,7 @@ from gantrytau import ModelError, Result
 from gantrytau.flattening.shapes import elements_of
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
-from gantrytau_optimica.control.guessing.guesses import guess_of
+from gantrytau_optimica.control.first_guesses.guesses import guess_of
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
 
 

@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
-from gantrytau_optimica.control.guessing.guesses import guess_of, number_guess
+from gantrytau_optimica.control.first_guesses.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.open_ends import open_ends

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase
-from gantrytau_optimica.control.guessing.guesses import horizon
+from gantrytau_optimica.control.first_guesses.guesses import horizon
 from gantrytau_optimica.control.sizes import BESIDE, SHARES
 
 NEAREST = 0.1  # of its largest value on the guess, as the guess itself keeps off zero

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
-from gantrytau_optimica.control.guessing.guesses import horizon
+from gantrytau_optimica.control.first_guesses.guesses import horizon
 from gantrytau_optimica.control.limits import signal_limits
 
 LOOSE = 1e4  # times the size that the rest tells: a limit that is farther away says nothing of the size

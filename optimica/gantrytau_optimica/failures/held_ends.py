@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau import ModelError, StructureError
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Phase
-from gantrytau_optimica.control.guessing.ends import values_at_ends
+from gantrytau_optimica.control.first_guesses.ends import values_at_ends
 from gantrytau_optimica.control.limits import signal_limits
 
 WORDS = {"initial": "start", "final": "end"}

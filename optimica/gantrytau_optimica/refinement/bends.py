@@ -23,7 +23,7 @@ from scipy.special import ndtri  # the inverse of the normal distribution
 from gantrytau import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, FreeNumber, Phase, Signal
-from gantrytau_optimica.control.guessing.guesses import Guess, horizon
+from gantrytau_optimica.control.first_guesses.guesses import Guess, horizon
 from gantrytau_optimica.control.limits import signal_limits
 
 SHARE = 0.4  # of the way from start to end, by which the first guesses are bent: of 0.1, 0.25 and 0.4 it finds most branches

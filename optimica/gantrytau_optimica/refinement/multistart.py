@@ -14,7 +14,7 @@ from gantrytau.ensembles.each import each
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.control.guessing.guesses import with_algebraics
+from gantrytau_optimica.control.first_guesses.guesses import with_algebraics
 from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.refinement.attempts import Attempts
 from gantrytau_optimica.refinement.bends import bends

@@ -12,7 +12,7 @@ from gantrytau import Dae, ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.control.guessing.guesses import Stretched
+from gantrytau_optimica.control.first_guesses.guesses import Stretched
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.mesh import Mesh
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.control.guessing.completion import driven
-from gantrytau_optimica.control.guessing.guesses import first_guesses
+from gantrytau_optimica.control.first_guesses.completion import driven
+from gantrytau_optimica.control.first_guesses.guesses import first_guesses
 from gantrytau_optimica.control.limits import signal_limits
 
 MOST_PACES = 4  # durations that are tried

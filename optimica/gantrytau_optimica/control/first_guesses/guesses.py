@@ -13,8 +13,8 @@ from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase
-from gantrytau_optimica.control.guessing.dependent_guesses import Guess, dependent_guesses
-from gantrytau_optimica.control.guessing.ends import values_at_ends
+from gantrytau_optimica.control.first_guesses.dependent_guesses import Guess, dependent_guesses
+from gantrytau_optimica.control.first_guesses.ends import values_at_ends
 
 RAMP = 0.3  # share of the time in which a motion from rest to rest speeds up, and again slows down
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Course, Phase, Signal
-from gantrytau_optimica.control.guessing.completion import Completion, Driven, driven
+from gantrytau_optimica.control.first_guesses.completion import Completion, Driven, driven
 
 Guess = Callable[[np.ndarray], np.ndarray]
 LEAST_ROOT = (
