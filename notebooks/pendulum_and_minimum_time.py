@@ -138,7 +138,7 @@ class FreePath(Optimization):
 
 fastest = optimize(FreePath)
 print(f"{fastest.final_time:.5f} s after {fastest.iterations} iterations")
-assert fastest.final_time < 0.9137  # 0.91351 s, or the faster branch
+assert fastest.final_time < 0.9145  # 0.9134 to 0.9142 s by where 50 elements stand, or the faster branch
 
 # %% [markdown]
 # ## Along a line
