@@ -292,8 +292,8 @@ figure
 
 # %% [markdown]
 # The slope between two neighbours must lie between their weights. The knee is what one would run: at w = 0.003 the
-# robot is 3 % faster than on the line for a few per cent more energy. The line itself lies above the curve: there are motions that
-# take less of both.
+# robot is 3 % faster than on the line for a few per cent more energy. The line itself lies above the curve: there are
+# motions that take less of both.
 
 # %%
 slopes = -np.diff(trade["duration"]) / np.diff(trade["energy"])
