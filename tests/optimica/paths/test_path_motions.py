@@ -68,7 +68,7 @@ def test_a_spline_takes_the_exact_time_to_the_accuracy_of_the_mesh():
     assert exact.least_margin > 1.0  # m/s2: the motion stays below the limit curve
     errors = [optimize(along(path), elements=n).final_time - exact.duration for n in (25, 100)]
     # limits hold at the collocation points only, so the time may be too short as well as too long
-    assert abs(errors[0]) < 5e-4
+    assert abs(errors[0]) < 2e-3
     assert abs(errors[1]) < abs(errors[0]) / 4
 
 
