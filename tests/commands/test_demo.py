@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+from dataclasses import replace
 
 import matplotlib
 import pytest
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import gantrytau_optimica
 from gantrytau.commands.app import app
+from gantrytau.commands.demo.motion_problems import OnLine
 
 matplotlib.use("Agg")
 # s, on ever finer meshes; the line by its phase plane; those with weights on 50 elements of free torques
@@ -80,3 +82,19 @@ def test_ctrl_c_leaves_a_message_and_the_unfinished_motion(tmp_path, monkeypatch
     assert "unfinished" in found.output
     assert (tmp_path / "unfinished.csv").stat().st_size > 1000
     assert "Traceback" not in found.output
+
+
+def test_motions_that_are_not_as_exact_as_wanted_are_told_on_the_screen(tmp_path, monkeypatch):
+    solve, found = gantrytau_optimica.optimize, []
+
+    def missing(problem, **policy):
+        if not found:  # one motion stands for all: only what is told of it is looked at
+            optimum = solve(OnLine, refine=policy["refine"])
+            found.append(optimum.with_notes(refinement=replace(optimum.refinement, reached=False)))
+        return found[0]
+
+    monkeypatch.setattr(gantrytau_optimica, "optimize", missing)
+    screen = CliRunner().invoke(app, ["demo", "--output", str(tmp_path)])
+    assert screen.exit_code == 0, screen.output
+    assert screen.output.count("NOT refined to 0.001") == 6
+    assert "six links, robot D1: NOT refined to 0.001" in screen.output

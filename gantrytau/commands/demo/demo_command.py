@@ -88,6 +88,9 @@ def demo(
     screen.print(table([*summaries, *more]))
     screen.print(WHY, soft_wrap=True)
     screen.print(WHICH, soft_wrap=True)
+    for row, optimum in zip([*summaries, *more], optima.values(), strict=True):
+        if not row["refined"]:
+            screen.print(f"{row['row']}: {optimum.refinement}", markup=False, soft_wrap=True)
     screen.print(f"Pictures and trajectories are in {output}/: {', '.join(file.name for file in files)}")
 
 

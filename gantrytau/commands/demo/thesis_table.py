@@ -63,7 +63,7 @@ def table(summaries: list[dict[str, Any]]) -> "Table":
     from rich.box import SIMPLE
     from rich.table import Table
 
-    found = Table(title="Minimum-time motions of the robot L1, beside Table 3.1 of the thesis", box=SIMPLE)
+    found = Table(title="Minimum-time motions, those of the L1 beside Table 3.1 of the thesis", box=SIMPLE)
     found.add_column("motion", no_wrap=True)
     for heading in ("T (s)", "energy", "thesis T", "energy", "took (s)"):
         found.add_column(heading, justify="right")
