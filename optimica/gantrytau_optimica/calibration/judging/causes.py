@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
+from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.order_effects import OrderEffect, order_effect
 from gantrytau_optimica.calibration.judging.pulls import pulls
@@ -29,7 +30,7 @@ def ordered(found: FittedRods) -> Iterator[Finding]:
             if (seen := slip(one, slopes, smooth)) is not None:
                 last = fitted[seen.last] if seen.last < len(fitted) else len(used)
                 slips.append((column, Slip(int(fitted[seen.first]), int(last), seen.size)))
-    rows = np.setdiff1d(np.union1d(found.rows, found.held_out), found.left_out)
+    rows = rows_of(found.rows, found.held_out, without=found.left_out)
     if (effect := order_effect(systems, r, used, slips)) is not None:
         yield _by_order(found, effect, rows, used)
         return

@@ -12,6 +12,7 @@ from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
+from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
 from gantrytau_optimica.calibration.fitting.named_parameters import (
@@ -264,7 +265,7 @@ class FittedRods:
         """Rows that were fitted or held out, at most so many, evenly spread, and their closure errors with all derivatives;
         without those that a robust loss left without weight.
         """
-        used = np.setdiff1d(np.union1d(self.rows, self.held_out), self.left_out)
+        used = rows_of(self.rows, self.held_out, without=self.left_out)
         rows = used[thinned(len(used), most)]
         return rows, link_systems(self.fits, self.measurements.select(rows))
 

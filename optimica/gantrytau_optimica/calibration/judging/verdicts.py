@@ -6,6 +6,7 @@ import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.causes import ordered, pulled, scaled
 from gantrytau_optimica.calibration.judging.device_frames import frame_of, moved_arms
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
@@ -174,7 +175,7 @@ def judged(found: FittedRods) -> list[Finding]:
     """
     seen = found.suspicion
     findings = _mistaken(found, seen)
-    others = np.setdiff1d(seen.rows, np.concatenate([seen.rows[:0], *(f.rows for f in findings)]))
+    others = rows_of(seen.rows, without=rows_of(*(f.rows for f in findings)))
     if others.size:
         one = len(others) == 1
         advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
@@ -218,7 +219,7 @@ def _far(found: FittedRods) -> Iterator[Finding]:
 def _misfit(found: FittedRods, seen: Suspicion, findings: list[Finding]) -> Iterator[Finding]:
     if seen.typical < MISFIT:
         return
-    rows = np.union1d(found.rows, found.held_out)
+    rows = rows_of(found.rows, found.held_out)
     where = rows_in_words(rows, len(found.measurements))
     words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {where} with the best parameters"
     remedy = (
