@@ -34,6 +34,7 @@ from gantrytau_optimica.calibration.trust.parameter_rows import (
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared
@@ -84,6 +85,7 @@ __all__ = [
     "MeasuredPlan",
     "Measurements",
     "MissingGuess",
+    "MotionLog",
     "Optimization",
     "Optimum",
     "ParameterRow",

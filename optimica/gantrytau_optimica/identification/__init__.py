@@ -1,0 +1,1 @@
+"""Masses, friction, servos and compliance of robots from measured motion."""

@@ -1,0 +1,1 @@
+"""Measured motion, and what is wrong with it."""

@@ -1,0 +1,123 @@
+"""Measured motion of a robot: actuator positions and forces over time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from gantrytau import ModelError
+
+GAP = 1.5  # median periods: what is longer lacks a sample
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionLog:
+    """Measured motion of a robot of n actuators, in N rows over time.
+
+    t: time (N,) in s; q: actuator positions (N, n) in m, or rad of turning actuators; f: actuator forces (N, n) in N, or
+    torques in N.m, as the model has them: along q, before friction. v: speeds of actuators (N, n) in m/s or None; r: tool
+    positions (N, 3) in m or None. Arrays are copied and cannot be written to; one actuator may be told as (N,).
+    Raises ModelError for shapes that do not fit and for what is no number.
+    """
+
+    t: Any
+    q: Any
+    f: Any
+    v: Any = None
+    r: Any = None
+
+    def __post_init__(self):
+        for name in ("t", "q", "f", "v", "r"):
+            array = getattr(self, name)
+            object.__setattr__(self, name, None if array is None else _numbers(name, array))
+        rows, actuators = len(self.t), self.q.shape[1]
+        expected = {"t": (rows,), "q": (rows, actuators), "f": (rows, actuators), "v": (rows, actuators)}
+        for name, shape in (expected | {"r": (rows, 3)}).items():
+            array = getattr(self, name)
+            if array is not None and array.shape != shape:
+                raise ModelError(
+                    f"MotionLog: found {name} of shape {array.shape} beside t of shape {self.t.shape} and q of shape "
+                    f"{self.q.shape}, expected {shape}: one row for each time, one column for each actuator",
+                    argument=name,
+                )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f", {self.t[0]:g} to {self.t[-1]:g} s" if len(self) else ""
+        more = "".join(f", with {name}" for name in ("v", "r") if getattr(self, name) is not None)
+        return f"<MotionLog: {len(self)} rows of {self.q.shape[1]} actuators{span}{more}>"
+
+    def __getitem__(self, rows: Any) -> Self:
+        """The log of some rows: a slice, indices or a mask."""
+        if isinstance(rows, (int, np.integer)):
+            rows = slice(rows, rows + 1 or None)
+        arrays = (self.t, self.q, self.f, self.v, self.r)
+        return type(self)(*(None if array is None else array[rows] for array in arrays))
+
+    def between(self, start: float, stop: float) -> Self:
+        """The rows from start to stop, both in s and included."""
+        return self[(self.t >= start) & (self.t <= stop)]
+
+    @property
+    def period(self) -> float:
+        """Median distance of samples in s; NaN of fewer than two rows."""
+        return float(np.median(np.diff(self.t))) if len(self) > 1 else np.nan
+
+    @property
+    def finite(self) -> np.ndarray:
+        """Which rows hold numbers only, (N,)."""
+        arrays = [array for array in (self.t[:, None], self.q, self.f, self.v, self.r) if array is not None]
+        return np.logical_and.reduce([np.isfinite(array).all(axis=1) for array in arrays])
+
+    def parts(self) -> tuple[Self, ...]:
+        """The stretches between gaps, times that do not rise, and rows without numbers: to be differentiated one by one."""
+        good = self.finite
+        kept = np.flatnonzero(good)
+        step = np.diff(self.t)
+        broken = (step <= 0) | (step > GAP * np.median(step[step > 0])) if np.any(step > 0) else step <= 0
+        crossed = np.add.reduceat(np.append(broken, False), kept)[:-1] > 0 if kept.size > 1 else np.zeros(0)
+        ends = np.flatnonzero((np.diff(kept) > 1) | crossed) + 1
+        return tuple(self[rows] for rows in np.split(kept, ends) if rows.size)
+
+
+def join(logs: Sequence[MotionLog]) -> MotionLog:
+    """One log of several of the same robot, each of which begins a second after the one before: `parts` parts them again.
+
+    v and r are kept where all have them. Raises ModelError for no log, and for logs of different numbers of actuators.
+    """
+    widths = [log.q.shape[1] for log in logs]
+    if len(set(widths)) != 1:
+        raise ModelError(
+            f"join: found logs of {widths} actuators, expected one log or more of the same robot"
+        )
+    times, end = [], 0.0
+    for log in logs:
+        times.append(log.t - log.t[0] + end if len(log) else log.t)
+        end = times[-1][-1] + 1.0 if len(log) else end
+    kept = [name for name in ("v", "r") if all(getattr(log, name) is not None for log in logs)]
+    arrays = {name: np.concatenate([getattr(log, name) for log in logs]) for name in ("q", "f", *kept)}
+    return MotionLog(np.concatenate(times), **arrays)
+
+
+def _numbers(name: str, values: Any) -> np.ndarray:
+    try:
+        found = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ModelError(
+            f"MotionLog: found {name} that is no array of numbers ({error}), expected rows of numbers",
+            argument=name,
+        ) from None
+    if name == "t":
+        if found.ndim != 1:
+            raise ModelError(
+                f"MotionLog: found t of shape {found.shape}, expected (N,), times in s", argument=name
+            )
+    elif found.ndim == 1:
+        found = found[:, None]
+    elif found.ndim != 2:
+        raise ModelError(f"MotionLog: found {name} of shape {found.shape}, expected (N, n)", argument=name)
+    found.flags.writeable = False
+    return found
