@@ -59,6 +59,9 @@ FACTORS = {  # unit of a quantity -> texts that a file may write behind its numb
     "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180},
     "s": {"s": 1.0, "ms": 1e-3},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
+    "N": {"N": 1.0, "kN": 1e3},
+    "N.m": {"N.m": 1.0, "Nm": 1.0, "kN.m": 1e3},
 }
 FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1)(?P<power>[+-]?\d+)?$")
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau_optimica.identification.logs.log_files import read_log, write_log
 
 GAP = 1.5  # median periods: what is longer lacks a sample
 
@@ -41,6 +43,23 @@ class MotionLog:
                     f"{self.q.shape}, expected {shape}: one row for each time, one column for each actuator",
                     argument=name,
                 )
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """A log from a CSV file whose columns are known by the names in its header, in any order.
+
+        Time: t, time; positions, forces and perhaps speeds: q1..qn, f1..fn, v1..vn, or carts[0].s, carts[0].f, carts[0].v
+        and so on, or carts[0].phi and .tau of what turns; tool positions: x, y, z or tool.r[0].. . Units stand behind names,
+        "q1 [mm]" or "f1 (kN)"; without one, values are SI. Cells are separated by commas, blanks, semicolons or tabs: with
+        the last two, decimals may have a comma. Empty cells are NaN. Columns with other names are not read.
+        Raises ModelError for columns that are missing or doubtful, and cells that are no numbers, with the line.
+        """
+        return cls(**read_log(Path(path)))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the log as a CSV file, in SI, which `read` reads to the last digit."""
+        write_log(Path(path), dict(t=self.t, q=self.q, f=self.f, v=self.v, r=self.r))
+        return Path(path)
 
     def __len__(self) -> int:
         return len(self.t)
