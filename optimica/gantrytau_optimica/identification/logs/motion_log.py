@@ -2,15 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import Model, ModelError, Result, translate
+from gantrytau.dae import Dae
+from gantrytau.kinematics.kinematics import driven_joints
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import read_log, write_log
-
-GAP = 1.5  # median periods: what is longer lacks a sample
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,6 +59,37 @@ class MotionLog:
         """
         return cls(**read_log(Path(path)))
 
+    @classmethod
+    def of(
+        cls,
+        result: Result,
+        robot: Model | Dae,
+        *,
+        period: float = 0.004,
+        encoder: float = 0.0,
+        force: float = 0.0,
+        seed: int = 0,
+    ) -> Self:
+        """The log that a simulated motion would give: samples every `period` s, with white noise.
+
+        result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
+        the same for the same seed. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
+        one, without noise. Raises ModelError for a robot without driven coordinates, and for a period that is not above 0.
+        """
+        if not (0 < period < np.inf and encoder >= 0 and force >= 0):
+            raise ModelError(
+                f"MotionLog.of: found period={period!r}, encoder={encoder!r}, force={force!r}, expected a time above 0 and "
+                "deviations of at least 0"
+            )
+        joints = driven_joints(robot if isinstance(robot, Dae) else translate(robot, units=False))
+        drives = [f"{name[:-2]}.f" if name.endswith(".s") else f"{name[:-4]}.tau" for name in joints]
+        count = int(np.floor((result.time[-1] - result.time[0]) / period * (1 + 1e-12))) + 1
+        t = result.time[0] + period * np.arange(count)
+        q, f = (np.column_stack([result.at(t, name) for name in names]) for names in (joints, drives))
+        noise = np.random.default_rng(seed).normal(size=(2, *q.shape))
+        r = result.at(t, "tool.r") if "tool.r" in result.arrays else None
+        return cls(t, q + encoder * noise[0], f + force * noise[1], r=r)
+
     def save(self, path: str | Path) -> Path:
         """Write the log as a CSV file, in SI, which `read` reads to the last digit."""
         write_log(Path(path), dict(t=self.t, q=self.q, f=self.f, v=self.v, r=self.r))
@@ -90,6 +124,13 @@ class MotionLog:
         """Which rows hold numbers only, (N,)."""
         arrays = [array for array in (self.t[:, None], self.q, self.f, self.v, self.r) if array is not None]
         return np.logical_and.reduce([np.isfinite(array).all(axis=1) for array in arrays])
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "millimetres", "saturated force",
+        "slow", "constant velocity", "delay", "sign of force".
+        """
+        return check_log(self.t, self.q, self.f, self.finite)
 
     def parts(self) -> tuple[Self, ...]:
         """The stretches between gaps, times that do not rise, and rows without numbers: to be differentiated one by one."""

@@ -1,0 +1,172 @@
+"""Checks of a log of motion that need no robot."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
+from gantrytau_optimica.identification.logs.plain_friction import PlainFits, plain_fits
+
+GAP = 1.5  # median periods: what is longer lacks a sample
+LARGEST = 50.0  # m or rad, reach of robots; what is farther apart was not written in m
+STILL = 0.005  # m/s or rad/s, below which friction has no law that can be told
+STEADY = 0.05  # of speed squared by stroke, as a sine has 1.4: accelerations below it tell no mass
+WINDOW = 0.1  # s, over which speeds are slopes
+HELD = 5  # samples in a row at the largest force, which is a limit then
+SAME = 1e-9  # of the span of a force, within which it is at its largest
+MOST = 20_000  # rows that show how a log moves
+
+
+def check_log(t: np.ndarray, q: np.ndarray, f: np.ndarray, finite: np.ndarray) -> tuple[Finding, ...]:
+    """What is doubtful in a log t (N,), q and f (N, n), of which the rows `finite` (N,) are numbers."""
+    return (
+        *_not_finite(finite),
+        *_times(t, finite),
+        *_units(q, finite),
+        *_saturated(f, finite),
+        *_motion(*_stretch(t, q, f, finite)),
+    )
+
+
+def _not_finite(finite: np.ndarray) -> Iterator[Finding]:
+    bad = np.flatnonzero(~finite)
+    if bad.size:
+        hold, left = agreeing(bad, "hold"), agreeing(bad, "are")
+        yield Finding("nan", bad, f"{rows_in_words(bad)} {hold} no finite numbers and {left} left out")
+
+
+def _times(t: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
+    rows = np.flatnonzero(finite)
+    step = np.diff(t[rows])
+    back = rows[1:][step <= 0]
+    if back.size:
+        repeat = agreeing(back, "repeat")
+        yield Finding(
+            "time",
+            back,
+            f"{rows_in_words(back)} {repeat} the time before or {agreeing(back, 'go')} back; the log is parted there; sort "
+            "rows by time, and leave copies out",
+        )
+    if not np.any(step > 0):
+        return
+    period = np.median(step[step > 0])
+    after = rows[1:][(step > GAP * period) & (np.diff(rows) == 1)]
+    if after.size:
+        longest = float(np.max(np.diff(t[rows])))
+        yield Finding(
+            "gaps",
+            after,
+            f"{rows_in_words(after)} {agreeing(after, 'follow')} a gap, up to {longest:.3g} s, of samples every "
+            f"{period:.3g} s; the log is parted there, as slopes across gaps would be wrong",
+        )
+
+
+def _units(q: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
+    spans = np.ptp(q[finite], axis=0) if finite.any() else np.zeros(q.shape[1])
+    for k in np.flatnonzero(spans > LARGEST):
+        yield Finding(
+            "millimetres",
+            np.flatnonzero(finite),
+            f"q{k + 1} covers {spans[k]:.4g}, expected m or rad; write its unit in the header, 'q{k + 1} [mm]'",
+        )
+
+
+def _saturated(f: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
+    for k, column in enumerate(f.T):
+        good = column[finite]
+        span = np.ptp(good) if good.size else 0.0
+        if span == 0:
+            continue
+        for side, limit in (("largest", good.max()), ("smallest", good.min())):
+            at = finite & (np.abs(column - limit) <= SAME * span)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(np.int8), [0]])))
+            longest = int(np.max(edges[1::2] - edges[::2]))
+            if longest >= HELD and abs(limit) > 0.5 * np.max(np.abs(good)):
+                rows = np.flatnonzero(at)
+                yield Finding(
+                    "saturated force",
+                    rows,
+                    f"f{k + 1} stays at its {side} value {limit:.6g} in {rows_in_words(rows)}: a limit, where the force "
+                    "that was logged may not be the one that acted; leave these rows out, or move more slowly",
+                )
+
+
+def _stretch(
+    t: np.ndarray, q: np.ndarray, f: np.ndarray, finite: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, times, positions and forces of the longest part without gaps and NaN, cut to so many rows as are looked at."""
+    rows = np.flatnonzero(finite)
+    step = np.diff(t[rows])
+    rising = step[step > 0]
+    period = np.median(rising) if rising.size else 0.0
+    ends = np.flatnonzero((np.diff(rows) > 1) | (step <= 0) | (step > GAP * period)) + 1
+    parts = np.split(rows, ends)
+    kept = max(parts, key=len)[:MOST]
+    return kept, t[kept], q[kept], f[kept]
+
+
+def _motion(rows: np.ndarray, t: np.ndarray, q: np.ndarray, f: np.ndarray) -> Iterator[Finding]:
+    """What the motion itself does not tell, and forces that do not belong to it."""
+    width = max(int(WINDOW / (t[1] - t[0])) if len(t) > 1 else 2, 2)
+    if len(t) < 5 * width:
+        return
+    v, a, noise, inner = slopes(t, q, width)
+    fastest = np.max(np.abs(v), axis=0)
+    slow = np.flatnonzero(fastest < STILL)
+    for k in slow:
+        yield Finding(
+            "slow",
+            rows,
+            f"q{k + 1} never moves faster than {fastest[k]:.3g}, expected more than {STILL:g} m/s or rad/s: friction has no "
+            "direction there; log a faster motion",
+        )
+    moving = np.abs(v) > STILL
+    stroke = np.ptp(q, axis=0)
+    rms = np.sqrt(np.mean(v**2, axis=0))
+    # only rows in motion: at rest nothing accelerates, whatever comes after
+    squares = np.array([np.mean(a[m, k] ** 2) if m.any() else 0.0 for k, m in enumerate(moving.T)])
+    swing = np.sqrt(np.maximum(squares - 2 * noise**2, 0.0))
+    if not slow.size and np.all(swing < STEADY * rms**2 / np.maximum(stroke, 1e-12)):
+        yield Finding(
+            "constant velocity",
+            rows,
+            "all actuators move at constant speed: masses cannot be told from such a log, only friction and weight; add "
+            "motion that accelerates, or use identify_friction",
+        )
+        return
+    if not slow.size:
+        yield from _forces(rows, plain_fits(q[inner], v, a, f, inner), t[1] - t[0])
+
+
+def slopes(t: np.ndarray, q: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Speeds and accelerations by parabolas over about `width` samples, the noise of the latter (n,), and their rows.
+
+    Savitzky and Golay (1964); t evenly spaced. Of n samples with white noise s, the second derivative of a parabola has
+    the variance 720 s^2 / (n^5 dt^4) for large n.
+    """
+    count, step = 2 * max(width // 2, 1) + 1, float(np.mean(np.diff(t)))
+    inner = np.arange(width, len(t) - width)
+    smooth, v, a = (savgol_filter(q, count, 2, deriv=k, delta=step, axis=0)[inner] for k in range(3))
+    noise = np.std(q[inner] - smooth, axis=0) * np.sqrt(720 / count**5) / step**2
+    return v, a, noise, inner
+
+
+def _forces(rows: np.ndarray, fits: PlainFits | None, period: float) -> Iterator[Finding]:
+    if fits is None:
+        return
+    if fits.lag:
+        late = "late" if fits.lag > 0 else "early"
+        yield Finding(
+            "delay",
+            rows,
+            f"forces are {abs(fits.lag)} samples {late} ({abs(fits.lag) * period * 1e3:.3g} ms): that fits the motion best; "
+            f"shift the columns of f by {-fits.lag:+d} rows",
+        )
+    if fits.reversed:
+        yield Finding(
+            "sign of force",
+            rows,
+            "forces take power out of the motion at all speeds, in all actuators: friction would drive the robot; change "
+            "the sign of f",
+        )
