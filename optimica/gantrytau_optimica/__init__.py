@@ -34,6 +34,8 @@ from gantrytau_optimica.calibration.trust.parameter_rows import (
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.identification.friction.friction_result import Friction
+from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
@@ -80,6 +82,7 @@ __all__ = [
     "Experiment",
     "Finding",
     "Free",
+    "Friction",
     "LaserTracker",
     "LengthGauge",
     "MeasuredPlan",
@@ -114,6 +117,7 @@ __all__ = [
     "frame_words",
     "held_out",
     "identifiability",
+    "identify_friction",
     "in_lines",
     "initial",
     "integral_of_squares",
