@@ -37,6 +37,9 @@ from gantrytau_optimica.estimation.experiments import Experiment
 from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.rigid.identification import Identification
+from gantrytau_optimica.identification.rigid.identify import identify
+from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared
@@ -83,6 +86,8 @@ __all__ = [
     "Finding",
     "Free",
     "Friction",
+    "Identification",
+    "IdentificationError",
     "LaserTracker",
     "LengthGauge",
     "MeasuredPlan",
@@ -117,6 +122,7 @@ __all__ = [
     "frame_words",
     "held_out",
     "identifiability",
+    "identify",
     "identify_friction",
     "in_lines",
     "initial",

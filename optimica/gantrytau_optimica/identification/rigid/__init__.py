@@ -1,0 +1,1 @@
+"""Masses and friction of a robot of rigid bodies from its motion and its forces."""

@@ -1,0 +1,94 @@
+"""What a call of `identify` asks for: names of parameters, and values that are fixed, with refusals."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.dae import Dae
+from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.rigid.friction_columns import SIDES, Law, words
+from gantrytau_optimica.identification.rigid.robot_dynamics import (
+    candidates,
+    expanded,
+    frictions,
+    public_name,
+)
+
+LAWS = ("symmetric", "asymmetric", "stribeck", None)
+
+
+def check_call(
+    dae: Dae, logs: Sequence[MotionLog], coordinates: Sequence[str], friction: Any, minimum_speed: float
+) -> None:
+    """ModelError for what no call can mean."""
+    if friction not in LAWS:
+        raise ModelError(f"identify: friction is {friction!r}, expected one of {', '.join(map(repr, LAWS))}")
+    if not 0 <= minimum_speed < np.inf:
+        raise ModelError(
+            f"identify: minimum_speed is {minimum_speed!r}, expected a speed in m/s, not negative"
+        )
+    if not logs:
+        raise ModelError("identify: found no log, expected one or more; give a MotionLog")
+    for number, log in enumerate(logs):
+        if not isinstance(log, MotionLog):
+            raise ModelError(
+                f"identify: log {number} is {type(log).__name__}, expected a MotionLog; make one of t, q, f"
+            )
+        if log.q.shape[1] != len(coordinates):
+            raise ModelError(
+                f"identify: log {number} has {log.q.shape[1]} actuators, expected {len(coordinates)}, as {dae.name} is "
+                f"driven at {', '.join(coordinates)}; log them all"
+            )
+
+
+def is_friction(name: str) -> bool:
+    """Whether it names a friction that is identified apart from the model."""
+    return name.partition("[")[0] in words("stribeck")
+
+
+def asked_parameters(
+    dae: Dae, parameters: Sequence[str] | str | None, given: Mapping[str, Any]
+) -> tuple[str, ...]:
+    """Public names of the robot's own parameters to be identified, without those that are fixed."""
+    if parameters is None:
+        return tuple(n for n in candidates(dae) if n not in given)
+    known = dict.fromkeys((*candidates(dae), *(public_name(dae, n) for n in dae.adjustable)))
+    wanted = [parameters] if isinstance(parameters, str) else list(parameters)
+    found = expanded([n for n in wanted if not is_friction(n)], tuple(known))
+    both = [n for n in found if n in given]
+    if both:
+        raise ModelError(
+            f"identify: {', '.join(both)} stand in parameters= and in fixed=; leave them out of one"
+        )
+    return found
+
+
+def fixed_values(dae: Dae, fixed: Mapping[str, Any], n: int, friction: Law | None) -> dict[str, Any]:
+    """Values by scalar name; of frictions a number, or a pair at positive and at negative speed."""
+    own = tuple(dict.fromkeys(public_name(dae, p) for p in dae.adjustable if p not in frictions(dae)))
+    laws = [f"{word}[{i}]" for word in words(friction or "symmetric") for i in range(n)] if friction else []
+    sides = [name + side for name in laws for side in SIDES] if friction == "asymmetric" else []
+    found: dict[str, Any] = {}
+    for name, value in fixed.items():
+        exact = name in own or name in laws or name in sides
+        members = (name,) if exact else expanded(name, (*own, *laws))
+        try:
+            values = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            values = np.array(np.nan)
+        whole = not exact and values.ndim > 0
+        pairs = is_friction(name) and values.ndim == 1 + whole and values.shape[-1:] == (2,)
+        fits = (
+            values.ndim == 0 or (whole and len(values) == len(members) and values.ndim == 1 + pairs) or pairs
+        )
+        if not fits or not np.all(np.isfinite(values)):
+            raise ModelError(
+                f"identify: fixed value of {name} is {value!r}, expected a number, or one for each of {', '.join(members)}"
+                f"{', or pairs at positive and negative speed' if is_friction(name) else ''}"
+            )
+        for k, member in enumerate(members):
+            one = values[k] if whole else values
+            found[member] = tuple(one.tolist()) if np.ndim(one) else float(one)
+    return found

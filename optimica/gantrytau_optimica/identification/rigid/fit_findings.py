@@ -1,0 +1,80 @@
+"""What is noticed of logs and of a fit: findings in words, with rows and remedy."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.rigid.regression import Factors, Fit
+from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
+
+PERIODS = 10  # of the cutoff, which a stretch must last to be filtered
+WORSE = 1.5  # times what a fit leaves where it was made, above which held-out rows contradict it
+
+
+def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionLog], list[Finding]]:
+    """Stretches without gaps that a filter can pass, and what was left out. IdentificationError where nothing is left."""
+    kept, findings = [], []
+    if not 0 < cutoff < np.inf:
+        raise IdentificationError(f"identify: cutoff is {cutoff!r}, expected a frequency in Hz above 0")
+    for number, log in enumerate(logs):
+        parts = log.parts()
+        long = [p for p in parts if len(p) > 1 and (p.t[-1] - p.t[0]) * cutoff >= PERIODS]
+        kept += long
+        lost = len(log) - sum(map(len, long))
+        if lost:
+            bad = np.flatnonzero(~log.finite)
+            why = (
+                f"{len(bad)} of them are not finite, first row {bad[0]}"
+                if len(bad)
+                else "times have gaps or do not rise"
+            )
+            words = (
+                f"{lost} of {len(log)} rows of log {number} do not count: {why}; what is left are {len(long)} stretches of "
+                f"at least {PERIODS / cutoff:g} s"
+            )
+            findings.append(Finding("gaps", bad, words))
+    if not kept:
+        raise IdentificationError(
+            f"identify: no log lasts {PERIODS} periods of the cutoff of {cutoff:g} Hz, {PERIODS / cutoff:g} s, without gap; "
+            f"log longer, or raise the cutoff. {' '.join(f.message for f in findings)}"
+        )
+    return kept, findings
+
+
+def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[float, list[Finding]]:
+    """Rms of what a fit of the first half leaves of the second, N, and what that says. p: the fit of the first half."""
+    first, second = (np.sqrt(h.squares(p) / max(h.rows, 1)) for h in halves)
+    findings = []
+    if second > WORSE * first:
+        words = (
+            f"a fit of the first half leaves {first:.4g} N rms there and {second:.4g} N in the second: friction, load or "
+            "geometry changed, or one half moves what the other does not; log again, or fit the halves apart"
+        )
+        findings.append(Finding("held out", np.arange(0), words))
+    return float(second), findings
+
+
+def fit_findings(names: Sequence[str], found: Fit, weak: Sequence[str]) -> list[Finding]:
+    """What the motion does not tell, and what cannot be so."""
+    findings = []
+    silent = found.base.silent(names)
+    if silent:
+        words = f"no force of this motion depends on {', '.join(silent)}, which stay as they are in the robot; move them"
+        findings.append(Finding("silent", np.arange(0), words))
+    together = found.base.words(names)
+    if together:
+        words = f"only {'; '.join(together)} are determined, not the parts; what follows the first keeps its nominal value"
+        findings.append(Finding("base parameters", np.arange(0), words))
+    if weak:
+        words = (
+            f"the motion hardly tells {', '.join(weak)} from others, or from zero: small errors of the model move them far; "
+            "excite them more, or fix them"
+        )
+        findings.append(Finding("weak", np.arange(0), words))
+    carts = [k for k, n in enumerate(names) if n.startswith("cart_masses[")]
+    if carts and all(found.p[k] < 0 or found.active[k] for k in carts):
+        words = "no cart has a mass above zero: forces have the opposite sign, or another unit; give them along q, in N"
+        findings.append(Finding("sign of forces", np.arange(0), words))
+    return findings

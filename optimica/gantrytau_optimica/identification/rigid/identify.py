@@ -1,0 +1,170 @@
+"""Masses and friction of a robot from its motion and its forces: `identify`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from gantrytau import Model, translate
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.rigid.chosen_parameters import (
+    asked_parameters,
+    check_call,
+    fixed_values,
+    is_friction,
+)
+from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, half_against_half, usable_parts
+from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
+from gantrytau_optimica.identification.rigid.identification import Identification
+from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
+from gantrytau_optimica.identification.rigid.regression import Fit, fit
+from gantrytau_optimica.identification.rigid.residual_covariance import Rows, covariance
+from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
+from gantrytau_optimica.identification.rigid.robot_dynamics import (
+    RobotDynamics,
+    drives,
+    frictions,
+    model_name,
+)
+
+FALLS = (0.01, 1.0)  # m/s between which a Stribeck speed is looked for
+INFLATED = (
+    10.0  # times the deviation that a parameter would have alone: errors of the model weigh as much more
+)
+
+
+def identify(
+    robot: Model,
+    log: MotionLog | Sequence[MotionLog],
+    *,
+    parameters: Sequence[str] | str | None = None,
+    fixed: Mapping[str, Any] | None = None,
+    friction: Law | None = "symmetric",
+    physical: bool = True,
+    cutoff: float = 10.0,
+    minimum_speed: float = 0.005,
+    holdout: Literal["second half"] | None = "second half",
+) -> Identification:
+    """Masses and friction of a robot of rigid bodies, by least squares of its forces along measured motion.
+
+    robot: any model whose inputs are the forces or torques of its drives, with `s` or `phi` beside them, of any loops;
+    log: one or several, q and f in the order of these inputs. parameters: names or families, `plate_mass`,
+    `cart_masses`, `link_masses[0]` or the model's own, by default all masses and inertias that move the forces.
+    fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0 leaves links out.
+    friction: the law that is identified in place of the model's; None keeps the model's. physical: no mass and no
+    friction below the limits that the model declares. cutoff: Hz, of the zero-phase filter of both sides; minimum_speed:
+    m/s or rad/s, below which a joint's rows do not count. holdout: the part that judges a fit of the rest; the
+    parameters are of all. Gautier (1991); Dressler (2012), section 6.1.
+
+    Raises ModelError for unknown names, IdentificationError for data that determine nothing.
+    """
+    dae = translate(robot)
+    logs = [log] if isinstance(log, MotionLog) else list(log)
+    coordinates, forces = drives(dae)
+    check_call(dae, logs, coordinates, friction, minimum_speed)
+    parts, findings = usable_parts(logs, cutoff)
+    given = fixed_values(dae, fixed or {}, len(coordinates), friction)
+    known = {n: v for n, v in given.items() if is_friction(n)}
+    rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    rigid |= dict.fromkeys(frictions(dae), 0.0) if friction else {}
+    names = asked_parameters(dae, parameters, given)
+    problem = RigidRegression(
+        RobotDynamics(dae, coordinates, forces, names, rigid),
+        FrictionColumns(len(coordinates), friction, known) if friction else None,
+        [filtered_motion(part, cutoff) for part in parts],
+        minimum_speed,
+    )
+    problem = problem if parameters else problem.without_silent()
+    nonlinear = problem.nonlinear()
+    if nonlinear:
+        words = f"forces are not linear in {', '.join(nonlinear)}; found by Gauss-Newton from the robot's own values"
+        findings.append(Finding("not linear", np.arange(0), words))
+    least = problem.least if physical else np.full(len(problem.names), -np.inf)
+    if friction == "stribeck":
+        problem = _with_fall(problem, least, nonlinear)
+    found, rows = minimum(problem, least, nonlinear)
+    judged, held_findings = _judged(rows, problem, least) if holdout else (np.nan, [])
+    answer = _identified(problem, found, rows, robot)
+    noticed = (*findings, *fit_findings(problem.names, found, answer.weak), *held_findings)
+    return replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
+
+
+def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str, ...]) -> RigidRegression:
+    """The regression with the Stribeck speed that leaves the least; everything else is minimised at each."""
+
+    def at(logarithm: float) -> RigidRegression:
+        assert problem.friction is not None
+        return replace(problem, friction=replace(problem.friction, fall=float(np.exp(logarithm))))
+
+    def left(logarithm: float) -> float:
+        found, rows = minimum(at(logarithm), least, nonlinear)
+        return factors_of(rows).squares(found.p)
+
+    # several minima are possible: the best of a coarse row of speeds is where to look
+    coarse = np.linspace(*np.log(FALLS), 8)
+    best = int(np.argmin([left(x) for x in coarse]))
+    around = (coarse[max(best - 1, 0)], coarse[min(best + 1, len(coarse) - 1)])
+    return at(minimize_scalar(left, bounds=around, method="bounded", options=dict(xatol=1e-3)).x)
+
+
+def _judged(rows: list[Rows], problem: RigidRegression, least: np.ndarray) -> tuple[float, list[Finding]]:
+    """What a fit of the first half of each log leaves of the second."""
+    halves = [[r.part(s) for r in rows for s in (half(len(r.b)),)] for half in (_first, _second)]
+    if not all(any(np.any(r.moving) for r in half) for half in halves):
+        return np.nan, []
+    first, second = map(factors_of, halves)
+    return half_against_half((first, second), fit(first, problem.nominal, least).p)
+
+
+def _first(count: int) -> slice:
+    return slice(0, count // 2)
+
+
+def _second(count: int) -> slice:
+    return slice(count // 2, count)
+
+
+def _identified(problem: RigidRegression, found: Fit, rows: list[Rows], robot: Model) -> Identification:
+    """The record of a fit."""
+    names, p = problem.names, found.p
+    free = found.base.independent[~found.active[found.base.independent]]
+    matrix = covariance(rows, p, free)
+    matrix[found.base.dependent, found.base.dependent] = np.nan
+    deviations = np.sqrt(np.diag(matrix))
+    told = (found.inflation <= INFLATED) & (2 * deviations <= np.abs(p))
+    left = [np.where(r.moving, r.left(p), np.nan) for r in rows]
+    own = problem.dynamics.names
+    values = {model_name(problem.dynamics.dae, n): float(x) for n, x in zip(own, p, strict=False)}
+    parameters = dict(zip(names, p.tolist(), strict=True))
+    friction = problem.friction
+    if friction and friction.law == "symmetric":
+        laws = {
+            f"{place}.{short}": f"{word}[{i}]"
+            for i, place in enumerate(problem.dynamics.laws)
+            if place
+            for short, word in (("f_c", "coulomb"), ("f_v", "viscous"))
+        }
+        values |= {model: parameters[name] for model, name in laws.items() if name in parameters}
+    return Identification(
+        robot_name=problem.dynamics.dae.name,
+        parameters=parameters,
+        fixed={},
+        matrix=matrix,
+        residuals=np.concatenate(left),
+        squares=sum(r.thinned * np.nansum(e**2, axis=0) for r, e in zip(rows, left, strict=True)),
+        condition=found.condition,
+        weak=tuple(
+            n for n, sure, held in zip(names, told, found.active, strict=True) if not sure and not held
+        ),
+        active=tuple(n for n, held in zip(names, found.active, strict=True) if held),
+        base=found.base.words(names),
+        nonlinear=(),
+        stribeck_speed=friction.fall if friction and friction.law == "stribeck" else None,
+        model_values=values,
+        held_out=np.nan,
+        findings=(),
+        nominal=robot,
+    )

@@ -1,0 +1,72 @@
+"""How sure parameters are, from what is left of the forces: neighbouring rows are not independent.
+
+    p = A^+ b:  cov p = A^+ cov(e) A^+T,  cov(e) of each joint and log by the spectrum of what is left
+
+Filtered samples taken as independent would promise deviations up to three times too small.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+BAND = 5.0  # parts of the cutoff over which the spectrum is averaged
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Filtered rows of one log: A (N, n, k), b (N, n), moving (N, n): those that count; s between rows, Hz."""
+
+    A: np.ndarray
+    b: np.ndarray
+    moving: np.ndarray
+    period: float
+    cutoff: float
+    thinned: int
+
+    def part(self, rows: slice) -> "Rows":
+        """Some of the rows, one after another."""
+        return Rows(self.A[rows], self.b[rows], self.moving[rows], self.period, self.cutoff, self.thinned)
+
+    def left(self, p: np.ndarray) -> np.ndarray:
+        """What parameters leave of the forces, (N, n), zero where rows do not count."""
+        return np.where(self.moving, self.b - self.A @ p, 0.0)
+
+
+def covariance(logs: Sequence[Rows], p: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Covariance (k, k) of the parameters; zero for those that are not free."""
+    found = np.zeros((len(p), len(p)))
+    if not len(free):
+        return found
+    scale = np.sqrt(
+        sum(np.sum(np.where(r.moving[:, :, None], r.A[:, :, free], 0.0) ** 2, (0, 1)) for r in logs)
+    )
+    normal, middle = np.zeros((len(free),) * 2), np.zeros((len(free),) * 2)
+    independent = sum(2 * r.cutoff * r.period * np.sum(r.moving) for r in logs)
+    for rows in logs:
+        left = rows.left(p)
+        for i in range(left.shape[1]):
+            x = np.where(rows.moving[:, i, None], rows.A[:, i, free], 0.0) / scale
+            normal += x.T @ x
+            middle += _middle(x, left[:, i], rows, np.mean(rows.moving[:, i]))
+    inverse = np.linalg.inv(normal)
+    # parameters have taken their share of what was there to be left
+    share = independent / max(independent - len(free), 1.0)
+    found[np.ix_(free, free)] = share * (inverse @ middle @ inverse) / np.outer(scale, scale)
+    return found
+
+
+def _middle(x: np.ndarray, left: np.ndarray, rows: Rows, used: float) -> np.ndarray:
+    """The product x' cov(left) x for stationary noise, by its averaged spectrum."""
+    count = len(left)
+    if used == 0:
+        return np.zeros((x.shape[1],) * 2)
+    spectrum = np.abs(np.fft.rfft(left)) ** 2 / (count * used)
+    width = max(3, round(rows.cutoff / BAND * count * rows.period))
+    spectrum = uniform_filter1d(spectrum, width, mode="reflect")
+    seen = np.fft.rfft(x, axis=0)
+    twice = np.full(len(spectrum), 2.0)  # but the mean, and the last of an even count
+    twice[0] = 1.0
+    twice[-1] = 1.0 if count % 2 == 0 else 2.0
+    return np.real(np.conj(seen).T @ (seen * (twice * spectrum)[:, None])) / count

@@ -1,0 +1,177 @@
+"""Forces of a robot as a function of its motion and of some parameters, with slopes, from the model's own equations.
+
+    f = y(q, q', q''; p)          rows y (n,) in N or N.m, slopes dy/dp (n, k), exact
+
+The model is asked for its forces given its driven coordinates, whatever loops it has: what has no closed form is solved
+inside, row by row. Where y is linear in p, slopes are the same at any p, which is looked at and not assumed.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import GantryTauError, ModelError
+from gantrytau.dae import Dae
+from gantrytau.errors import did_you_mean
+
+BLOCK = 1024  # rows of one call
+PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records
+PLATE = ("plate_mass", "tool.m", "platform.m")  # what a robot calls its plate
+LAWS = re.compile(r"\.(f_c|f_v|f_s)(\[\d\])?$")  # as all laws of friction name their parameters
+LINEAR = 1e-9  # of the largest slope of a parameter, by which rounding may change it
+
+
+class IdentificationError(GantryTauError):
+    """Motion and forces that do not determine the parameters of a robot, or are not its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotDynamics:
+    """Inverse dynamics of a robot in some of its parameters.
+
+    coordinates, forces: scalar names, n each; names: public names of the parameters, k; values: by model name, of what
+    is set besides: frictions that are identified apart are zero, fixed parameters what they are fixed to.
+    """
+
+    dae: Dae
+    coordinates: tuple[str, ...]
+    forces: tuple[str, ...]
+    names: tuple[str, ...]
+    values: Mapping[str, float]
+
+    @property
+    def nominal(self) -> np.ndarray:
+        """Values of the parameters in the model, (k,)."""
+        return np.array([self.dae.parameter_values[model_name(self.dae, n)] for n in self.names])
+
+    @property
+    def least(self) -> np.ndarray:
+        """Lower limits that the model declares for the parameters, (k,)."""
+        found = []
+        for name in self.names:
+            declared = self.dae.flat.find(model_name(self.dae, name))
+            limit = None if declared is None else declared.min
+            found.append(-np.inf if limit is None else self.dae.number(limit[0]))
+        return np.array(found)
+
+    @property
+    def laws(self) -> tuple[str | None, ...]:
+        """The component of symmetric friction beside each force, such as `carts[0].law`, None where there is none."""
+        found = []
+        for force in self.forces:
+            owner = force.rpartition(".")[0]
+            within = [n for n in frictions(self.dae) if n.startswith(f"{owner}.") and n.endswith(".f_c")]
+            found.append(within[0].removesuffix(".f_c") if len(within) == 1 else None)
+        return tuple(found)
+
+    @cached_property
+    def _function(self) -> ca.Function:
+        q = self.coordinates
+        motion = [*q, *(f"der({n})" for n in q), *(f"der(der({n}))" for n in q)]
+        wanted = [model_name(self.dae, n) for n in self.names]
+        whole = self.dae.function(given=[*motion, *wanted, *self.values], find=list(self.forces))
+        try:
+            whole, kind = whole.expand(), ca.SX
+        except RuntimeError:  # loops without closed form are solved by a call, which has no written form
+            kind = ca.MX
+        x, p = kind.sym("x", 3 * len(q)), kind.sym("p", len(wanted))
+        y = ca.vertcat(*whole.call([*ca.vertsplit(x), *ca.vertsplit(p), *map(kind, self.values.values())]))
+        slopes = ca.densify(ca.jacobian(y, p))
+        return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True}).map(BLOCK)
+
+    def slopes(self, motion: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Slopes (N, n, k) and forces (N, n) of rows (N, 3 n) of q, q', q''; NaN where the model has no answer."""
+        n, k, rows = len(self.coordinates), len(self.names), len(motion)
+        A, y = np.empty((rows, n, k)), np.empty((rows, n))
+        values = np.tile(np.asarray(p, dtype=float)[:, None], (1, BLOCK))
+        for begin in range(0, rows, BLOCK):
+            part = motion[begin : begin + BLOCK]
+            full = np.concatenate([part, np.repeat(part[-1:], BLOCK - len(part), axis=0)])
+            a, f = self._function(full.T, values)
+            A[begin : begin + BLOCK] = np.asarray(a).reshape(n, BLOCK, k).transpose(1, 0, 2)[: len(part)]
+            y[begin : begin + BLOCK] = np.asarray(f).T[: len(part)]
+        return A, y
+
+    def not_linear(self, motion: np.ndarray) -> tuple[str, ...]:
+        """Parameters along which slopes change, at these rows: forces are not linear in them."""
+        begin = self.nominal
+        first, _ = self.slopes(motion, begin)
+        sizes = np.nanmax(np.abs(first), axis=(0, 1), initial=0.0)
+        found = []
+        for j, name in enumerate(self.names):
+            p = begin.copy()
+            p[j] = 1.5 * p[j] + 0.5  # away from zero, where a product would hide
+            changed = np.nanmax(np.abs(self.slopes(motion, p)[0] - first), axis=(0, 1), initial=0.0)
+            if np.any(changed > LINEAR * np.maximum(sizes, 1e-3 * np.max(sizes, initial=0.0))):
+                found.append(name)
+        return tuple(found)
+
+
+def model_name(dae: Dae, name: str) -> str:
+    """What the model calls a parameter of a public name such as `cart_masses[0]`; others keep their own."""
+    if name == "plate_mass":
+        return next((n for n in PLATE if n in dae.adjustable), name)
+    parted = re.fullmatch(r"(\w+)\[(\d+)\]", name)
+    return PUBLIC[parted[1]].format(parted[2]) if parted and parted[1] in PUBLIC else name
+
+
+def public_name(dae: Dae, name: str) -> str:
+    """The other way round."""
+    if name in PLATE:
+        return "plate_mass"
+    for word, pattern in PUBLIC.items():
+        parted = re.fullmatch(re.escape(pattern).replace(r"\{\}", r"(\d+)"), name)
+        if parted:
+            return f"{word}[{parted[1]}]"
+    return name
+
+
+def drives(dae: Dae) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Driven coordinates and what drives them: the `s` or `phi` beside each input force or torque."""
+    coordinates = []
+    for force in dae.inputs:
+        owner = force.rpartition(".")[0]
+        beside = [f"{owner}.{n}" for n in ("s", "phi")]
+        found = next((n for n in beside if n in dae.variables), None)
+        if found is None:
+            raise ModelError(
+                f"identify: {dae.name} has no {' or '.join(beside)} beside its input {force}, expected the coordinate that "
+                "it drives; give the component one"
+            )
+        coordinates.append(found)
+    if not coordinates:
+        raise ModelError(
+            f"identify: {dae.name} has no inputs, expected forces or torques; declare them as Input"
+        )
+    return tuple(coordinates), tuple(dae.inputs)
+
+
+def candidates(dae: Dae) -> tuple[str, ...]:
+    """Public names of the masses and moments of inertia of a robot that can be adjusted; frictions stand elsewhere."""
+    found = []
+    for name in dae.adjustable:
+        declared = dae.flat.find(name)
+        scalar = declared is not None and declared.shape == ()
+        if scalar and declared.unit in ("kg", "kg.m2") and not LAWS.search(name):
+            found.append(public_name(dae, name))
+    return tuple(dict.fromkeys(found))
+
+
+def frictions(dae: Dae) -> tuple[str, ...]:
+    """Names of the parameters of friction in the model."""
+    return tuple(n for n in dae.adjustable if LAWS.search(n))
+
+
+def expanded(names: Iterable[str] | str, known: Sequence[str]) -> tuple[str, ...]:
+    """Scalar names; a family such as `link_masses` stands for all of it. ModelError for names that are not known."""
+    found: list[str] = []
+    for name in (names,) if isinstance(names, str) else tuple(names):
+        members = [n for n in known if n == name or n.startswith(f"{name}[")]
+        if not members:
+            raise ModelError(f"identify: there is no parameter {name!r}{did_you_mean(name, known)}")
+        found += members
+    return tuple(dict.fromkeys(found))
