@@ -6,7 +6,7 @@ import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
-from gantrytau_optimica.identification.rigid.regression import Factors, Fit
+from gantrytau_optimica.identification.rigid.regression import Factors, LimitedFit
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 PERIODS = 10  # of the cutoff, which a stretch must last to be filtered
@@ -56,7 +56,7 @@ def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[f
     return float(second), findings
 
 
-def fit_findings(names: Sequence[str], found: Fit, weak: Sequence[str]) -> list[Finding]:
+def fit_findings(names: Sequence[str], found: LimitedFit, weak: Sequence[str]) -> list[Finding]:
     """What the motion does not tell, and what cannot be so."""
     findings = []
     silent = found.base.silent(names)

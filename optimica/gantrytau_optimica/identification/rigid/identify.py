@@ -20,8 +20,8 @@ from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, h
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
-from gantrytau_optimica.identification.rigid.regression import Fit, fit
-from gantrytau_optimica.identification.rigid.residual_covariance import Rows, covariance
+from gantrytau_optimica.identification.rigid.regression import LimitedFit, fit
+from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
     RobotDynamics,
@@ -110,7 +110,7 @@ def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str
     return at(minimize_scalar(left, bounds=around, method="bounded", options=dict(xatol=1e-3)).x)
 
 
-def _judged(rows: list[Rows], problem: RigidRegression, least: np.ndarray) -> tuple[float, list[Finding]]:
+def _judged(rows: list[LogRows], problem: RigidRegression, least: np.ndarray) -> tuple[float, list[Finding]]:
     """What a fit of the first half of each log leaves of the second."""
     halves = [[r.part(s) for r in rows for s in (half(len(r.b)),)] for half in (_first, _second)]
     if not all(any(np.any(r.moving) for r in half) for half in halves):
@@ -127,7 +127,9 @@ def _second(count: int) -> slice:
     return slice(count // 2, count)
 
 
-def _identified(problem: RigidRegression, found: Fit, rows: list[Rows], robot: Model) -> Identification:
+def _identified(
+    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model
+) -> Identification:
     """The record of a fit."""
     names, p = problem.names, found.p
     free = found.base.independent[~found.active[found.base.independent]]

@@ -40,7 +40,7 @@ class Factors:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class LimitedFit:
     """Parameters p (k,), of those that are not determined the nominal value.
 
     active: at a limit; inflation: deviation of each over that if it were alone (inf where not determined);
@@ -54,7 +54,7 @@ class Fit:
     condition: float
 
 
-def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> Fit:
+def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> LimitedFit:
     """Least squares with lower limits, -inf for none."""
     base = base_parameters(factors.R)
     free, held = base.independent, base.dependent
@@ -79,4 +79,4 @@ def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> Fit:
         inverse = np.linalg.inv(np.linalg.qr(normed, mode="r"))
         inflation[free] = np.linalg.norm(inverse, axis=1)
     condition = float(np.linalg.cond(normed)) if len(free) else np.nan
-    return Fit(p, base, active, inflation, condition)
+    return LimitedFit(p, base, active, inflation, condition)

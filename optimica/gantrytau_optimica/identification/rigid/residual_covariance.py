@@ -15,7 +15,7 @@ BAND = 5.0  # parts of the cutoff over which the spectrum is averaged
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class LogRows:
     """Filtered rows of one log: A (N, n, k), b (N, n), moving (N, n): those that count; s between rows, Hz."""
 
     A: np.ndarray
@@ -25,16 +25,16 @@ class Rows:
     cutoff: float
     thinned: int
 
-    def part(self, rows: slice) -> "Rows":
+    def part(self, rows: slice) -> "LogRows":
         """Some of the rows, one after another."""
-        return Rows(self.A[rows], self.b[rows], self.moving[rows], self.period, self.cutoff, self.thinned)
+        return LogRows(self.A[rows], self.b[rows], self.moving[rows], self.period, self.cutoff, self.thinned)
 
     def left(self, p: np.ndarray) -> np.ndarray:
         """What parameters leave of the forces, (N, n), zero where rows do not count."""
         return np.where(self.moving, self.b - self.A @ p, 0.0)
 
 
-def covariance(logs: Sequence[Rows], p: np.ndarray, free: np.ndarray) -> np.ndarray:
+def covariance(logs: Sequence[LogRows], p: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Covariance (k, k) of the parameters; zero for those that are not free."""
     found = np.zeros((len(p), len(p)))
     if not len(free):
@@ -57,7 +57,7 @@ def covariance(logs: Sequence[Rows], p: np.ndarray, free: np.ndarray) -> np.ndar
     return found
 
 
-def _middle(x: np.ndarray, left: np.ndarray, rows: Rows, used: float) -> np.ndarray:
+def _middle(x: np.ndarray, left: np.ndarray, rows: LogRows, used: float) -> np.ndarray:
     """The product x' cov(left) x for stationary noise, by its averaged spectrum."""
     count = len(left)
     if used == 0:

@@ -1,4 +1,4 @@
-"""Rows of a regression from filtered motion, and the minimum over parameters, linear or not.
+"""LogRows of a regression from filtered motion, and the minimum over parameters, linear or not.
 
 Where forces are not linear in some parameters, each step linearises them with exact slopes (Gauss-Newton) and is halved
 while it does not descend; where they are, one step is the answer.
@@ -12,8 +12,8 @@ import numpy as np
 
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns
 from gantrytau_optimica.identification.rigid.parallel_filter import FilteredMotion
-from gantrytau_optimica.identification.rigid.regression import Factors, Fit, fit
-from gantrytau_optimica.identification.rigid.residual_covariance import Rows
+from gantrytau_optimica.identification.rigid.regression import Factors, LimitedFit, fit
+from gantrytau_optimica.identification.rigid.residual_covariance import LogRows
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError, RobotDynamics
 
 STEPS = 30
@@ -60,7 +60,7 @@ class RigidRegression:
         """Parameters in which forces are not linear, as seen along the motion."""
         return self.dynamics.not_linear(self._some_rows())
 
-    def rows(self, p: np.ndarray) -> list[Rows]:
+    def rows(self, p: np.ndarray) -> list[LogRows]:
         """Forces linearised at parameters p, filtered, one record for each motion.
 
         Raises IdentificationError where the model has no forces: outside of its workspace.
@@ -84,11 +84,11 @@ class RigidRegression:
                 A = np.concatenate([A, motion.thin(self.friction.columns(motion.v, motion.speed))], axis=2)
             moving = motion.moving(self.minimum_speed)
             A, b = motion.filtered(A), motion.filtered(motion.f - known)
-            found.append(Rows(A, b, moving, motion.period, motion.cutoff, motion.thinned))
+            found.append(LogRows(A, b, moving, motion.period, motion.cutoff, motion.thinned))
         return found
 
 
-def factors_of(rows: Sequence[Rows]) -> Factors:
+def factors_of(rows: Sequence[LogRows]) -> Factors:
     """Triangular factors of all rows that count. IdentificationError where none does."""
     if not any(np.any(r.moving) for r in rows):
         raise IdentificationError(
@@ -97,7 +97,9 @@ def factors_of(rows: Sequence[Rows]) -> Factors:
     return reduce(Factors.__add__, (Factors.of(r.A[r.moving], r.b[r.moving]) for r in rows))
 
 
-def minimum(problem: RigidRegression, least: np.ndarray, nonlinear: Sequence[str]) -> tuple[Fit, list[Rows]]:
+def minimum(
+    problem: RigidRegression, least: np.ndarray, nonlinear: Sequence[str]
+) -> tuple[LimitedFit, list[LogRows]]:
     """The least squares and the rows at it. Raises IdentificationError where Gauss-Newton does not settle."""
     nominal = problem.nominal
     rows = problem.rows(nominal)
