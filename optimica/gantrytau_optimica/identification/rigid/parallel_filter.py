@@ -24,7 +24,7 @@ ENDS = 0.5  # periods of the cutoff at either end, in which the filter knows one
 
 @dataclass(frozen=True, eq=False)
 class FilteredMotion:
-    """LogRows of one log at equal steps, thinned: motion (N, 3 n) of q, q', q'' and forces f (N, n), not yet filtered by H.
+    """Rows of one log at equal steps, thinned: motion (N, 3 n) of q, q', q'' and forces f (N, n), not yet filtered by H.
 
     log_period: s, of the log, of whose rows each `thinned`th is kept; v, speed (all rows of the log, n): the second filtered
     by H, for the sign of friction and the dead zone. That sign jumps, so friction is filtered before it is thinned.

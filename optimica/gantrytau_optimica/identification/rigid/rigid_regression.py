@@ -1,4 +1,4 @@
-"""LogRows of a regression from filtered motion, and the minimum over parameters, linear or not.
+"""Rows of a regression from filtered motion, and the minimum over parameters, linear or not.
 
 Where forces are not linear in some parameters, each step linearises them with exact slopes (Gauss-Newton) and is halved
 while it does not descend; where they are, one step is the answer.
