@@ -10,6 +10,7 @@ from gantrytau_models.control.references import CircularReference
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
 from gantrytau_models.mechanisms.delta import DeltaRobot
 from gantrytau_models.mechanisms.f1 import F1GantryTau
+from gantrytau_models.mechanisms.flexible import FlexibleGantryTau
 from gantrytau_models.mechanisms.four_bar import FourBar
 from gantrytau_models.mechanisms.gantry_tau import GantryTau
 from gantrytau_models.mechanisms.pendulum import Pendulum
@@ -26,6 +27,7 @@ __all__ = [
     "F1GantryTau",
     "F1WithWrist",
     "Feedforward",
+    "FlexibleGantryTau",
     "ForwardKinematics",
     "FourBar",
     "GantryTau",

@@ -18,24 +18,29 @@ import functools
 import math
 import tomllib
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau_models.quantities import (
+    REMEDY,
+    ROUNDING,
+    Matrix,
+    Vector,
+    check_inertia,
+    check_rotation,
+    hold_numbers,
+    hold_records,
+    quantities_of,
+    quantity,
+)
 
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
 Quaternion = tuple[float, float, float, float]
 
 _FOLDER = Path(__file__).parent / "parameters"
-_REMEDY = "correct the value in the TOML file or in dataclasses.replace"
-_COUNTS = {3: "three", 4: "four"}
 _NO_ROTATION: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_ROUNDING = 1e-5  # ten times what six decimals leave of a rotation matrix
 
 
 class UnknownPrototype(ModelError, AttributeError):
@@ -46,22 +51,12 @@ class DoubtfulPrototype(UserWarning):
     """A prototype as it is printed, although the print is known to be wrong."""
 
 
-def _quantity(unit: str, description: str, **limits: Any) -> dict[str, Any]:
-    """What a field says about its number, or about each number of its array.
-
-    limits: shape of an array; positive: each number must be above 0; least: the smallest number allowed;
-    nonzero: not all may be 0; optional: None is allowed.
-    """
-    usual = dict(shape=(), positive=False, least=-math.inf, nonzero=False, optional=False)
-    return dict(unit=unit, description=description) | usual | limits
-
-
 def _vector(unit: str, description: str, **limits: Any) -> dict[str, Any]:
-    return _quantity(unit, description, shape=(3,), **limits)
+    return quantity(unit, description, shape=(3,), **limits)
 
 
 def _matrix(unit: str, description: str) -> dict[str, Any]:
-    return _quantity(unit, description, shape=(3, 3))
+    return quantity(unit, description, shape=(3, 3))
 
 
 _DIRECTION = _vector("1", "axis of the guideway; its length is the transmission factor", nonzero=True)
@@ -72,11 +67,11 @@ class _AnyLink:
     """What all links between a cart and a plate that can turn have."""
 
     plate_offset: Vector = field(metadata=_vector("m", "joint on the plate B_ij^0, plate frame"))
-    length: float = field(metadata=_quantity("m", "distance of its two ball joints", positive=True))
-    mass: float = field(metadata=_quantity("kg", "mass of this one link", least=0.0))
+    length: float = field(metadata=quantity("m", "distance of its two ball joints", positive=True))
+    mass: float = field(metadata=quantity("kg", "mass of this one link", least=0.0))
 
     def __post_init__(self):
-        _hold_numbers(self, type(self).__name__)
+        hold_numbers(self, type(self).__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +98,7 @@ class Arm:
     one, for the robot whose plate can turn. Neither follows when the other is replaced.
     """
 
-    length: float = field(metadata=_quantity("m", "length of the link between cart and tool", positive=True))
+    length: float = field(metadata=quantity("m", "length of the link between cart and tool", positive=True))
     offset: Vector = field(
         metadata=_vector("m", "cart at s = 0, less the place of the joint on the plate (4.7)")
     )
@@ -111,8 +106,8 @@ class Arm:
     links: tuple[Link, ...] = ()
 
     def __post_init__(self):
-        _hold_numbers(self, "Arm")
-        _hold_records(self, "Arm", "links", Link)
+        hold_numbers(self, "Arm")
+        hold_records(self, "Arm", "links", Link)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +115,7 @@ class _Robot:
     """What all Gantry-Tau robots have."""
 
     name: str
-    plate_mass: float = field(metadata=_quantity("kg", "mass of the plate and tool", positive=True))
+    plate_mass: float = field(metadata=quantity("kg", "mass of the plate and tool", positive=True))
     plate_inertia: Matrix = field(metadata=_matrix("kg.m2", "inertia about the centre of mass, plate axes"))
     plate_centre: Vector = field(
         default=(0.0, 0.0, 0.0), metadata=_vector("m", "centre of mass from the tool point, plate frame")
@@ -136,9 +131,9 @@ class _Robot:
     assumed: tuple[str, ...] = ()  # what the source does not print for this robot
 
     def __post_init__(self):
-        _hold_numbers(self, self.name)
-        _check_inertia(f"{self.name}.plate_inertia", self.plate_inertia)
-        _check_rotation(f"{self.name}.plate_rotation", self.plate_rotation)
+        hold_numbers(self, self.name)
+        check_inertia(f"{self.name}.plate_inertia", self.plate_inertia)
+        check_rotation(f"{self.name}.plate_rotation", self.plate_rotation)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,8 +148,22 @@ class Prototype(_Robot):
     link_masses: Vector = field(metadata=_vector("kg", "mass of the links of each arm together", least=0.0))
 
     def __post_init__(self):
-        _hold_records(self, self.name, "arms", Arm, count=3)
+        hold_records(self, self.name, "arms", Arm, count=3)
         super().__post_init__()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlexiblePrototype(Prototype):
+    """A robot with three arms whose frame sways and whose arms give way; in a point of its workspace."""
+
+    frame_mass: float = field(metadata=quantity("kg", "mass of the frame that sways along x", positive=True))
+    frame_stiffness: float = field(metadata=quantity("N/m", "stiffness of its feet along x", positive=True))
+    frame_damping: float = field(metadata=quantity("N.s/m", "damping of its feet along x", least=0.0))
+    arm_stiffness: Vector = field(
+        metadata=_vector("N/m", "stiffness of each arm along its link", positive=True)
+    )
+    arm_damping: Vector = field(metadata=_vector("N.s/m", "damping of each arm along its link", least=0.0))
+    lever: float = field(metadata=quantity("1", "deflection of the wrist for a unit of that of the plate"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,17 +183,17 @@ class Turntable:
 
     offset: Vector = field(metadata=_vector("m", "origin of its frame in the frame that carries it"))
     orientation: Quaternion = field(
-        metadata=_quantity("1", "quaternion of its frame at angle 0, scalar first", shape=(4,))
+        metadata=quantity("1", "quaternion of its frame at angle 0, scalar first", shape=(4,))
     )
     axis: Vector = field(metadata=_vector("1", "unit vector of the axis of rotation, its own frame"))
-    mass: float = field(metadata=_quantity("kg", "mass, centred in the origin of its frame", positive=True))
+    mass: float = field(metadata=quantity("kg", "mass, centred in the origin of its frame", positive=True))
     inertia: Matrix = field(metadata=_matrix("kg.m2", "inertia about the origin of its frame, own axes"))
 
     def __post_init__(self):
-        _hold_numbers(self, "Turntable")
-        _check_inertia("Turntable.inertia", self.inertia)
-        if abs(math.hypot(*self.axis) - 1.0) > _ROUNDING:
-            raise ModelError(f"Turntable.axis: found {self.axis}, expected a unit vector; {_REMEDY}")
+        hold_numbers(self, "Turntable")
+        check_inertia("Turntable.inertia", self.inertia)
+        if abs(math.hypot(*self.axis) - 1.0) > ROUNDING:
+            raise ModelError(f"Turntable.axis: found {self.axis}, expected a unit vector; {REMEDY}")
 
 
 @dataclass(frozen=True)
@@ -197,9 +206,9 @@ class RotatingArm:
     links: tuple[RotatingLink, ...]
 
     def __post_init__(self):
-        _hold_numbers(self, "RotatingArm")
-        _hold_records(self, "RotatingArm", "turntables", Turntable)
-        _hold_records(self, "RotatingArm", "links", RotatingLink)
+        hold_numbers(self, "RotatingArm")
+        hold_records(self, "RotatingArm", "turntables", Turntable)
+        hold_records(self, "RotatingArm", "links", RotatingLink)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +223,7 @@ class RotatingPrototype(_Robot):
     unit_norm: bool = True
 
     def __post_init__(self):
-        _hold_records(self, self.name, "arms", RotatingArm, count=3)
+        hold_records(self, self.name, "arms", RotatingArm, count=3)
         super().__post_init__()
         for i, arm in enumerate(self.arms):
             for k, turntable in enumerate(arm.turntables):
@@ -224,84 +233,6 @@ class RotatingPrototype(_Robot):
                         f"{self.name}.arms[{i}].turntables[{k}].orientation: found a quaternion of length"
                         f" {norm:.6g}, expected 1; normalise it, or say unit_norm=False"
                     )
-
-
-def _hold_records(record: Any, path: str, name: str, kind: type, *, count: int | None = None) -> None:
-    """Check a sequence of records of one kind, and hold it as a tuple."""
-    value = getattr(record, name)
-    items = tuple(value) if isinstance(value, Iterable) else (value,)
-    if not all(isinstance(item, kind) for item in items) or len(items) != (count or len(items)):
-        found = ", ".join(type(item).__name__ for item in items) or "nothing"
-        number = f"{_COUNTS[count]} " if count else ""
-        raise ModelError(f"{path}.{name}: found {found}; expected {number}{kind.__name__} records; {_REMEDY}")
-    object.__setattr__(record, name, items)
-
-
-def _hold_numbers(record: Any, path: str) -> None:
-    """Check the quantities of a record, and hold them as floats and tuples of floats."""
-    for item in _quantities_of(type(record)):
-        value = getattr(record, item.name)
-        if not (value is None and item.metadata["optional"]):
-            held = _numbers(f"{path}.{item.name}", value, item, item.metadata["shape"])
-            object.__setattr__(record, item.name, held)
-
-
-def _quantities_of(record: type) -> list[dataclasses.Field]:
-    return [item for item in dataclasses.fields(record) if "unit" in item.metadata]
-
-
-def _numbers(place: str, value: Any, item: dataclasses.Field, shape: Sequence[int]) -> Any:
-    """A number, or nested tuples of numbers of this shape, within the bounds of the field."""
-    if not shape:
-        return _number(place, value, item)
-    if isinstance(value, str) or not isinstance(value, Iterable) or len(elements := list(value)) != shape[0]:
-        rows = "rows of three numbers" if len(shape) > 1 else "numbers"
-        raise ModelError(
-            f"{place}: found {value!r}, expected {_COUNTS[shape[0]]} {rows} in {_unit(item)}; {_REMEDY}"
-        )
-    held = tuple(_numbers(f"{place}[{k}]", element, item, shape[1:]) for k, element in enumerate(elements))
-    if item.metadata["nonzero"] and not any(held):
-        raise ModelError(f"{place}: found {value!r}, expected the axis of a guideway; {_REMEDY}")
-    return held
-
-
-def _number(place: str, value: Any, item: dataclasses.Field) -> float:
-    """A finite number within the bounds of its field."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    positive, least = item.metadata["positive"], item.metadata["least"]
-    if math.isfinite(number) and number >= least and (number > 0 or not positive):
-        return number
-    bound = " above 0" if positive else "" if least == -math.inf else f" of at least {least:g}"
-    raise ModelError(f"{place}: found {value!r}, expected a finite number{bound} in {_unit(item)}; {_REMEDY}")
-
-
-def _unit(item: dataclasses.Field) -> str:
-    unit = item.metadata["unit"]
-    return "no unit" if unit == "1" else unit
-
-
-def _check_rotation(place: str, rotation: Matrix) -> None:
-    matrix = np.array(rotation)
-    if np.abs(matrix.T @ matrix - np.eye(3)).max() > _ROUNDING or np.linalg.det(matrix) < 0:
-        raise ModelError(f"{place}: found {rotation}, expected a rotation matrix; {_REMEDY}")
-
-
-def _check_inertia(place: str, inertia: Matrix) -> None:
-    """Refuse what no rigid body has: each principal moment is at most the sum of the other two."""
-    matrix = np.array(inertia)
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * np.abs(matrix).max()):
-        raise ModelError(f"{place}: found {inertia}, expected a symmetric matrix in kg.m2; {_REMEDY}")
-    moments = np.linalg.eigvalsh(matrix)
-    shown = ", ".join(f"{moment:.4g}" for moment in moments)
-    if moments[0] <= 0.0:
-        raise ModelError(f"{place}: found principal moments {shown} kg.m2, expected all above 0; {_REMEDY}")
-    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
-        raise ModelError(
-            f"{place}: found principal moments {shown} kg.m2, expected none above the sum of the others; {_REMEDY}"
-        )
 
 
 @functools.cache
@@ -325,7 +256,7 @@ def _build(record: type, file: str, *keys: str | int, **others: Any) -> Any:
     table: Any = _table(file)
     for key in keys:
         table = table[key]
-    for item in _quantities_of(record):
+    for item in quantities_of(record):
         if item.name in table or (item.name not in others and item.default is dataclasses.MISSING):
             others[item.name] = _entry(file, (*keys, item.name), item.metadata["unit"])
     return record(**others)
@@ -362,6 +293,8 @@ def _read(name: str) -> Prototype | RotatingPrototype:
     kind, read_arm, others = Prototype, _arm, {}
     if "unit_norm" in table:
         kind, read_arm, others = RotatingPrototype, _rotating_arm, {"unit_norm": table["unit_norm"]}
+    if "frame_mass" in table:
+        kind = FlexiblePrototype
     arms = [read_arm(name, i) for i in range(len(table["arms"]))]
     assumed = tuple(table.get("assumed", ()))
     return _build(kind, name, name=name, arms=arms, source=table["source"], assumed=assumed, **others)
@@ -375,6 +308,7 @@ def names() -> list[str]:
 D1: Prototype
 GT_A: Prototype
 L1: Prototype
+L1_flexible: FlexiblePrototype
 F1: RotatingPrototype
 F1_ideal: RotatingPrototype
 F1_printed: RotatingPrototype
