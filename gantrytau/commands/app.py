@@ -11,6 +11,7 @@ from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
 from gantrytau.commands.doctor_command import doctor
 from gantrytau.commands.equations_command import equations
+from gantrytau.commands.identify.identify_command import identify
 from gantrytau.commands.library_command import library
 from gantrytau.commands.optimize_command import optimize
 from gantrytau.commands.printing.reporting import Commands
@@ -19,7 +20,7 @@ from gantrytau.commands.study_command import study
 
 app = typer.Typer(
     cls=Commands,
-    help="Acausal models of parallel robots: simulate, optimise, calibrate, export.",
+    help="Acausal models of parallel robots: simulate, optimise, calibrate, identify, export.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_show_locals=False,
@@ -38,7 +39,7 @@ def options(
         bool, typer.Option("--version", help="Print the version.", callback=_tell, is_eager=True)
     ] = False,
 ) -> None:
-    """Acausal models of parallel robots: simulate, optimise, calibrate, export."""
+    """Acausal models of parallel robots: simulate, optimise, calibrate, identify, export."""
 
 
 app.command()(doctor)
@@ -53,6 +54,9 @@ app.command(
 app.command(
     epilog="Example: gantrytau calibrate measurements.csv --robot 'GantryTau(L1)' --set arms[0].length=1.52"
 )(calibrate)
+app.command(epilog="Example: gantrytau identify log.csv --robot 'GantryTau(L1)' --fixed link_masses=0")(
+    identify
+)
 app.command(
     epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"
 )(optimize)

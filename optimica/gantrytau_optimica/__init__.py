@@ -37,6 +37,7 @@ from gantrytau_optimica.estimation.experiments import Experiment
 from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.logs.robot_checks import check_motion
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
@@ -112,6 +113,7 @@ __all__ = [
     "calibrate",
     "calibrated_geometry",
     "cell_example",
+    "check_motion",
     "compare_records",
     "cross_validate",
     "enough_poses",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LAGS = 25  # samples, to either side, among which the best is looked for
-BETTER = 0.97  # of the residual without lag, which a lag must leave to be told
+BETTER = 0.97  # of the squares without lag, which a lag must leave to be told; one sample rarely does
 ENOUGH = 0.5  # of the forces' variance, that must be explained before anything is said
 LEAST_POWER = 0.02  # of the mean of |f v|, below which friction has no sign
 
@@ -39,7 +39,7 @@ def plain_fits(
     total = float(np.sum((f[rows] - f[rows].mean(axis=0)) ** 2))
     if left[lag] > (1 - ENOUGH) * total or abs(lag) == LAGS:
         return None
-    lag = lag if left[lag] < BETTER**2 * left[0] else 0
+    lag = lag if left[lag] < BETTER * left[0] else 0
     powers = [_power(_columns(q, v, a, k), f[rows + lag, k], v[:, k]) for k in range(q.shape[1])]
     return PlainFits(lag, all(power < -LEAST_POWER for power in powers))
 

@@ -1,0 +1,150 @@
+"""`gantrytau identify`: masses and friction of a robot from logs of its motion."""
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
+from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
+from gantrytau.commands.printing.spelling import Spelling
+
+if TYPE_CHECKING:
+    from gantrytau_optimica import Finding, Identification, MotionLog
+
+LAWS = ("symmetric", "asymmetric", "stribeck", "none")
+SPELLING = Spelling(
+    ("identify",), {name: f"--{name}" for name in ("friction", "fixed", "cutoff")} | {"robot": "--robot"}
+)
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE...",
+        help="Logs of motion, as log.csv with the header t,q1,...,f1,... in SI, or with units, as 'q1 [mm]'.",
+        show_default=False,
+    ),
+]
+RobotName = Annotated[
+    str,
+    typer.Option(
+        "--robot",
+        metavar="MODEL",
+        help="The robot with its nominal values, named as for the other commands: 'GantryTau(L1)', robot.py:Robot.",
+        show_default=False,
+    ),
+]
+FixedValues = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fixed",
+        metavar="NAME=VALUE",
+        help="Parameters or families that are known: link_masses=0, cart_masses[0]=13.1. Repeatable.",
+        show_default=False,
+    ),
+]
+Report = Annotated[
+    Path | None, typer.Option("--report", help="Write a page (HTML) of what was found.", show_default=False)
+]
+
+
+def identify(
+    files: Logs,
+    robot: RobotName,
+    friction: Annotated[
+        str, typer.Option(metavar="|".join(LAWS), help="The law of friction; none keeps the model's.")
+    ] = "symmetric",
+    fixed: FixedValues = None,
+    cutoff: Annotated[float, typer.Option(metavar="HZ", help="Of the filter of motion and forces.")] = 10.0,
+    report: Report = None,
+    prototype: PrototypeName = None,
+    set_: Settings = None,
+    json: Json = False,
+) -> None:
+    """Identify masses and friction of a robot from logs of its motion and forces.
+
+    What is wrong with the logs, as gaps, units, late forces, is told with rows and remedy. The last line has the values as
+    options of all commands: --set carts[0].m=13.1.
+    """
+    with reporting(json, source_of(robot), SPELLING):
+        from gantrytau_optimica import MotionLog, check_motion
+        from gantrytau_optimica import identify as identified
+
+        if friction not in LAWS:
+            raise CommandError(
+                f"--friction {friction}: found an unknown law, expected one of {', '.join(LAWS)}"
+            )
+        known = dict(_fixed(text) for text in fixed or ())
+        chosen = build(robot, prototype, set_ or ())
+        with refusing():
+            logs = [MotionLog.read(file) for file in files]
+        with busy(f"identifying {type(chosen.model).__name__}"):
+            noticed = [
+                (file, f)
+                for file, log in zip(files, logs, strict=True)
+                for f in _once(log, check_motion(chosen.model, log))
+            ]
+            law: Any = None if friction == "none" else friction
+            found = identified(chosen.model, logs, fixed=known, friction=law, cutoff=cutoff)
+        if report is not None:
+            with writable(report):
+                found.report(report)
+        record = summary(found, noticed)
+        typer.echo(
+            as_json({**record, "report": None if report is None else str(report)})
+            if json
+            else _told(found, record)
+        )
+
+
+def _fixed(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise CommandError(
+            f"--fixed {text}: found {value!r}, expected a number, as --fixed link_masses=0"
+        ) from None
+
+
+def _once(log: "MotionLog", against: "tuple[Finding, ...]") -> "list[Finding]":
+    """Findings of a log, and of it beside the robot, one of each kind of the latter."""
+    own = list(log.findings)
+    return [*own, *(f for f in against if f.kind not in {one.kind for one in own})]
+
+
+def summary(found: "Identification", noticed: "list[tuple[Path, Finding]]") -> dict[str, Any]:
+    """What was found as a record for programs; rows of findings count from 0."""
+    deviations = found.deviations
+    told = [
+        dict(file=str(file), kind=f.kind, message=f.message, rows=f.rows.tolist()[:100])
+        for file, f in noticed
+    ]
+    told += [
+        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:100]) for f in found.findings
+    ]
+    return {
+        "robot": found.robot_name,
+        "parameters": {
+            name: {"value": float(value), "deviation": float(deviations[name])}
+            for name, value in found.parameters.items()
+        },
+        "weak": list(found.weak),
+        "active": list(found.active),
+        "condition": float(found.condition),
+        "squares_N2": found.squares.tolist(),
+        "set": {name: float(value) for name, value in found.model_values.items()},
+        "findings": told,
+    }
+
+
+def _told(found: "Identification", record: dict[str, Any]) -> str:
+    """The same for readers."""
+    lines = [str(found)]
+    lines += [
+        f"  {Path(f['file']).name}: {f['kind']}: {f['message']}" for f in record["findings"] if f["file"]
+    ]
+    options = " ".join(f"--set {shlex.quote(f'{name}={value:.9g}')}" for name, value in record["set"].items())
+    return "\n".join([*lines, f"As options: {options}"])
