@@ -9,6 +9,7 @@ from gantrytau_models.control.plant import MeasuredGantryTau, MotorDrivenGantryT
 from gantrytau_models.control.references import CircularReference
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
 from gantrytau_models.mechanisms.delta import DeltaRobot
+from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
 from gantrytau_models.mechanisms.f1 import F1GantryTau
 from gantrytau_models.mechanisms.flexible import FlexibleGantryTau
 from gantrytau_models.mechanisms.four_bar import FourBar
@@ -24,6 +25,7 @@ __all__ = [
     "ComputedTorqueController",
     "ControlledRobot",
     "DeltaRobot",
+    "ElasticSixLinkGantryTau",
     "F1GantryTau",
     "F1WithWrist",
     "Feedforward",
