@@ -50,6 +50,7 @@ def test_what_is_wrong_with_a_log_is_told_with_its_file(run, log, tmp_path):
     answer = run("identify", late, *ROBOT)
     assert answer.exit_code == 0, answer.output
     assert "late.csv: delay: forces are 5 samples late" in answer.stdout
+    assert answer.stdout.count("delay:") == 1
     assert "late.csv: unit of force: forces are 1" in answer.stdout
 
 

@@ -1,6 +1,7 @@
 """`gantrytau identify`: masses and friction of a robot from logs of its motion."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -123,7 +124,9 @@ def summary(found: "Identification", noticed: "list[tuple[Path, Finding]]") -> d
         for file, f in noticed
     ]
     told += [
-        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:100]) for f in found.findings
+        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:100])
+        for f in found.findings
+        if f.kind not in {one["kind"] for one in told}
     ]
     return {
         "robot": found.robot_name,
@@ -142,9 +145,9 @@ def summary(found: "Identification", noticed: "list[tuple[Path, Finding]]") -> d
 
 def _told(found: "Identification", record: dict[str, Any]) -> str:
     """The same for readers."""
-    lines = [str(found)]
-    lines += [
-        f"  {Path(f['file']).name}: {f['kind']}: {f['message']}" for f in record["findings"] if f["file"]
-    ]
+    lines = [str(replace(found, findings=()))]
+    for finding in record["findings"]:
+        place = f"{Path(finding['file']).name}: " if finding["file"] else ""
+        lines.append(f"  {place}{finding['kind']}: {finding['message']}")
     options = " ".join(f"--set {shlex.quote(f'{name}={value:.9g}')}" for name, value in record["set"].items())
     return "\n".join([*lines, f"As options: {options}"])

@@ -139,3 +139,11 @@ def test_gaps_and_flipped_forces_are_findings(robot):
     assert found.findings[0].rows.tolist() == list(range(3000, 3010))
     flipped = identify(robot, replace(log, f=-log.f), fixed=WITHOUT_LINKS)
     assert "sign of forces" in [x.kind for x in flipped.findings]
+
+
+def test_what_a_log_tells_of_itself_is_told_of_the_fit(robot):
+    log = logs.log(0)
+    late = replace(log, f=np.roll(log.f, 5, axis=0))
+    found = identify(robot, [log, late], fixed=WITHOUT_LINKS).findings
+    (delay,) = (x for x in found if x.kind == "delay")
+    assert delay.message.startswith("log 1: forces are 5 samples late")

@@ -138,8 +138,12 @@ class MotionLog:
         kept = np.flatnonzero(good)
         step = np.diff(self.t)
         broken = (step <= 0) | (step > GAP * np.median(step[step > 0])) if np.any(step > 0) else step <= 0
-        crossed = np.add.reduceat(np.append(broken, False), kept)[:-1] > 0 if kept.size > 1 else np.zeros(0)
-        ends = np.flatnonzero((np.diff(kept) > 1) | crossed) + 1
+        crossed = (
+            np.add.reduceat(np.append(broken, False), kept)[:-1] > 0
+            if kept.size > 1
+            else np.zeros(0, dtype=bool)
+        )
+        ends = np.flatnonzero(np.logical_or(np.diff(kept) > 1, crossed)) + 1
         return tuple(self[rows] for rows in np.split(kept, ends) if rows.size)
 
 

@@ -1,6 +1,7 @@
 """What is noticed of logs and of a fit: findings in words, with rows and remedy."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.regression import Factors, LimitedFit
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
+LEFT_OUT = ("nan", "time", "gaps")  # kinds of findings of a log, whose rows are told together
 PERIODS = 10  # of the cutoff, which a stretch must last to be filtered
 WORSE = 1.5  # times what a fit leaves where it was made, above which held-out rows contradict it
 
@@ -35,6 +37,9 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
                 f"at least {PERIODS / cutoff:g} s"
             )
             findings.append(Finding("gaps", bad, words))
+        told = [f for f in log.findings if f.kind not in LEFT_OUT]
+        where = f"log {number}: " if len(logs) > 1 else ""
+        findings += [replace(f, message=f"{where}{f.message}") for f in told]
     if not kept:
         raise IdentificationError(
             f"identify: no log lasts {PERIODS} periods of the cutoff of {cutoff:g} Hz, {PERIODS / cutoff:g} s, without gap; "
