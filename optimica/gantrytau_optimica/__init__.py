@@ -13,9 +13,11 @@ from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
 from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityTable, sensitivity_table
+from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
 from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
+from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.judging.device_frames import frame_words
@@ -71,6 +73,7 @@ from gantrytau_optimica.studies.trade_off import TradeOff
 
 __all__ = [
     "About",
+    "Accelerometer",
     "Bars",
     "Calibration",
     "CalibrationError",
@@ -101,6 +104,7 @@ __all__ = [
     "Path",
     "PlannedCell",
     "Prepared",
+    "SampledDevice",
     "Samples",
     "SavedOptimum",
     "Sensitivities",
@@ -145,6 +149,7 @@ __all__ = [
     "plan_calibration",
     "plan_cell",
     "predict",
+    "predict_late",
     "prepare",
     "read_arms",
     "read_cell",

@@ -1,0 +1,142 @@
+"""Devices that watch a motion: noise, bandwidth, range, friction of a tip, predictors, orientation."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError, Result
+from gantrytau.kinematics.rotations import turned
+from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
+from gantrytau_optimica.calibration.devices.devices import LaserTracker
+from gantrytau_optimica.calibration.devices.gauges import LengthGauge
+from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
+
+
+def motion(name: str, values, t) -> Result:
+    return Result(t, {f"{name}[{k}]": np.broadcast_to(x, t.shape) for k, x in enumerate(values)})
+
+
+def test_tracker_has_its_deviations_and_equal_seeds_give_equal_series():
+    t = np.linspace(0.0, 4.0, 9)
+    path = motion("tool.r", [3.0 + 0.1 * t, 0.0, 0.0], t)
+    tracker = LaserTracker()
+    series = SampledDevice(tracker).measure(path, rate=1000.0, seed=3)
+    assert len(series.time) == 4001
+    assert series.unit("range") == "m"
+    miss = series["r"] - path.at(series.time, "tool.r")
+    expected = np.sqrt(np.diag(tracker.covariance([[3.2, 0.0, 0.0]])[0]))
+    assert miss.std(axis=0) == pytest.approx(
+        expected, rel=0.05
+    )  # 4001 readings: 1.1 %, four and a half times
+    again = SampledDevice(tracker).measure(path, rate=1000.0, seed=3)
+    other = SampledDevice(tracker).measure(path, rate=1000.0, seed=4)
+    assert np.array_equal(series["r"], again["r"])
+    assert not np.array_equal(series["r"], other["r"])
+
+
+def test_rate_that_does_not_divide_and_times_that_repeat():
+    t = np.array([0.0, 0.5, 0.5, 1.0])
+    jump = motion("tool.r", [np.array([1.0, 1.0, 2.0, 2.0]), 0.0, 0.0], t)
+    exact = SampledDevice(LaserTracker(range_noise=0.0, range_noise_per_metre=0.0))
+    series = exact.measure(jump, rate=2.0)
+    assert series["range"] == pytest.approx([1.0, 2.0, 2.0])  # at the jump, what is behind it
+    assert exact.measure(jump, rate=3.0).time == pytest.approx([0, 1 / 3, 2 / 3, 1])
+    assert exact.measure(jump, rate=0.3).time == pytest.approx([0.0])
+    assert exact.measure(jump, rate=1.5).time == pytest.approx([0.0, 2 / 3])
+    for rate in (0.0, -1.0, np.nan):
+        with pytest.raises(ModelError, match="expected a number above 0 in Hz"):
+            exact.measure(jump, rate=rate)
+
+
+def test_friction_at_the_tip_gives_a_loop_as_wide_as_twice_the_play():
+    t = np.linspace(0.0, 2.0, 2001)
+    path = motion("tool.r", [0.01 + 1e-3 * np.sin(np.pi * t), 0.0, 0.0], t)
+    gauge = SampledDevice(LengthGauge(noise=0.0), play=2e-6)
+    series = gauge.measure(path, rate=500.0)
+    lag = series["length"] - path.at(series.time, "tool.r[0]")
+    assert lag[50] == pytest.approx(-2e-6)  # on the way out
+    assert lag[500] == pytest.approx(2e-6)  # on the way back
+    with pytest.raises(ModelError, match="expected a LengthGauge; nothing else touches"):
+        SampledDevice(LaserTracker(), play=1e-6)
+    with pytest.raises(ModelError, match="found play=-1"):
+        SampledDevice(LengthGauge(), play=-1.0)
+
+
+@pytest.mark.parametrize(("latency", "late"), [(0.0, 0), (0.004, 1), (0.009, 3), (0.012, 3)])
+def test_predictor_misses_what_theory_says(latency, late):
+    h, a = 0.004, 3.0
+    t = h * np.arange(100)
+    series = Result(t, {"x": a * t**2 / 2})
+    first = predict_late(series, "x", latency=latency)
+    assert np.count_nonzero(np.isnan(first)) == late + 1
+    miss = series["x"] - first
+    assert miss[late + 1 :] == pytest.approx(a * h**2 * late * (late + 1) / 2, abs=1e-12)
+    second = predict_late(series, "x", latency=latency, degree=2)
+    assert second[late + 2 :] == pytest.approx(series["x"][late + 2 :], abs=1e-12)  # exact for parabolas
+
+
+def test_predictor_refuses_what_it_cannot_do():
+    series = Result(np.array([0.0, 1.0, 2.0]), {"x": np.zeros(3)})
+    with pytest.raises(ModelError, match="found 3 readings, expected more than 3"):
+        predict_late(series, "x", latency=2.0)
+    with pytest.raises(ModelError, match="latency in s that is not negative"):
+        predict_late(series, "x", latency=-1.0)
+    with pytest.raises(ModelError, match="uneven times"):
+        predict_late(Result(np.array([0.0, 1.0, 3.0]), {"x": np.zeros(3)}), "x", latency=0.0)
+
+
+@pytest.mark.parametrize(("rate", "bandwidth"), [(1000.0, 50.0), (250.0, 100.0)])
+def test_bandwidth_is_at_minus_3_dB(rate, bandwidth):
+    t = np.linspace(0.0, 1.0, 40001)
+    path = motion("accelerometer.a", [np.sin(2 * np.pi * bandwidth * t), 0.0, 0.0], t)
+    device = Accelerometer(noise=0.0, bandwidth=bandwidth)
+    series = device.measure(path, rate=rate)
+    late = series.time > 0.5
+    basis = np.exp(2j * np.pi * bandwidth * series.time[late])
+    gain = 2 * abs(np.mean(series["a"][late, 0] * basis.conj()))
+    assert gain == pytest.approx(1 / np.sqrt(2), rel=0.01)  # straight lines between 40 steps a period: 0.2 %
+
+
+def test_at_rest_it_feels_gravity_with_its_noise_and_stays_in_its_range():
+    t = np.array([0.0, 20.0])
+    still = motion("accelerometer.a", [0.0, 0.0, 0.0], t)
+    series = Accelerometer().measure(still, rate=250.0, seed=1)
+    assert series["a"].mean(axis=0) == pytest.approx([0.0, 0.0, 9.81], abs=4 * 0.07 / np.sqrt(5001))
+    assert series["a"].std(axis=0) == pytest.approx([0.07] * 3, rel=0.05)  # 5001 readings: 1 %
+    spectrum = np.abs(np.fft.rfft(series["a"][1:, 0])) ** 2
+    halves = spectrum[1:1250].mean(), spectrum[1250:].mean()
+    assert halves[0] == pytest.approx(halves[1], rel=0.2)  # white: each mean is right within 3 %
+    held = Accelerometer(noise=0.0, range=5.0).measure(still, rate=10.0)
+    assert held["a"][:, 2] == pytest.approx(5.0)
+    assert np.all(held["saturated"] == 1)
+
+
+def test_orientation_is_found_to_its_predicted_deviation():
+    t = np.linspace(0.0, 2.0, 4001)
+    path = motion("accelerometer.a", [1.4 * np.sin(40 * t), 2.2 * np.sin(30 * t), 0.0], t)
+    R = turned(np.eye(3)[None], np.array([[0.4, -2.0, 1.0]]))[0]
+    device, unknown = Accelerometer(R=R), Accelerometer()
+    scores = []
+    for seed in range(40):
+        found, covariance = unknown.orientation(device.measure(path, rate=250.0, seed=seed), path)
+        D = found @ R.T
+        turn = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]]) / 2
+        scores.append(turn @ np.linalg.solve(covariance, turn))
+    # chi squared with three degrees of freedom: the mean of 40 is 3 with a deviation of 0.39
+    assert np.mean(scores) == pytest.approx(3.0, abs=4 * 0.39)
+
+
+def test_orientation_is_refused_where_it_is_not_told():
+    t = np.linspace(0.0, 1.0, 101)
+    upright = motion("accelerometer.a", [0.0, 0.0, np.sin(9 * t)], t)
+    device = Accelerometer(noise=0.0)
+    with pytest.raises(ModelError, match="a turn about that direction is not told"):
+        device.orientation(device.measure(upright, rate=100.0), upright)
+    small = Accelerometer(range=1.0)
+    with pytest.raises(ModelError, match="found 0 readings within the range"):
+        small.orientation(small.measure(upright, rate=100.0), upright)
+    with pytest.raises(ModelError, match="found noise=-1"):
+        Accelerometer(noise=-1.0)
+    with pytest.raises(ModelError, match="found bandwidth=0, expected a finite number above 0"):
+        Accelerometer(bandwidth=0)
+    with pytest.raises(ModelError, match="expected three finite numbers, m/s2"):
+        Accelerometer(gravity=9.81)
