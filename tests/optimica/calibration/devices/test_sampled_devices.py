@@ -6,6 +6,7 @@ import pytest
 from gantrytau import ModelError, Result
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
+from gantrytau_optimica.calibration.devices.cameras import stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import LaserTracker
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
@@ -140,3 +141,19 @@ def test_orientation_is_refused_where_it_is_not_told():
         Accelerometer(bandwidth=0)
     with pytest.raises(ModelError, match="expected three finite numbers, m/s2"):
         Accelerometer(gravity=9.81)
+
+
+def test_camera_at_250_Hz_with_a_predictor_is_late_by_what_theory_says():
+    t = np.linspace(0.0, 0.4, 401)
+    path = motion("tool.r", [0.3 * t, 0.0, 0.0], t)
+    watching = SampledDevice(stereo_cameras((0.0, 0.0, 1.5), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)))
+    series = watching.measure(path, rate=250.0, seed=2)
+    assert np.all(series["seen"] == 1)
+    exact = path.at(series.time, "tool.r[0]")
+    alone = np.std(series["r[0]"] - exact)
+    late = predict_late(series, "r[0]", latency=0.008) - exact
+    held = predict_late(series, "r[0]", latency=0.008, degree=0) - exact
+    assert np.nanmean(held) == pytest.approx(-0.3 * 0.008, abs=5 * alone)
+    # two readings ahead with constant speed: 3 x - 2 x before it, so the noise grows by the root of 13
+    assert np.nanstd(late) == pytest.approx(np.sqrt(13) * alone, rel=0.35)
+    assert abs(np.nanmean(late)) < 5 * alone
