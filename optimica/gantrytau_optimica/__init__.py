@@ -42,6 +42,11 @@ from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.logs.robot_checks import check_motion
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
+from gantrytau_optimica.identification.rigid.model_comparison import (
+    ModelComparison,
+    compare,
+    printed_models,
+)
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
@@ -97,6 +102,7 @@ __all__ = [
     "MeasuredPlan",
     "Measurements",
     "MissingGuess",
+    "ModelComparison",
     "MotionLog",
     "Optimization",
     "Optimum",
@@ -118,6 +124,7 @@ __all__ = [
     "calibrated_geometry",
     "cell_example",
     "check_motion",
+    "compare",
     "compare_records",
     "cross_validate",
     "enough_poses",
@@ -151,6 +158,7 @@ __all__ = [
     "predict",
     "predict_late",
     "prepare",
+    "printed_models",
     "read_arms",
     "read_cell",
     "report_numbers",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Model
+from gantrytau import Model, ModelError
 from gantrytau.writing.pages import page, table
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
@@ -45,7 +45,7 @@ class Identification:
     model_values: Mapping[str, float]
     held_out: float
     findings: tuple[Finding, ...]
-    nominal: Model = field(repr=False)
+    nominal: Model | None = field(repr=False)
 
     def covariance(self, names: Iterable[str] | str) -> np.ndarray:
         """Covariance (k, k) of parameters in the order of names; zero for those at a limit, NaN where not determined.
@@ -63,7 +63,12 @@ class Identification:
 
     @property
     def robot(self) -> Model:
-        """The robot with the identified parameters."""
+        """The robot with the identified parameters. ModelError where identify was given a translated one."""
+        if self.nominal is None:
+            raise ModelError(
+                f"robot: {self.robot_name} was identified from what translate made of it, expected the model; give that to "
+                "identify, or use .model_values"
+            )
         return with_numbers(self.nominal, self.model_values)
 
     def prototype(self, record: Any) -> Any:

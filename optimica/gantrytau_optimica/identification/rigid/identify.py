@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from gantrytau import Model, translate
+from gantrytau.dae import Dae
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.chosen_parameters import (
@@ -37,7 +38,7 @@ INFLATED = (
 
 
 def identify(
-    robot: Model,
+    robot: Model | Dae,
     log: MotionLog | Sequence[MotionLog],
     *,
     parameters: Sequence[str] | str | None = None,
@@ -50,7 +51,8 @@ def identify(
 ) -> Identification:
     """Masses and friction of a robot of rigid bodies, by least squares of its forces along measured motion.
 
-    robot: any model whose inputs are the forces or torques of its drives, with `s` or `phi` beside them, of any loops;
+    robot: any model, or what `translate` made of it, of any loops, whose inputs are the forces or torques of its drives,
+    with `s` or `phi` beside them;
     log: one or several, q and f in the order of these inputs. parameters: names or families, `plate_mass`,
     `cart_masses`, `link_masses[0]` or the model's own, by default all masses and inertias that move the forces.
     fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0 leaves links out.
@@ -61,7 +63,7 @@ def identify(
 
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """
-    dae = translate(robot)
+    dae = robot if isinstance(robot, Dae) else translate(robot)
     logs = [log] if isinstance(log, MotionLog) else list(log)
     coordinates, forces = drives(dae)
     check_call(dae, logs, coordinates, friction, minimum_speed)
@@ -128,7 +130,7 @@ def _second(count: int) -> slice:
 
 
 def _identified(
-    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model
+    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model | Dae
 ) -> Identification:
     """The record of a fit."""
     names, p = problem.names, found.p
@@ -168,5 +170,5 @@ def _identified(
         model_values=values,
         held_out=np.nan,
         findings=(),
-        nominal=robot,
+        nominal=robot if isinstance(robot, Model) else None,
     )

@@ -54,6 +54,8 @@ class RigidRegression:
         A, _ = self.dynamics.slopes(self._some_rows(), self.dynamics.nominal)
         moved = np.nanmax(np.abs(A), axis=(0, 1), initial=0.0) > 0
         names = tuple(n for n, moves in zip(self.dynamics.names, moved, strict=True) if moves)
+        if np.all(moved):
+            return self
         return replace(self, dynamics=replace(self.dynamics, names=names))
 
     def nonlinear(self) -> tuple[str, ...]:
