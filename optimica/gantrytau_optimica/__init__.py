@@ -36,6 +36,8 @@ from gantrytau_optimica.calibration.trust.parameter_rows import (
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.identification.excitation.design_excitation import design_excitation
+from gantrytau_optimica.identification.excitation.excitation_result import Excitation
 from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -91,6 +93,7 @@ __all__ = [
     "CrossValidation",
     "Deviation",
     "Estimate",
+    "Excitation",
     "Experiment",
     "Finding",
     "Free",
@@ -127,6 +130,7 @@ __all__ = [
     "compare",
     "compare_records",
     "cross_validate",
+    "design_excitation",
     "enough_poses",
     "error_map",
     "estimate",

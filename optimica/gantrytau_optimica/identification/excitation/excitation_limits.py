@@ -1,0 +1,58 @@
+"""Limits that a motion keeps: speeds, accelerations and forces of actuators, and a box of the tool."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gantrytau import ModelError
+
+SIZES = ("speed", "acceleration", "force")
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationLimits:
+    """speed, acceleration, force (n,) of actuators in SI; low, high (m,): corners of the box in m."""
+
+    speed: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    def worst(self, r: np.ndarray, v: np.ndarray, a: np.ndarray, f: np.ndarray) -> dict[str, float]:
+        """The largest share of each limit that is used; r (N, m) of the tool, the others (N, n)."""
+        half, centre = (self.high - self.low) / 2, (self.high + self.low) / 2
+        shares = (np.abs(v) / self.speed, np.abs(a) / self.acceleration, np.abs(f) / self.force)
+        return dict(zip(SIZES, (float(np.max(s)) for s in shares), strict=True)) | {
+            "box": float(np.max(np.abs(r - centre) / half))
+        }
+
+
+def excitation_limits(limits: Mapping[str, Any], actuators: int, coordinates: int) -> ExcitationLimits:
+    """Limits as they were told. Raises ModelError for those that lack or do not fit."""
+    if not isinstance(limits, Mapping) or set(limits) != {*SIZES, "box"}:
+        found = sorted(limits) if isinstance(limits, Mapping) else limits
+        raise ModelError(
+            f"design_excitation: found limits {found!r}, expected dict(speed=, acceleration=, force=, box=(low, high)): "
+            "m/s, m/s2 and N of the actuators, corners of the tool's box in m",
+            argument="limits",
+        )
+    sizes = []
+    for name in SIZES:
+        value = np.asarray(limits[name], dtype=float)
+        if value.shape not in ((), (actuators,)) or not np.all((value > 0) & np.isfinite(value)):
+            raise ModelError(
+                f"design_excitation: found limit {name}={limits[name]!r}, expected a number above 0 or {actuators} of them",
+                argument="limits",
+            )
+        sizes.append(np.broadcast_to(value, actuators))
+    box = np.asarray(limits["box"], dtype=float)
+    if box.shape != (2, coordinates) or not np.all(box[0] < box[1]) or not np.all(np.isfinite(box)):
+        raise ModelError(
+            f"design_excitation: found limit box={limits['box']!r}, expected two corners of {coordinates} numbers in m, the "
+            "lower first",
+            argument="limits",
+        )
+    return ExcitationLimits(*sizes, *box)
