@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from gantrytau import ModelError
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
@@ -135,6 +134,8 @@ def _by_positions(actuators: Sequence[ActuatorRows]) -> list[np.ndarray]:
 
 def _symmetric_masses(actuators: Sequence[ActuatorRows], near: float) -> dict[str, float]:
     """Masses of most symmetric Coulomb friction: of least sum (f_c+ - f_c-)^2, and of least sum ln(f_c+ / f_c-)^2."""
+    from scipy.optimize import minimize_scalar
+
     pairs = [a for a in actuators if a.groups == (0, 1)]
     try:
         least = float(sum(w @ a.y for w, a in zip(_by_symmetry(pairs), pairs, strict=True)))

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
 from gantrytau_optimica.identification.logs.plain_friction import PlainFits, plain_fits
@@ -145,6 +144,8 @@ def slopes(t: np.ndarray, q: np.ndarray, width: int) -> tuple[np.ndarray, np.nda
     Savitzky and Golay (1964); t evenly spaced. Of n samples with white noise s, the second derivative of a parabola has
     the variance 720 s^2 / (n^5 dt^4) for large n.
     """
+    from scipy.signal import savgol_filter
+
     count, step = 2 * max(width // 2, 1) + 1, float(np.mean(np.diff(t)))
     inner = np.arange(width, len(t) - width)
     smooth, v, a = (savgol_filter(q, count, 2, deriv=k, delta=step, axis=0)[inner] for k in range(3))

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from gantrytau import Model, translate
 from gantrytau.dae import Dae
@@ -96,6 +95,7 @@ def identify(
 
 def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str, ...]) -> RigidRegression:
     """The regression with the Stribeck speed that leaves the least; everything else is minimised at each."""
+    from scipy.optimize import minimize_scalar
 
     def at(logarithm: float) -> RigidRegression:
         assert problem.friction is not None

@@ -9,8 +9,6 @@ Modeling, identification and control of robots, section 12.6.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.signal import butter, sosfiltfilt
 
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
@@ -62,6 +60,8 @@ class FilteredMotion:
 
 def low_pass(y: np.ndarray, period: float, cutoff: float) -> np.ndarray:
     """Zero-phase Butterworth low-pass along the first axis; period in s, cutoff in Hz."""
+    from scipy.signal import butter, sosfiltfilt
+
     return sosfiltfilt(butter(ORDER, cutoff, fs=1 / period, output="sos"), y, axis=0)
 
 
@@ -70,6 +70,8 @@ def filtered_motion(log: MotionLog, cutoff: float) -> FilteredMotion:
 
     Raises IdentificationError for a cutoff that the rate of the log does not bear.
     """
+    from scipy.interpolate import make_interp_spline
+
     period = log.period
     t, q, f = log.t - log.t[0], log.q, log.f
     if np.any(np.abs(np.diff(t) - period) > JITTER * period):  # filters know one period only

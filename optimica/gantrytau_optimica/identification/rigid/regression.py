@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.optimize import lsq_linear
 
 from gantrytau_optimica.identification.rigid.base_parameters import BaseParameters, base_parameters
 
@@ -56,6 +55,8 @@ class LimitedFit:
 
 def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> LimitedFit:
     """Least squares with lower limits, -inf for none."""
+    from scipy.optimize import lsq_linear
+
     base = base_parameters(factors.R)
     free, held = base.independent, base.dependent
     p = np.array(nominal, dtype=float)
