@@ -4,7 +4,6 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from gantrytau import ModelError, Result
 from gantrytau_optimica.calibration.devices.devices import Array, checked_rotation, numbers
@@ -90,6 +89,8 @@ class Accelerometer:
 
     def _felt(self, result: Result, t: Array, rate: float) -> Array:
         """Specific force behind the low pass at the times t, in the world, (N, 3); at rest before it starts."""
+        from scipy import signal
+
         parts = max(1, int(np.ceil(FINE * self.bandwidth / rate)))
         fine = np.minimum(t[0] + np.arange((len(t) - 1) * parts + 1) / (rate * parts), result.time[-1])
         force = result.at(fine, self.acceleration) - self.gravity
