@@ -10,6 +10,7 @@ from tests.benchmarks import (
     engine,
     fmus,
     growth,
+    identification,
     kinematics,
     mechanisms,
     motion,
@@ -37,6 +38,6 @@ if __name__ == "__main__":
         kinematics.rows(),
         calibration.rows(),
     )
-    timed = (fmus.rows(), sampling.rows(), studies.rows())
+    timed = (fmus.rows(), sampling.rows(), studies.rows(), identification.rows())
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))

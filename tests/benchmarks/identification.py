@@ -1,0 +1,49 @@
+"""Masses of the three-link robot from 10,250 rows, beside scipy with differences on the same inverse dynamics."""
+
+import time
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import least_squares
+
+from gantrytau import translate
+from gantrytau_models import GantryTau, prototypes
+from gantrytau_optimica.identification.rigid.robot_dynamics import (
+    RobotDynamics,
+    candidates,
+    drives,
+    frictions,
+    model_name,
+)
+from tests.benchmarks.table import Row, at_least
+from tests.optimica.identification import gantry_logs as logs
+
+
+def rows() -> Iterator[Row]:
+    """Processor time of one regression, and of scipy's differences from ones to the same masses."""
+    dae = translate(GantryTau(prototypes.L1))
+    joints, forces = drives(dae)
+    dynamics = RobotDynamics(dae, joints, forces, candidates(dae), dict.fromkeys(frictions(dae), 0.0))
+    _, q, v, a, _ = logs.motion()
+    x, f = np.hstack([q, v, a]), logs.log(0).f
+    names = [*joints, *(f"der({n})" for n in joints), *(f"der(der({n}))" for n in joints)]
+    given = [*names, *(model_name(dae, n) for n in dynamics.names), *frictions(dae)]
+    inverse = dae.function(given=given, find=forces).expand().map(len(x))
+    ones = np.ones((1, len(x)))
+
+    def left(p: np.ndarray) -> np.ndarray:
+        found = inverse(*x.T[:, None], *(k * ones for k in p), *[0.0] * len(frictions(dae)))
+        return (np.asarray(ca.vertcat(*found)).T - f).ravel()
+
+    dynamics.slopes(x[:10], dynamics.nominal)  # builds the function
+    begin = time.process_time()
+    A, y = dynamics.slopes(x, dynamics.nominal)
+    p = np.linalg.lstsq(A.reshape(f.size, -1), (f - y + A @ dynamics.nominal).ravel(), rcond=None)[0]
+    middle = time.process_time()
+    found = least_squares(left, np.ones(len(p)))
+    end = time.process_time()
+    assert np.allclose(found.x, p, rtol=1e-3, atol=1e-3)  # the same masses, as closely as differences go
+    yield at_least(
+        "masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0, "x"
+    )
