@@ -44,6 +44,4 @@ def rows() -> Iterator[Row]:
     found = least_squares(left, np.ones(len(p)))
     end = time.process_time()
     assert np.allclose(found.x, p, rtol=1e-3, atol=1e-3)  # the same masses, as closely as differences go
-    yield at_least(
-        "masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0, "x"
-    )
+    yield at_least("masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from gantrytau import ModelError, Samples
 from gantrytau_optimica.identification.excitation.fourier_series import FourierSeries
@@ -62,6 +61,8 @@ class Excitation:
                 f"Excitation.gain: found {log!r}, expected a log of the {len(self.actuators)} actuators of {self.robot}",
                 argument="log",
             )
+        from scipy.interpolate import make_interp_spline
+
         spline = make_interp_spline(log.t, log.q, k=5)
         motion = np.hstack([log.q, spline(log.t, 1) if log.v is None else log.v, spline(log.t, 2)])
         Y = self.by_actuators.rows(motion)[4].reshape(-1, len(self.names))
