@@ -7,6 +7,7 @@ Gautier (1991), Numerical calculation of the base inertial parameters of robots,
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -29,23 +30,24 @@ class BaseParameters:
         found = []
         for row, i in enumerate(self.independent):
             terms = [
-                f"{'+' if share > 0 else '-'} {'' if abs(abs(share) - 1) < SMALL else f'{abs(share):.3g} '}{names[d]}"
+                f"{'+' if share > 0 else '-'} {'' if abs(abs(share) - 1) < SMALL else f'{abs(share):.3g} '}{names[int(d)]}"
                 for share, d in zip(self.shares[row], self.dependent, strict=True)
                 if share
             ]
-            found += [" ".join([names[i], *terms])] if terms else []
+            found += [" ".join([names[int(i)], *terms])] if terms else []
         return tuple(found)
 
     def silent(self, names: Sequence[str]) -> tuple[str, ...]:
         """Parameters without any influence."""
-        return tuple(names[d] for k, d in enumerate(self.dependent) if not np.any(self.shares[:, k]))
+        return tuple(names[int(d)] for k, d in enumerate(self.dependent) if not np.any(self.shares[:, k]))
 
 
 def base_parameters(factor: np.ndarray) -> BaseParameters:
     """Base parameters of a regression by its triangular factor (k, k), or by its columns."""
     norms = np.linalg.norm(factor, axis=0)
     scale = np.where(norms > EMPTY * np.max(norms, initial=0.0), norms, np.inf)
-    _, R, order = qr(factor / scale, mode="economic", pivoting=True)
+    found = qr(factor / scale, mode="economic", pivoting=True)
+    _, R, order = cast(tuple[np.ndarray, np.ndarray, np.ndarray], found)
     size = np.abs(np.diag(R))
     rank = int(np.sum(size > SILENT))
     first, rest = order[:rank], order[rank:]

@@ -106,10 +106,11 @@ def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str
         return factors_of(rows).squares(found.p)
 
     # several minima are possible: the best of a coarse row of speeds is where to look
-    coarse = np.linspace(*np.log(FALLS), 8)
+    coarse = np.linspace(np.log(FALLS[0]), np.log(FALLS[1]), 8)
     best = int(np.argmin([left(x) for x in coarse]))
     around = (coarse[max(best - 1, 0)], coarse[min(best + 1, len(coarse) - 1)])
-    return at(minimize_scalar(left, bounds=around, method="bounded", options=dict(xatol=1e-3)).x)
+    found = minimize_scalar(left, bounds=around, method="bounded", options=dict(xatol=1e-3))
+    return at(float(found.x))
 
 
 def _judged(rows: list[LogRows], problem: RigidRegression, least: np.ndarray) -> tuple[float, list[Finding]]:
@@ -158,7 +159,9 @@ def _identified(
         fixed={},
         matrix=matrix,
         residuals=np.concatenate(left),
-        squares=sum(r.thinned * np.nansum(e**2, axis=0) for r, e in zip(rows, left, strict=True)),
+        squares=np.sum(
+            [r.thinned * np.nansum(e**2, axis=0) for r, e in zip(rows, left, strict=True)], axis=0
+        ),
         condition=found.condition,
         weak=tuple(
             n for n, sure, held in zip(names, told, found.active, strict=True) if not sure and not held

@@ -49,7 +49,7 @@ def covariance(logs: Sequence[LogRows], p: np.ndarray, free: np.ndarray) -> np.n
         for i in range(left.shape[1]):
             x = np.where(rows.moving[:, i, None], rows.A[:, i, free], 0.0) / scale
             normal += x.T @ x
-            middle += _middle(x, left[:, i], rows, np.mean(rows.moving[:, i]))
+            middle += _middle(x, left[:, i], rows, float(np.mean(rows.moving[:, i])))
     inverse = np.linalg.inv(normal)
     # parameters have taken their share of what was there to be left
     share = independent / max(independent - len(free), 1.0)

@@ -155,8 +155,9 @@ def candidates(dae: Dae) -> tuple[str, ...]:
     found = []
     for name in dae.adjustable:
         declared = dae.flat.find(name)
-        scalar = declared is not None and declared.shape == ()
-        if scalar and declared.unit in ("kg", "kg.m2") and not LAWS.search(name):
+        if declared is None or declared.shape != ():
+            continue
+        if declared.unit in ("kg", "kg.m2") and not LAWS.search(name):
             found.append(public_name(dae, name))
     return tuple(dict.fromkeys(found))
 

@@ -150,7 +150,7 @@ def test_camera_at_250_Hz_with_a_predictor_is_late_by_what_theory_says():
     series = watching.measure(path, rate=250.0, seed=2)
     assert np.all(series["seen"] == 1)
     exact = path.at(series.time, "tool.r[0]")
-    alone = np.std(series["r[0]"] - exact)
+    alone = float(np.std(series["r[0]"] - exact))
     late = predict_late(series, "r[0]", latency=0.008) - exact
     held = predict_late(series, "r[0]", latency=0.008, degree=0) - exact
     assert np.nanmean(held) == pytest.approx(-0.3 * 0.008, abs=5 * alone)
