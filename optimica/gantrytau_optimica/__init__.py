@@ -50,6 +50,9 @@ from gantrytau_optimica.identification.rigid.model_comparison import (
     printed_models,
 )
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
+from gantrytau_optimica.identification.servos.identify_servo import identify_servo
+from gantrytau_optimica.identification.servos.servo_model import ServoModel
+from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared
@@ -118,6 +121,8 @@ __all__ = [
     "SavedOptimum",
     "Sensitivities",
     "SensitivityTable",
+    "ServoModel",
+    "StepResponse",
     "TMac",
     "TradeOff",
     "Way",
@@ -141,6 +146,7 @@ __all__ = [
     "identifiability",
     "identify",
     "identify_friction",
+    "identify_servo",
     "in_lines",
     "initial",
     "integral_of_squares",

@@ -1,0 +1,1 @@
+"""Servos of actuators from measured steps."""

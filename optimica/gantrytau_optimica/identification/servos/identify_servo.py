@@ -1,0 +1,73 @@
+"""From measured steps to the servos of a robot."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
+from gantrytau_optimica.identification.servos.servo_findings import explained, servo_findings
+from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRows, fit_servo
+from gantrytau_optimica.identification.servos.servo_model import ServoModel
+from gantrytau_optimica.identification.servos.step_response import StepResponse, check_steps
+
+FOLLOWS = 30.0  # % of the motion, below which positions do not follow references
+
+
+def identify_servo(steps: StepResponse | Sequence[StepResponse]) -> ServoModel:
+    """Delay, pole and gain of each servo, q_m = q^-d b / (1 - a q^-1) q_r, from steps of references.
+
+    steps: one StepResponse or several, best of several sizes; an actuator is fitted to those in which its reference
+    changes. From rest wherever friction holds it: the law is that of differences. The delay is a whole number of samples,
+    that of the least sum of squares of the simulated response. `.findings` tell of friction and saturation.
+    Raises ModelError for steps that tell nothing, and IdentificationError for positions that do not follow their
+    references. Dressler (2012), (6.10) and (6.11).
+    """
+    steps = check_steps(steps)
+    period = steps[0].period
+    n = steps[0].position.shape[1]
+    rows = [_rows(steps, i) for i in range(n)]
+    fits = [fit_servo(one, period) for one in rows]
+    share = np.array([explained(one, fit) for one, fit in zip(rows, fits, strict=True)])
+    rest = np.full((len(steps), n), np.nan)
+    matrix = np.zeros((2 * n, 2 * n))
+    for i, (one, fit) in enumerate(zip(rows, fits, strict=True)):
+        _check_follows(i, share[i], fit)
+        rest[[r.step for r in one], i] = fit.rest
+        matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = fit.covariance
+    return ServoModel(
+        np.array([fit.delay for fit in fits]),
+        np.array([fit.pole for fit in fits]),
+        np.array([fit.gain for fit in fits]),
+        share,
+        period,
+        rest,
+        steps,
+        tuple(
+            finding
+            for i, pair in enumerate(zip(rows, fits, strict=True))
+            for finding in servo_findings(i, *pair, period)
+        ),
+        matrix,
+    )
+
+
+def _rows(steps: Sequence[StepResponse], i: int) -> list[ServoRows]:
+    return [
+        ServoRows(k, step.reference[:, i] - step.reference[0, i], step.position[:, i])
+        for k, step in enumerate(steps)
+        if step.start[i] < len(step)
+    ]
+
+
+def _check_follows(i: int, share: float, fit: ServoFit) -> None:
+    if not share > FOLLOWS:
+        raise IdentificationError(
+            f"identify_servo: found that the reference explains {max(share, 0.0):.0f} % of the motion of actuator {i}, "
+            f"expected {FOLLOWS:.0f} % at least; look at the order of columns and at the clocks of both (the best delay is "
+            f"{fit.delay} samples)"
+        )
+    if fit.pole >= 1 - 1e-8:
+        raise IdentificationError(
+            f"identify_servo: found that actuator {i} does not come to an end of its motion, expected a pole below 1; log "
+            "until it rests, and look whether the reference is a position, not a speed"
+        )
