@@ -42,6 +42,8 @@ from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.logs.robot_checks import check_motion
+from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
+from gantrytau_optimica.identification.physical.physical_form import PhysicalForm, physical_form
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
 from gantrytau_optimica.identification.rigid.model_comparison import (
@@ -107,6 +109,7 @@ __all__ = [
     "LengthGauge",
     "MeasuredPlan",
     "Measurements",
+    "MechanicalForm",
     "MissingGuess",
     "ModelComparison",
     "MotionLog",
@@ -114,6 +117,7 @@ __all__ = [
     "Optimum",
     "ParameterRow",
     "Path",
+    "PhysicalForm",
     "PlannedCell",
     "Prepared",
     "SampledDevice",
@@ -163,6 +167,7 @@ __all__ = [
     "orientation_errors",
     "parameter_rows",
     "pareto",
+    "physical_form",
     "plan_calibration",
     "plan_cell",
     "predict",

@@ -1,7 +1,9 @@
-"""Linear systems from sample to sample: inputs held, or joined by straight lines, in between."""
+"""Linear systems from sample to sample: inputs held, or joined by straight lines, in between; and back."""
+
+import warnings
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import expm, logm
 
 
 def held(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -12,6 +14,23 @@ def held(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.nd
     n, m = B.shape
     whole = expm(period * np.block([[A, B], [np.zeros((m, n + m))]]))
     return whole[:n, :n], whole[:n, n:]
+
+
+def unheld(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """A and B of the continuous system that is A (n, n), B (n, m) from sample to sample, inputs held: the inverse of `held`.
+
+    By the principal logarithm, which takes every mode to be below half of the sampling frequency. A must have no
+    eigenvalue at zero or on the negative real axis: there is no real logarithm. NaN where rounding spoils all.
+    """
+    n, m = B.shape
+    whole = np.block([[A, B], [np.zeros((m, n)), np.eye(m)]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of 1e-13 already
+        try:
+            found = np.real(logm(whole)) / period
+        except ValueError:  # lost on the way
+            found = np.full_like(whole, np.nan)
+    return found[:n, :n], found[:n, n:]
 
 
 def ramped(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

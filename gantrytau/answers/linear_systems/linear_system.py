@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.answers.linear_systems import bode_and_poles
-from gantrytau.answers.linear_systems.discretisation import held
+from gantrytau.answers.linear_systems.discretisation import held, unheld
 from gantrytau.answers.linear_systems.poles_and_zeros import (
     damping_of,
     in_s,
@@ -19,6 +19,9 @@ from gantrytau.errors import ModelError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+LOST = 1e-6  # of the largest element, by which a system may differ when it is sampled again
+ROUNDING = 1e-12  # relative: eigenvalues that are off the real axis by less are real
 
 
 class LinearSystem:
@@ -95,6 +98,34 @@ class LinearSystem:
         A, B = held(self.A, self.B, float(period))
         return _Plain(self, A, B, float(period))
 
+    def continuous(self) -> "LinearSystem":
+        """The continuous system that this one is from sample to sample with inputs held: the inverse of `discrete`.
+
+        Modes are taken to be below half of the sampling frequency. ModelError for a system that is continuous already, and
+        for a pole at zero or on the negative real axis, which no continuous system of this order has.
+        """
+        if self.period is None:
+            raise ModelError(
+                f"{self.title}: found a continuous system, expected one with a period; take it as it is"
+            )
+        poles = self.poles
+        real = np.abs(np.imag(poles)) <= ROUNDING * np.abs(poles)
+        strange = poles[real & (np.real(poles) <= ROUNDING)]
+        if strange.size:
+            raise ModelError(
+                f"{self.title}: found a pole at z = {strange[0].real:.4g}, expected none at zero or on the negative real "
+                "axis: no continuous system of this order is sampled so (a delay, or noise at half of the sampling rate); "
+                "identify a model of another order, or with samples taken more often"
+            )
+        A, B = unheld(self.A, self.B, self.period)
+        again = held(A, B, self.period)[0] if np.all(np.isfinite(A)) else A
+        if not np.all(np.abs(again - self.A) <= LOST * np.abs(self.A).max(initial=0.0)):
+            raise ModelError(
+                f"{self.title}: found poles whose logarithm is lost to rounding (|z| from {np.abs(poles).min():.2g} to "
+                f"{np.abs(poles).max():.2g}), expected poles of similar size; reduce the order of the system"
+            )
+        return _Plain(self, A, B, None)
+
     def simulate(self, u: Any, *, x: Any = None) -> np.ndarray:
         """Outputs (N, outputs) to samples of the inputs.
 
@@ -144,7 +175,7 @@ class LinearSystem:
 class _Plain(LinearSystem):
     """Another system of the same inputs and outputs."""
 
-    def __init__(self, of: LinearSystem, A: np.ndarray, B: np.ndarray, period: float):
+    def __init__(self, of: LinearSystem, A: np.ndarray, B: np.ndarray, period: float | None):
         self.A, self.B, self.C, self.D, self.period = A, B, of.C, of.D, period
         self.states, self.inputs, self.outputs = of.states, of.inputs, of.outputs
         self.units, self._of = of.units, of.title
@@ -152,7 +183,7 @@ class _Plain(LinearSystem):
     @property
     def title(self) -> str:
         """What it was made of, and its period."""
-        return f"{self._of}, every {self.period:g} s"
+        return f"{self._of}, {'continuous' if self.period is None else f'every {self.period:g} s'}"
 
 
 def check_period(place: str, period: Any) -> None:

@@ -1,0 +1,1 @@
+"""Masses, damping and stiffness of a structure from a model without physics."""

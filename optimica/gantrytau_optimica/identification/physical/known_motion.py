@@ -1,0 +1,144 @@
+"""What a form is fitted to: the response of a black box, or forces and positions as they were measured."""
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.answers.linear_systems.responses import frequency_response
+from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
+
+SHIFT = 0.02  # e, of the slowest eigenfrequency
+POINTS = 400
+FASTEST = 2.0  # of the fastest eigenfrequency, up to which the response is fitted
+SLOWEST = 1e-3  # of the fastest eigenfrequency: slower ones are at rest beside it
+LEAST = 20  # samples for each coordinate
+
+
+@dataclass(frozen=True, eq=False)
+class KnownResponse:
+    """The response G (N, n, n) of a continuous system at points s (N,), with weights (N,) by which its squares sum to one.
+
+    Over s = e + j w these squares are, by Parseval, those of impulse responses weighed by exp(-e t): an output error for a
+    white input. e > 0 blunts resonances that have no damping. frequency: a typical w in 1/s.
+    """
+
+    s: np.ndarray
+    G: np.ndarray
+    weight: np.ndarray
+    frequency: float
+
+    @classmethod
+    def of(cls, system: LinearSystem) -> Self:
+        """The response over the band of its modes."""
+        sizes = np.abs(np.linalg.eigvals(system.A))
+        slow, fast = max(sizes.min(), SLOWEST * sizes.max()), FASTEST * sizes.max()
+        # even up to the slowest mode, then by ratios, so that modes far apart are all seen
+        count = POINTS // 5
+        w = np.concatenate(
+            [np.linspace(0.0, slow / 2, count, endpoint=False), np.geomspace(slow / 2, fast, POINTS - count)]
+        )
+        s = SHIFT * slow + 1j * w
+        G = np.moveaxis(frequency_response(system.A, system.B, system.C, system.D, s), 2, 0)
+        weight = np.sqrt(np.gradient(w))
+        return cls(s, G, weight / np.linalg.norm(weight[:, None, None] * G), float(np.median(sizes)))
+
+    def left(self, form: MechanicalForm) -> np.ndarray:
+        """What a form leaves of the response, as real numbers."""
+        found = ((form.response(self.s) - self.G) * self.weight[:, None, None]).ravel()
+        return np.concatenate([np.real(found), np.imag(found)])
+
+
+@dataclass(frozen=True, eq=False)
+class KnownMotion:
+    """Positions y (N, n) measured every period in s while forces u (N, n) were held in between.
+
+    Where the motion began and what positions are at rest is estimated with each form, as it is linear. frequency: a
+    typical one in 1/s.
+    """
+
+    u: np.ndarray
+    y: np.ndarray
+    period: float
+    frequency: float
+
+    @classmethod
+    def of(cls, measured: Any, system: LinearSystem, frequency: float) -> Self:
+        """Checked (u, y) that belong to a sampled system; ModelError for others."""
+        name = f"physical_form of {system.title}"
+        if system.period is None:
+            raise ModelError(
+                f"{name}: found measured= for a continuous system, expected one with the period of the samples; give "
+                f"system.discrete(period)",
+                argument="measured",
+            )
+        if not isinstance(measured, tuple) or len(measured) != 2:
+            raise ModelError(
+                f"{name}: found measured={type(measured).__name__}, expected (u, y), forces and positions, (N, n) each",
+                argument="measured",
+            )
+        n = len(system.C)
+        u, y = (_samples(name, letter, x, n) for letter, x in zip("uy", measured, strict=True))
+        if len(u) != len(y) or len(y) < LEAST * n:
+            raise ModelError(
+                f"{name}: found {len(u)} samples of forces and {len(y)} of positions, expected as many of both, {LEAST * n} "
+                "at least",
+                argument="measured",
+            )
+        if not np.any(np.ptp(y, axis=0)):
+            raise ModelError(f"{name}: found positions that do not move", argument="measured")
+        return cls(u, y, system.period, frequency)
+
+    def left(self, form: MechanicalForm) -> np.ndarray:
+        """What the best start and rest leave of the positions, in units of their motion about the mean."""
+        n, count = len(form.M), len(self.y)
+        sampled = form.system.discrete(self.period)
+        powers = _powers(sampled.A, np.hstack([sampled.B, np.eye(2 * n)]), sampled.C, count)
+        forced = np.zeros((count, n))
+        forced[1:] = _convolved(powers[: count - 1, :, :n], self.u[: count - 1])
+        left = self.y - forced
+        free = np.concatenate([powers[:, :, n:], np.tile(np.eye(n), (count, 1, 1))], axis=2).reshape(
+            count * n, -1
+        )
+        free = free / np.maximum(np.linalg.norm(free, axis=0), np.finfo(float).tiny)
+        rest = left.ravel() - free @ np.linalg.lstsq(free, left.ravel(), rcond=None)[0]
+        return rest / np.linalg.norm(self.y - self.y.mean(axis=0))
+
+
+def _powers(A: np.ndarray, B: np.ndarray, C: np.ndarray, count: int) -> np.ndarray:
+    """C A^k B for k = 0 to count - 1, (count, outputs, inputs), by doubling."""
+    found, power = B[None], A
+    while len(found) < count:
+        found = np.concatenate([found, power @ found])
+        power = power @ power
+    return C @ found[:count]
+
+
+def _convolved(h: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Sum over j of h[j] u[k - j], (N, outputs), for h (N, outputs, inputs) and u (N, inputs)."""
+    length = 2 ** int(np.ceil(np.log2(2 * len(u))))
+    product = np.fft.rfft(h, length, axis=0) @ np.fft.rfft(u, length, axis=0)[:, :, None]
+    return np.fft.irfft(product[:, :, 0], length, axis=0)[: len(u)]
+
+
+def _samples(name: str, letter: str, values: Any, n: int) -> np.ndarray:
+    try:
+        found = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"{name}: found {letter} that is no array of numbers", argument="measured") from None
+    found = found[:, None] if found.ndim == 1 else found
+    if found.ndim != 2 or found.shape[1] != n:
+        raise ModelError(
+            f"{name}: found {letter} of shape {found.shape}, expected (N, {n}), a column for each coordinate",
+            argument="measured",
+        )
+    bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
+    if bad.size:
+        raise ModelError(
+            f"{name}: found {letter} that is not finite in {rows_in_words(bad)}; take a part without such rows",
+            argument="measured",
+        )
+    return found
