@@ -191,6 +191,27 @@ def test_stribeck_and_load_are_seen(load):
     assert all("by 0.05 N per N" in words for words in told)
 
 
+def test_friction_that_falls_towards_rest_is_told():
+    """A sign that is smoothed by tanh, as simulated robots have it: full friction comes with speed."""
+    smooth = [
+        replace(
+            run,
+            f=run.f + np.tile(TABLE_6_1[0].mean(axis=1) * (np.tanh(v / 0.05) - np.sign(v)), (len(run.t), 1)),
+        )
+        for run in runs(poses(), TABLE_6_1[0].mean(axis=1)[:, None] * [1, 1], TABLE_6_1[1])
+        for v in [(run.q[-1] - run.q[0]) / (run.t[-1] - run.t[0])]
+    ]
+    told = [
+        finding
+        for finding in identify_friction(ROBOT, smooth, mass=MASS).findings
+        if finding.kind == "smoothed"
+    ]
+    assert len(told) == 3
+    assert all(
+        "falls by" in finding.message and "leave out runs below 0.2" in finding.message for finding in told
+    )
+
+
 def test_missing_and_unsteady_runs_are_told():
     all_runs = runs(poses(), *TABLE_6_1)
     forth = [run for run in all_runs if run.q[-1, 0] > run.q[0, 0]]

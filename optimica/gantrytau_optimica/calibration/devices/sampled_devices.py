@@ -9,16 +9,24 @@ from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 
 ROUNDING = 1e-9  # of a sample: a last instant that rounding puts behind the end is still read
+EVEN = 1e-3  # of the distance of two outputs, by which they may differ
 
 
 def instants(result: Result, rate: float) -> Array:
     """When a device with this rate in Hz reads, from the first time of a result to its last, (N,) in s.
 
-    A rate that does not divide the duration leaves an unread rest. ModelError for a rate that is not above zero.
+    A rate that does not divide the duration leaves an unread rest. ModelError for a rate that is not above zero, and for
+    a result whose outputs lie farther apart than two readings: straight lines between them are not what moved.
     """
     if not (np.isfinite(rate) and rate > 0):
         raise ModelError(f"measure: found rate={rate!r}, expected a number above 0 in Hz, such as 1000.0")
     first, last = result.time[[0, -1]]
+    apart = float(np.max(np.diff(result.time), initial=0.0))
+    if apart * rate > 1 + EVEN:
+        raise ModelError(
+            f"measure: found a result with outputs {apart:.3g} s apart, expected {1 / rate:.3g} s or less for readings at "
+            f"{rate:g} Hz; simulate with points={int(np.ceil((last - first) * rate)) + 1} or more"
+        )
     count = int(np.floor((last - first) * rate + ROUNDING)) + 1
     return np.minimum(first + np.arange(count) / rate, last)
 

@@ -19,6 +19,7 @@ PERIOD = 0.004  # s between rows
 SMOOTH = 0.02  # of the limit of the speed, within which the sign of friction turns in a design
 SHARP = 1e-9  # m/s, the same in what is foretold
 TYPICAL = 1.0  # SI unit of a parameter whose value in the model is zero
+FASTEST = 2.5  # Hz of the highest harmonic, a quarter of where `identify` cuts off
 BEGIN = 0.3  # of the box that a start moves in
 SPARE = 1e-3  # of a limit, drawn in besides
 ROUNDS = 4  # of limits drawn in, as motions swing out between points
@@ -31,20 +32,22 @@ def design_excitation(
     limits: Mapping[str, Any],
     parameters: Sequence[str] | None = None,
     harmonics: int = 5,
-    period: float = 10.0,
+    period: float | None = None,
     criterion: Criterion = "a",
     seed: int = 0,
     starts: int = 3,
 ) -> Excitation:
     """A periodic motion of the tool that begins at rest, keeps limits, and tells parameters with least deviations.
 
-    duration, period: s; limits: dict(speed=, acceleration=, force=, box=(low, high)) of the actuators, in m/s, m/s2 and N, a
+    duration, period: s; by default whole periods in which the highest harmonic can use speed and acceleration alike, of
+    2.5 Hz at most; limits: dict(speed=, acceleration=, force=, box=(low, high)) of the actuators, in m/s, m/s2 and N, a
     number or one for each, and of the tool, in m. parameters: names such as `plate_mass`, `cart_masses[0]`,
     `coulomb[1]`; None for all. criterion: "a", the sum of squares of relative deviations; "d", the volume of the
     confidence ellipsoid; "condition", a smooth bound of the condition number. The best of `starts` random starts.
     Raises ModelError for what does not fit, SolveError where no motion keeps the limits. Swevers et al. (1997).
     """
-    _check(dict(duration=duration, period=period), dict(harmonics=harmonics, starts=starts), criterion)
+    times = dict(duration=duration) | ({} if period is None else dict(period=period))
+    _check(times, dict(harmonics=harmonics, starts=starts), criterion)
     dae = translate(robot)
     if TOOL[0] not in dae.variables:
         raise ModelError(
@@ -57,6 +60,7 @@ def design_excitation(
     scale = (
         np.where(soft.nominal > 0, soft.nominal, TYPICAL) if criterion == "a" else np.ones(len(soft.names))
     )
+    period = whole_periods(duration, harmonics, held) if period is None else period
     program = ExcitationProgram(soft, held, harmonics, period, criterion, scale)
     rows = np.arange(round(duration / PERIOD) + 1) * PERIOD
     found = [_within(program, sharp, begin, rows) for begin in _begins(held, harmonics, seed, starts)]
@@ -80,6 +84,12 @@ def design_excitation(
         start,
         by_actuators,
     )
+
+
+def whole_periods(duration: float, harmonics: int, limits: ExcitationLimits) -> float:
+    """The period in s of which duration holds whole ones, and whose highest harmonic has w = acceleration / speed."""
+    natural = harmonics * max(2 * np.pi * float(np.max(limits.speed / limits.acceleration)), 1 / FASTEST)
+    return duration / max(1, round(duration / natural))
 
 
 def _best(

@@ -49,7 +49,7 @@ def _missing(a: ActuatorRows, runs: ConstantRuns, name: str) -> list[Finding]:
 
 
 def _stribeck(a: ActuatorRows, runs: ConstantRuns, left: np.ndarray, name: str) -> list[Finding]:
-    """A rise of friction towards rest, sign(v) exp(-(v / v_s)^2), of the speed v_s that fits best."""
+    """A rise or fall of friction towards rest, sign(v) exp(-(v / v_s)^2), of the speed v_s that fits best."""
     spare = a.y.size - a.X.shape[1] - 2
     if spare < 1:
         return []
@@ -57,17 +57,18 @@ def _stribeck(a: ActuatorRows, runs: ConstantRuns, left: np.ndarray, name: str) 
     best = (0.0, 0.0, 0.0)
     for fall in np.geomspace(max(np.min(speeds), 1e-3 * np.max(speeds)), np.max(speeds) / FALLEN, FALLS):
         size, deviation = _share(a, np.sign(_speeds(a)) * np.exp(-((speeds / fall) ** 2)), left, spare)
-        if deviation > 0 and size / deviation > best[0]:
-            best = (size / deviation, size, fall)
+        if deviation > 0 and abs(size) / deviation > best[0]:
+            best = (abs(size) / deviation, size, fall)
     slow = speeds < FALLEN * best[2]
     if best[0] < SURE or not np.any(slow):
         return []
     words = (
-        f"friction of {name} rises by {best[1]:.3g} towards rest, with a Stribeck speed of {best[2]:.2g}: {np.sum(slow)} of "
+        f"friction of {name} {'rises' if best[1] > 0 else 'falls'} by {abs(best[1]):.3g} towards rest, with a "
+        f"{'Stribeck' if best[1] > 0 else 'smoothing'} speed of {best[2]:.2g}: {np.sum(slow)} of "
         f"{a.y.size} runs are slower than three of it and bend Coulomb and viscous friction; leave out runs below "
         f"{FALLEN * best[2]:.2g}"
     )
-    return [Finding("Stribeck", runs.runs[a.rows[slow]], words)]
+    return [Finding("Stribeck" if best[1] > 0 else "smoothed", runs.runs[a.rows[slow]], words)]
 
 
 def _load(a: ActuatorRows, fit: FrictionFit, left: np.ndarray, name: str) -> list[Finding]:

@@ -12,6 +12,7 @@ from gantrytau import Model, ModelError, Result, translate
 from gantrytau.dae import Dae
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import read_log, write_log
 
@@ -74,7 +75,8 @@ class MotionLog:
 
         result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
         the same for the same seed. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
-        one, without noise. Raises ModelError for a robot without driven coordinates, and for a period that is not above 0.
+        one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
+        for a result with outputs farther apart than that.
         """
         if not (0 < period < np.inf and encoder >= 0 and force >= 0):
             raise ModelError(
@@ -83,8 +85,7 @@ class MotionLog:
             )
         joints = driven_joints(robot if isinstance(robot, Dae) else translate(robot, units=False))
         drives = [f"{name[:-2]}.f" if name.endswith(".s") else f"{name[:-4]}.tau" for name in joints]
-        count = int(np.floor((result.time[-1] - result.time[0]) / period * (1 + 1e-12))) + 1
-        t = result.time[0] + period * np.arange(count)
+        t = instants(result, 1 / period)
         q, f = (np.column_stack([result.at(t, name) for name in names]) for names in (joints, drives))
         noise = np.random.default_rng(seed).normal(size=(2, *q.shape))
         r = result.at(t, "tool.r") if "tool.r" in result.arrays else None

@@ -17,7 +17,7 @@ def motion(name: str, values, t) -> Result:
 
 
 def test_tracker_has_its_deviations_and_equal_seeds_give_equal_series():
-    t = np.linspace(0.0, 4.0, 9)
+    t = np.linspace(0.0, 4.0, 4001)
     path = motion("tool.r", [3.0 + 0.1 * t, 0.0, 0.0], t)
     tracker = LaserTracker()
     series = SampledDevice(tracker).measure(path, rate=1000.0, seed=3)
@@ -35,8 +35,8 @@ def test_tracker_has_its_deviations_and_equal_seeds_give_equal_series():
 
 
 def test_rate_that_does_not_divide_and_times_that_repeat():
-    t = np.array([0.0, 0.5, 0.5, 1.0])
-    jump = motion("tool.r", [np.array([1.0, 1.0, 2.0, 2.0]), 0.0, 0.0], t)
+    t = np.array([0.0, 0.25, 0.5, 0.5, 0.75, 1.0])
+    jump = motion("tool.r", [np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 0.0, 0.0], t)
     exact = SampledDevice(LaserTracker(range_noise=0.0, range_noise_per_metre=0.0))
     series = exact.measure(jump, rate=2.0)
     assert series["range"] == pytest.approx([1.0, 2.0, 2.0])  # at the jump, what is behind it
@@ -46,6 +46,16 @@ def test_rate_that_does_not_divide_and_times_that_repeat():
     for rate in (0.0, -1.0, np.nan):
         with pytest.raises(ModelError, match="expected a number above 0 in Hz"):
             exact.measure(jump, rate=rate)
+
+
+def test_outputs_farther_apart_than_readings_are_refused():
+    t = np.linspace(0.0, 1.0, 101)
+    path = motion("tool.r", [1.0 + 0.1 * np.sin(20 * t), 0.0, 0.0], t)
+    assert len(SampledDevice(LaserTracker()).measure(path, rate=100.0).time) == 101
+    with pytest.raises(
+        ModelError, match=r"outputs 0\.01 s apart, expected 0\.004 s or less .* points=251 or more"
+    ):
+        SampledDevice(LaserTracker()).measure(path, rate=250.0)
 
 
 def test_friction_at_the_tip_gives_a_loop_as_wide_as_twice_the_play():
@@ -98,7 +108,7 @@ def test_bandwidth_is_at_minus_3_dB(rate, bandwidth):
 
 
 def test_at_rest_it_feels_gravity_with_its_noise_and_stays_in_its_range():
-    t = np.array([0.0, 20.0])
+    t = np.linspace(0.0, 20.0, 5001)
     still = motion("accelerometer.a", [0.0, 0.0, 0.0], t)
     series = Accelerometer().measure(still, rate=250.0, seed=1)
     assert series["a"].mean(axis=0) == pytest.approx([0.0, 0.0, 9.81], abs=4 * 0.07 / np.sqrt(5001))
