@@ -55,6 +55,7 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import Identificatio
 from gantrytau_optimica.identification.servos.identify_servo import identify_servo
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse
+from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared
@@ -108,6 +109,7 @@ __all__ = [
     "LaserTracker",
     "LengthGauge",
     "MeasuredPlan",
+    "MeasuredResponse",
     "Measurements",
     "MechanicalForm",
     "MissingGuess",
@@ -162,6 +164,7 @@ __all__ = [
     "load_plan",
     "load_planned_cell",
     "measured_plan",
+    "measured_response",
     "optimize",
     "orientation_causes",
     "orientation_errors",

@@ -229,7 +229,7 @@ SYSTEM = TRUE.system
 RATES = StateSpace(SYSTEM.A, SYSTEM.B, SYSTEM.C @ SYSTEM.A)
 LAZY = StateSpace(SYSTEM.A, SYSTEM.B[:, :1] @ np.ones((1, 2)), SYSTEM.C)
 BLIND = StateSpace(SYSTEM.A, SYSTEM.B, SYSTEM.C[:1].repeat(2, axis=0))
-U, Y = np.zeros((50, 2)), np.ones((50, 2))
+U, Y = np.random.default_rng(0).normal(size=(2, 50, 2))
 
 
 @pytest.mark.parametrize(
@@ -281,10 +281,11 @@ def test_systems_that_have_no_such_form(system, error, words):
     [
         (U, r"measured=ndarray, expected \(u, y\)"),
         ((U, Y[:, :1]), r"found y of shape \(50, 1\), expected \(N, 2\)"),
-        ((U, Y[:40]), "50 samples of forces and 40 of positions"),
-        ((U[:9], Y[:9]), "9 samples of forces and 9 of positions, expected as many of both, 40 at least"),
-        ((U, Y), "positions that do not move"),
-        ((np.where(np.arange(50) == 3, np.nan, 0.0)[:, None] * U, Y), "u that is not finite in row 3"),
+        ((U, Y[:40]), "50 samples of u and 40 of y"),
+        ((U[:9], Y[:9]), "9 samples of u and 9 of y, expected as many of both, 40 at least"),
+        ((U, 0 * Y), r"found that y\[0\] never changes"),
+        ((U * [1, 0], Y), r"found that u\[1\] never changes, expected motion; leave it out, or excite it"),
+        ((np.where(np.arange(50) == 3, np.nan, 1.0)[:, None] * U, Y), "u that is not finite in row 3"),
         (("forces", Y), "found u that is no array of numbers"),
     ],
 )

@@ -8,8 +8,8 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.responses import frequency_response
-from gantrytau_optimica.calibration.data.findings import rows_in_words
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
+from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
 SHIFT = 0.02  # e, of the slowest eigenfrequency
 POINTS = 400
@@ -81,15 +81,7 @@ class KnownMotion:
                 argument="measured",
             )
         n = len(system.C)
-        u, y = (_samples(name, letter, x, n) for letter, x in zip("uy", measured, strict=True))
-        if len(u) != len(y) or len(y) < LEAST * n:
-            raise ModelError(
-                f"{name}: found {len(u)} samples of forces and {len(y)} of positions, expected as many of both, {LEAST * n} "
-                "at least",
-                argument="measured",
-            )
-        if not np.any(np.ptp(y, axis=0)):
-            raise ModelError(f"{name}: found positions that do not move", argument="measured")
+        u, y = sampled_motion(name, *measured, least=LEAST * n, columns=n)
         return cls(u, y, system.period, frequency)
 
     def left(self, form: MechanicalForm) -> np.ndarray:
@@ -122,23 +114,3 @@ def _convolved(h: np.ndarray, u: np.ndarray) -> np.ndarray:
     length = 2 ** int(np.ceil(np.log2(2 * len(u))))
     product = np.fft.rfft(h, length, axis=0) @ np.fft.rfft(u, length, axis=0)[:, :, None]
     return np.fft.irfft(product[:, :, 0], length, axis=0)[: len(u)]
-
-
-def _samples(name: str, letter: str, values: Any, n: int) -> np.ndarray:
-    try:
-        found = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(f"{name}: found {letter} that is no array of numbers", argument="measured") from None
-    found = found[:, None] if found.ndim == 1 else found
-    if found.ndim != 2 or found.shape[1] != n:
-        raise ModelError(
-            f"{name}: found {letter} of shape {found.shape}, expected (N, {n}), a column for each coordinate",
-            argument="measured",
-        )
-    bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
-    if bad.size:
-        raise ModelError(
-            f"{name}: found {letter} that is not finite in {rows_in_words(bad)}; take a part without such rows",
-            argument="measured",
-        )
-    return found

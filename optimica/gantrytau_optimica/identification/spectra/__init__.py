@@ -1,0 +1,1 @@
+"""Inputs and outputs sampled together, and their spectra."""
