@@ -12,6 +12,7 @@ from gantrytau.answers.diagnosis import Diagnosis, diagnose
 from gantrytau.answers.evaluation import evaluate
 from gantrytau.answers.instant_function import instant_function, is_before
 from gantrytau.compiler.request import Request, names
+from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.system import Causality, System, assemble
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
@@ -68,6 +69,10 @@ class Dae(Translated):
         """
         before = any(map(is_before, names(given)))
         return instant_function(self, given, find) if before else function(self, given, find)
+
+    def with_starts(self, starts: Mapping[str, Any]) -> "Dae":
+        """The same from other start values, as `simulate(..., starts=)` takes them, for many runs from there."""
+        return self.of(with_starts(self, starts))
 
     def evaluate(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """All variables and derivatives at a consistent point that holds `values` exactly.

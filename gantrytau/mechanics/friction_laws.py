@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from gantrytau import between, exp, fabs, if_else, tanh
+from gantrytau import between, exp, if_else, tanh
 
 
 def linear_sign(slope: Any) -> Any:
@@ -35,4 +35,4 @@ def stribeck_friction(speed: Any, smoothing: Any, coulomb: Any, static: Any, fal
 
 def dahl_rate(speed: Any, z: Any, stiffness: Any, coulomb: Any) -> Any:
     """The rate of the deflection z before sliding (Dahl 1968): speed - stiffness |speed| z / coulomb."""
-    return speed - stiffness * fabs(speed) * z / coulomb
+    return speed - stiffness * if_else(speed > 0, speed, -speed, smooth=True) * z / coulomb

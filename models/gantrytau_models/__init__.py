@@ -7,6 +7,7 @@ from gantrytau_models.control.feedforward import Feedforward
 from gantrytau_models.control.inverse_dynamics import InverseDynamics
 from gantrytau_models.control.plant import MeasuredGantryTau, MotorDrivenGantryTau
 from gantrytau_models.control.references import CircularReference
+from gantrytau_models.control.servos import CartServo, PreslidingFriction, cart_servos
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
 from gantrytau_models.mechanisms.delta import DeltaRobot
 from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
@@ -20,6 +21,7 @@ from gantrytau_models.mechanisms.stewart import StewartPlatform
 from gantrytau_models.mechanisms.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist
 
 __all__ = [
+    "CartServo",
     "CascadedController",
     "CircularReference",
     "ComputedTorqueController",
@@ -39,11 +41,13 @@ __all__ = [
     "MotorDrivenGantryTau",
     "Pendulum",
     "PidController",
+    "PreslidingFriction",
     "SerialWrist",
     "SixLinkGantryTau",
     "SixLinkWithWrist",
     "StewartPlatform",
     "TrackingController",
     "WithWrist",
+    "cart_servos",
     "prototypes",
 ]

@@ -56,6 +56,8 @@ from gantrytau_optimica.identification.servos.identify_servo import identify_ser
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
+from gantrytau_optimica.learning.rig import Rig
+from gantrytau_optimica.learning.scatter import Scatter
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared
@@ -122,9 +124,11 @@ __all__ = [
     "PhysicalForm",
     "PlannedCell",
     "Prepared",
+    "Rig",
     "SampledDevice",
     "Samples",
     "SavedOptimum",
+    "Scatter",
     "Sensitivities",
     "SensitivityTable",
     "ServoModel",

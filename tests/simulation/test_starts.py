@@ -37,6 +37,11 @@ def test_a_motion_begins_where_it_is_told():
     assert simulate(dae, stop=0.1, starts={"x[0]": 5.0})["x"][0].tolist() == [5.0, 0.0]
     assert simulate(dae, stop=0.1, starts={"twice": 8.0})["x[0]"][0] == 4.0
     assert simulate(dae, stop=0.1)["x[0]"][0] == 1.0  # the translation is as it was
+    begun = dae.with_starts({"x": [3.0, 0.0]})
+    assert (
+        simulate(begun, stop=2.0)["x[0]"].tolist()
+        == simulate(dae, stop=2.0, starts={"x": [3.0, 0.0]})["x[0]"].tolist()
+    )
 
 
 def test_algebraic_variables_take_the_branch_of_their_new_start():

@@ -216,11 +216,12 @@ def _solve(
         around = _propagated(level, around, missing)
     start = around[columns]
 
-    def met(
-        factors: np.ndarray | float, sizes: np.ndarray | float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where steps of these sizes lead, what is left there, and which equations do not hold."""
-        point, _, _ = newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)
+    def led(factors: np.ndarray | float, sizes: np.ndarray | float) -> np.ndarray:
+        """Where steps of these sizes lead."""
+        return newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)[0]
+
+    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+        """What is left at a point, and which equations do not hold."""
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
         if np.any(bad) and usual:
@@ -230,14 +231,20 @@ def _solve(
         left = np.flatnonzero(bad)
         if left.size and np.all(np.isfinite(f)):
             bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        return point, f, bad
+        return f, bad
 
     rows, sizes = balance(at(start)[1])
     usual = not np.any(sizes != 1)  # sizes of metres, radians and newtons
-    point, f, bad = met(1.0, 1.0)
+    point = led(1.0, 1.0)
+    f, bad = left_at(point, 1.0)
     if np.any(bad) and not usual:
-        usual = True
-        point, f, bad = met(rows, sizes)
+        usual, first = True, point
+        point = led(rows, sizes)
+        f, bad = left_at(point, sizes)
+        f_first, bad_first = left_at(first, sizes)
+        # where both hold but for rounding, the point where less is left
+        if not np.any(bad_first) and np.linalg.norm(rows * f_first) < np.linalg.norm(rows * f):
+            point, f, bad = first, f_first, bad_first
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))

@@ -31,6 +31,24 @@ def test_modes_with_carts_and_frame_locked():
     assert -poles.real / np.abs(poles) == pytest.approx(0.05, rel=0.2)  # what the record says of damping
 
 
+def test_the_point_at_rest_is_one():
+    dae = translate(FlexibleGantryTau(RECORD, friction=None, r=PLACE))
+    rest = {f"carts[{k}].s": float(s) for k, s in enumerate(unstretched(RECORD, PLACE))}
+    point = linearize(dae, at=rest, steady=True).point
+    forces = {f"carts[{k}].f": point[f"carts[{k}].f"] for k in range(3)}
+    held = simulate(dae, stop=0.02, starts={name: point[name] for name in dae.states}, inputs=forces)
+    assert np.ptp(held["tool.r"], axis=0) == pytest.approx(np.zeros(3), abs=1e-10)  # m, of a sag of 2 mm
+    weight = sum(arm_force(point, k) for k in range(3))
+    assert weight == pytest.approx([0, 0, 9.81 * RECORD.plate_mass], abs=1e-6)
+
+
+def arm_force(point, k) -> np.ndarray:
+    """Force of an arm on the tool, (3,) in N, from how much longer its rod is than its link."""
+    rod = point["tool.r"] - point[f"arms[{k}].frame_cart.r"]
+    length = np.linalg.norm(rod)
+    return -RECORD.arm_stiffness[k] * (length - RECORD.arms[k].length) * rod / length
+
+
 def test_static_stiffness_is_that_of_the_arms_seen_through_the_jacobian():
     h = 1e-5
     to_carts = np.column_stack([

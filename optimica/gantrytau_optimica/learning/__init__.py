@@ -1,0 +1,1 @@
+"""Learning control of robots: runs of a robot with its servos."""

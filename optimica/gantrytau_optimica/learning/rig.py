@@ -1,0 +1,169 @@
+"""A simulated robot under its servos, run after run: references in, what is measured out."""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gantrytau import Model, ModelError, Result, Samples, linearize, simulate, translate
+from gantrytau.dae import Dae
+from gantrytau.kinematics.kinematics import driven_joints
+from gantrytau_optimica.learning.scatter import STILL, Scatter
+from gantrytau_optimica.learning.servo_loop import servo_loop
+
+TOLERANCE = 1e-4  # of a run: leaves errors of 4 nm at the tool, far below the noise of encoders
+SHOWN = ("tool.r", "tool.v", "gauge.r", "accelerometer.a", "frame.s")  # what of it a robot has
+READ = {"r": ("gauge.r", "tool.r"), "a": ("accelerometer.a",)}  # the first of these that a robot has
+
+
+class Rig:
+    """A robot model with a controller for each driven joint, that runs references given every `period` seconds.
+
+    controllers: components such as `gantrytau_models.CartServo`, one for each force x.f beside x.s, with q_ref, v_ref, q,
+    v, f_ff and f. noise: what differs from run to run (`Scatter`), nothing if None; friction that differs is one with the
+    inputs `level` and `z_0`, such as `PreslidingFriction`.
+    Translation takes about a second, once; each run some tenths of one.
+    Raises ModelError for a period that is not above zero or not that of the controllers, controllers that do not fit, and
+    friction that cannot differ although it should.
+    """
+
+    def __init__(
+        self, model: Model, controllers: Sequence[Model], *, period: float, noise: Scatter | None = None
+    ):
+        if not (isinstance(period, (int, float)) and 0 < period < np.inf):
+            raise ModelError(f"Rig: found period={period!r}, expected a number above zero, in s")
+        if not isinstance(noise, Scatter | None):
+            raise ModelError(f"Rig: found noise={noise!r}, expected a Scatter, or None for none")
+        self.period = float(period)
+        self.noise = STILL if noise is None else noise
+        self.robot = translate(model)
+        self.joints = driven_joints(self.robot)
+        self.loop = translate(servo_loop(model, controllers, self.joints), events=True)
+        for k in range(len(self.joints)):
+            own = self.loop.parameter_values.get(f"controllers[{k}].period", period)
+            if abs(own - period) > 1e-9 * period:
+                raise ModelError(
+                    f"Rig: found controllers[{k}] with the period {own:g} s, expected that of the rig, {period:g} s"
+                )
+        self._laws = tuple(self._law(joint) for joint in self.joints)
+        self._started = dict[tuple[float, ...], tuple[Dae, np.ndarray]]()
+
+    def run(self, position: ArrayLike, velocity: ArrayLike | None = None, seed: int = 0) -> Result:
+        """What the robot does for references of its joints, position (N, n) in m and velocity (N, n) in m/s, none if None.
+
+        It rests at the first position before. Row k of a reference is given at k times the period, and held. The result
+        has N rows, at these times: joints, forces and friction by their names in the robot, `tool.r`, `gauge.r` and
+        `accelerometer.a` where it has them, `q_ref` and `v_ref`; readings with noise are `measured.q`, `measured.r` (of
+        the gauge, else of the tool) and `measured.a`. Equal seeds draw the same friction and noise: take another for each
+        run. Raises ModelError for references of another shape or not finite, InitializationError where the robot cannot
+        rest at the first, SolveError where the simulation stops.
+        """
+        q_ref = self._reference("position", position)
+        v_ref = np.zeros_like(q_ref) if velocity is None else self._reference("velocity", velocity)
+        if v_ref.shape != q_ref.shape:
+            raise ModelError(
+                f"Rig.run: found velocity of shape {v_ref.shape}, expected that of position, {q_ref.shape}"
+            )
+        random = np.random.default_rng(seed)
+        t = self.period * np.arange(len(q_ref))
+        loop, forces = self._at_rest(q_ref[0])
+        drawn = {name: [value] for name, value in self._drawn(forces, random).items()}
+        # all are samples, so that the equations of one run serve for the next
+        series = {"q_ref": q_ref, "v_ref": v_ref, **drawn}
+        inputs = {name: Samples(t[: len(u)], u, kind="constant") for name, u in series.items()}
+        found = simulate(
+            loop,
+            stop=t[-1],
+            inputs=inputs,
+            outputs=[*(f"robot.{name}" for name in self._shown), "q_ref", "v_ref"],
+            tolerance=TOLERANCE,
+            points=len(t),
+        )
+        # where references jump, the row behind
+        rows = np.searchsorted(found.time, t + 1e-6 * self.period, side="right") - 1
+        values = {name.removeprefix("robot."): found[name][rows] for name in found.names}
+        units = {name.removeprefix("robot."): found.unit(name) for name in found.names}
+        return self._with_readings(t, values, units, random)
+
+    def _reference(self, word: str, values: ArrayLike) -> np.ndarray:
+        found = np.asarray(values, dtype=float)
+        if found.ndim != 2 or found.shape[1] != len(self.joints) or len(found) < 2:
+            raise ModelError(
+                f"Rig.run: found {word} of shape {found.shape}, expected (N, {len(self.joints)}), one row for each period"
+            )
+        bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
+        if bad.size:
+            raise ModelError(f"Rig.run: row {bad[0]} of {word} is not finite, expected numbers")
+        return found
+
+    @cached_property
+    def _shown(self) -> tuple[str, ...]:
+        known = {*self.robot.variables, *self.robot.vectors}
+        owners = [joint.removesuffix(".s") for joint in self.joints]
+        wanted = [f"{owner}.{last}" for owner in owners for last in ("s", "v", "f", "friction")]
+        return tuple(name for name in (*wanted, *SHOWN) if name in known)
+
+    def _law(self, joint: str) -> str | None:
+        """The friction beside a joint whose level and deflection are drawn, None where there is none."""
+        owner = joint.removesuffix(".s")
+        laws = [n.removesuffix(".level") for n in self.robot.inputs if n.startswith(f"{owner}.")]
+        for law in laws:
+            if f"{law}.z_0" in self.robot.inputs:
+                return law
+        rubs = [n for n in self.robot.parameters if n.startswith(f"{owner}.") and n.endswith(".f_c")]
+        if rubs and (self.noise.level or self.noise.rest):
+            raise ModelError(
+                f"Rig: found friction {rubs[0].removesuffix('.f_c')} without the inputs level and z_0, expected such as "
+                "PreslidingFriction; or Scatter(level=0.0, rest=0.0), which draws noise alone"
+            )
+        return None
+
+    def _at_rest(self, q: np.ndarray) -> tuple[Dae, np.ndarray]:
+        """The loop that starts from rest with its joints at q (n,), and the forces (n,) in N that hold it there."""
+        key = tuple(q.tolist())
+        if key not in self._started:
+            laws = [law for law in self._laws if law is not None]
+            words = {"level": 1.0, "z_0": 0.0, "moved": 0.0}  # so that no friction helps to hold it
+            still = {f"{law}.{word}": value for law in laws for word, value in words.items()}
+            at = dict(zip(self.joints, key, strict=True)) | still
+            point = linearize(self.robot, at=at, steady=True).point
+            starts = {f"robot.{name}": point[name] for name in self.robot.states}
+            for k, value in enumerate(key):
+                starts |= dict.fromkeys(self.loop.expand(f"controllers[{k}].q_seen"), value)
+            forces = np.array([point[f"{joint.removesuffix('.s')}.f"] for joint in self.joints])
+            self._started[key] = self.loop.with_starts(starts), forces
+        return self._started[key]
+
+    def _drawn(self, forces: np.ndarray, random: np.random.Generator) -> dict[str, float]:
+        """Inputs of a run: level of friction, where it rests in it, and the forces that hold it there."""
+        n = len(self.joints)
+        level = 1 + self.noise.level * random.uniform(-1, 1, n)
+        rest = self.noise.rest * random.uniform(-1, 1, n)
+        inputs = {}
+        for k, law in enumerate(self._laws):
+            if law is not None:
+                values = {word: self.robot.parameter_values[f"{law}.{word}"] for word in ("f_c", "x")}
+                inputs[f"robot.{law}.level"] = float(level[k])
+                inputs[f"robot.{law}.z_0"] = rest[k] * values["x"]
+                forces = forces + np.eye(n)[k] * level[k] * rest[k] * values["f_c"]
+        return inputs | {f"controllers[{k}].f_ff": float(force) for k, force in enumerate(forces)}
+
+    def _with_readings(
+        self,
+        t: np.ndarray,
+        values: dict[str, np.ndarray],
+        units: dict[str, str],
+        random: np.random.Generator,
+    ) -> Result:
+        true = {"q": np.column_stack([values[joint] for joint in self.joints])}
+        for letter, places in READ.items():
+            place = next((name for name in places if name in self._shown), None)
+            if place is not None:
+                true[letter] = np.column_stack([values[f"{place}[{k}]"] for k in range(3)])
+        deviations = {"q": self.noise.encoder, "r": self.noise.gauge, "a": self.noise.accelerometer}
+        for letter, exact in true.items():
+            read = exact + deviations[letter] * random.standard_normal(exact.shape)
+            values |= {f"measured.{letter}[{k}]": column for k, column in enumerate(read.T)}
+            units[f"measured.{letter}"] = "m/s2" if letter == "a" else "m"
+        return Result(t, values, units=units, title=f"{self.robot.name} under its servos")

@@ -1,0 +1,35 @@
+"""What differs from run to run of one robot: friction, where it rests in it, and noise of what is measured."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from gantrytau import ModelError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """Standard deviations of noise, and widths of what is drawn for a run.
+
+    encoder, gauge: m, accelerometer: m/s2, white, of one reading. level: friction is drawn within 1 -+ level of its
+    nominal value. rest: friction at the start is drawn within -+ rest of the Coulomb friction, as earlier motion left it.
+    Raises ModelError for what is negative or not finite, and for level and rest of 1 and more.
+    """
+
+    encoder: float = 1e-6
+    gauge: float = 1e-6
+    accelerometer: float = 0.07
+    level: float = 0.1
+    rest: float = 0.6
+
+    def __post_init__(self):
+        for one in fields(self):
+            value = getattr(self, one.name)
+            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+            bound = 1.0 if one.name in ("level", "rest") else np.inf
+            if not (number and 0 <= value < bound):
+                words = "from 0 to below 1" if bound == 1.0 else "that is finite and not negative"
+                raise ModelError(f"Scatter: found {one.name}={value!r}, expected a number {words}")
+
+
+STILL = Scatter(encoder=0.0, gauge=0.0, accelerometer=0.0, level=0.0, rest=0.0)

@@ -1,0 +1,60 @@
+"""A robot and one controller for each of its joints, as one model."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from gantrytau import Array, Input, Model, ModelError
+
+PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
+
+
+def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]) -> Model:
+    """The model `robot` with `controllers`, driven by the references q_ref (n,) and v_ref (n,) of its joints.
+
+    Raises ModelError for controllers that are not one for each joint, with the ports q_ref, v_ref, q, v, f_ff and f.
+    """
+    n = len(joints)
+    if len(controllers) != n:
+        raise ModelError(
+            f"Rig: found {len(controllers)} controllers, expected one for each joint: {', '.join(joints)}"
+        )
+    for k, one in enumerate(controllers):
+        missing = [port for port in PORTS if not isinstance(one, Model) or port not in type(one).members()]
+        if missing:
+            raise ModelError(
+                f"Rig: controllers[{k}]: found {one!r} without {', '.join(missing)}, expected a component such as "
+                f"CartServo with {', '.join(PORTS)}"
+            )
+    turning = [joint for joint in joints if not joint.endswith(".s")]
+    if turning:
+        raise ModelError(
+            f"Rig: found the joints {', '.join(turning)} that turn, expected joints that move, x.s"
+        )
+    one_each = list(controllers)
+
+    class ServoLoop(Model):
+        """A robot under its servos."""
+
+        q_ref = Input(n, unit="m", description="references of the positions")
+        v_ref = Input(n, unit="m/s", start=0.0, description="references of the speeds")
+        robot = model
+        controllers = Array(Model, one_each)
+
+        def equations(self):
+            for k, (joint, one) in enumerate(zip(joints, self.controllers, strict=True)):
+                moved = _member(self.robot, joint.removesuffix(".s"))
+                yield one.q_ref == self.q_ref[k]
+                yield one.v_ref == self.v_ref[k]
+                yield one.q == moved.s
+                yield one.v == moved.v
+                yield moved.f == one.f
+
+    return ServoLoop()
+
+
+def _member(owner: Any, path: str) -> Any:
+    """What a dotted path such as `carts[0]` leads to."""
+    for word in re.findall(r"\w+", path):
+        owner = owner[int(word)] if word.isdigit() else getattr(owner, word)
+    return owner
