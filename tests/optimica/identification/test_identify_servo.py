@@ -278,4 +278,7 @@ def test_names_figure_and_words(exact, tmp_path):
     assert "delay 5, pole 0.96470" in repr(exact)
     figure = exact.plot(file=tmp_path / "steps.png")
     assert (tmp_path / "steps.png").stat().st_size > 10_000
-    assert len(figure.axes) == 9  # three actuators by three steps
+    assert len(figure.axes) == 6
+    left = figure.axes[1].lines
+    assert len(left) == 3
+    assert np.abs(left[0].get_ydata()).max() < 1e-12  # the law is exact

@@ -1,4 +1,4 @@
-"""Figures of steps: what was asked for, what was measured, and the law."""
+"""Figures of steps: what was measured, the law, and what the law leaves."""
 
 import os
 from collections.abc import Sequence
@@ -6,45 +6,50 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau import ModelError
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.identification.servos.step_response import StepResponse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = 6  # steps that one figure still shows
-
 
 def draw_steps(
-    steps: Sequence[StepResponse], simulated: Sequence[np.ndarray], file: str | os.PathLike[str] | None
+    steps: Sequence[StepResponse],
+    simulated: Sequence[np.ndarray],
+    rest: np.ndarray,
+    file: str | os.PathLike[str] | None,
 ) -> "Figure":
-    """One panel for each actuator and step; of many steps the first ones."""
+    """A row for each actuator with the steps that it took, from rest (steps, n), and beside them what the law leaves."""
     import matplotlib.pyplot as plt
 
     if file is not None:
         check_suffix(file)
-    shown = list(zip(steps, simulated, strict=True))[:MOST]
-    actuators = steps[0].position.shape[1]
-    if not actuators:
-        raise ModelError("ServoModel.plot: found no actuator to draw")
+    actuators = rest.shape[1]
     figure, axes = plt.subplots(
         actuators,
-        len(shown),
-        sharex="col",
+        2,
+        sharex=True,
         squeeze=False,
-        figsize=(1.0 + 3.2 * len(shown), 1.0 + 2.2 * actuators),
+        figsize=(10.0, 1.0 + 2.4 * actuators),
         layout="constrained",
     )
-    for k, (step, model) in enumerate(shown):
-        for i, axis in enumerate(axes[:, k]):
-            axis.plot(step.t, step.reference[:, i], color="0.5", drawstyle="steps-post", label="reference")
-            axis.plot(step.t, step.position[:, i], label="measured")
-            axis.plot(step.t, model[:, i], "--", label="law")
+    for i, (motion, left) in enumerate(axes):
+        took = np.flatnonzero(np.isfinite(rest[:, i]))
+        for number, k in enumerate(took):
+            step, law = steps[k], simulated[k][:, i] - rest[k, i]
+            t, colour, first = step.t - step.t[0], f"C{number % 10}", number == 0
+            moved = step.position[:, i] - rest[k, i]
+            asked = step.reference[:, i] - step.reference[0, i]
+            motion.plot(t, asked, color="0.7", drawstyle="steps-post", label="reference" if first else None)
+            motion.plot(t, moved, color=colour, label=f"step {k}")
+            motion.plot(t, law, "--", color="black", linewidth=0.8, label="law" if first else None)
+            left.plot(t, moved - law, color=colour, linewidth=0.8)
+        motion.set_ylabel(f"actuator {i} [m, rad]")
+        motion.legend(fontsize="x-small")
+        for axis in (motion, left):
             axis.grid(alpha=0.3)
-            if k == 0:
-                axis.set_ylabel(f"actuator {i} [m, rad]")
-        axes[0, k].set_title(f"step {k}", fontsize="medium")
-        axes[-1, k].set_xlabel("time [s]")
-    axes[0, 0].legend(fontsize="small")
+    axes[0, 0].set_title("from rest", fontsize="medium")
+    axes[0, 1].set_title("measured less the law", fontsize="medium")
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
     return finished(figure, file)

@@ -10,7 +10,7 @@ from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRo
 NOISY = 20.0  # deviations of noise that a step should have
 ALIKE = 0.01  # of its size, by which steps of one size may differ
 SURE = 3.0  # deviations, and
-CHANGED = 0.05  # of the lag, by which the lags of small and large steps differ for a reason
+CHANGED = 0.02  # of the lag, by which the lags of small and large steps differ for a reason
 CLEAR = 1.05  # times the squares of the best delay, that its neighbours leave
 SETTLED = 3.0  # time constants, that a step should be followed for
 FOLLOWED = 90.0  # % of the motion, that the law should explain

@@ -98,8 +98,8 @@ class ServoModel:
         return np.column_stack([response(u, int(d), a, b) for u, d, a, b in laws]) + self.rest[step]
 
     def plot(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
-        """References, positions and the law over time, a row for each actuator, a column for each step."""
-        return draw_steps(self.steps, [self.simulated(k) for k in range(len(self.steps))], file)
+        """Steps and the law over time, from rest, and what the law leaves; a row for each actuator."""
+        return draw_steps(self.steps, [self.simulated(k) for k in range(len(self.steps))], self.rest, file)
 
     def __repr__(self) -> str:
         lines = [f"<Servos of {len(self.pole)} actuators, every {self.period:g} s"]
