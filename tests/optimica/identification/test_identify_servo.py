@@ -224,7 +224,7 @@ HOLE = np.where(np.arange(100) == 7, np.nan, JUMP)
         ((T, "step", JUMP), "reference that is no array of numbers"),
         ((T[:, None], JUMP, JUMP), r"t of shape \(100, 1\), expected \(N,\)"),
         (([], [], []), r"t of shape \(0,\)"),
-        (([0.0], [1.0], [1.0]), "found 1 row, expected the rows of a step"),
+        (([0.0], [1.0], [1.0]), "found one row, expected those of a step"),
     ],
 )
 def test_what_is_no_step_response(arguments, words):

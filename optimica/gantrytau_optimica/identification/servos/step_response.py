@@ -148,7 +148,7 @@ def _numbers(name: str, values: Any) -> np.ndarray:
 
 def _check_times(t: np.ndarray) -> None:
     if len(t) < 2:
-        raise ModelError(f"StepResponse: found {len(t)} rows, expected those of a step", argument="t")
+        raise ModelError("StepResponse: found one row, expected those of a step", argument="t")
     steps = np.diff(t)
     period = float(np.median(steps))
     off = np.flatnonzero(~(np.abs(steps - period) <= EVEN * period)) + 1
