@@ -42,7 +42,8 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
         controllers = Array(Model, one_each)
 
         def equations(self):
-            for k, (joint, one) in enumerate(zip(joints, self.controllers, strict=True)):
+            ones: Any = self.controllers
+            for k, (joint, one) in enumerate(zip(joints, ones, strict=True)):
                 moved = _member(self.robot, joint.removesuffix(".s"))
                 yield one.q_ref == self.q_ref[k]
                 yield one.v_ref == self.v_ref[k]

@@ -44,6 +44,39 @@ def test_modes_are_those_of_a_body_on_springs_in_series(joint, tube):
     assert found == pytest.approx(by_hand(dae.evaluate({}), 1 / (2 / joint + 1 / tube)), rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("joint", "tube", "expected"),
+    [  # two ball joints a link, stiff tubes; tubes of carbon as well; every arm 3 N/um in all
+        (115e6, 1e15, [107, 268, 555]),
+        (115e6, 25e6, [59, 148, 305]),
+        (None, None, [22, 39, 90]),
+    ],
+)
+def test_plate_that_does_not_turn_has_three_modes(joint, tube, expected):
+    """Links and joints are 10 to 50 times too stiff for the 10.5 and 11.5 Hz that were measured.
+
+    The figures are those of a point mass; a plate of large inertia is one, and its links, 2 and 3 on an arm, are parallel.
+    """
+    mass, heavy = 22.38, 1e9 * np.eye(3)
+    # springs in series give c / n for each of n links
+    stiffness = [
+        dict(c_joint=joint, c_tube=tube) if joint else dict(c_joint=1e15, c_tube=3e6 / n) for n in (1, 2, 3)
+    ]
+    links = [dict(links=[dict(mass=0.0, **c)] * n) for n, c in enumerate(stiffness, start=1)]
+    robot = ElasticSixLinkGantryTau(
+        RECORD,
+        r=PLACE,
+        friction=None,
+        arms=links,
+        tool=dict(m=mass, J=heavy),
+        world=dict(g=0.0),
+    )
+    linear = linearize(robot)
+    rows = [k for k, name in enumerate(linear.states) if name.startswith("tool")]
+    poles = np.linalg.eigvals(np.array(linear.A)[np.ix_(rows, rows)])
+    assert np.sort(np.abs(poles))[-6::2] / (2 * np.pi) == pytest.approx(expected, rel=0.02)
+
+
 def test_place_out_of_reach_is_refused():
     with pytest.raises(
         InitializationError, match=r"SixLinkGantryTau: no consistent start.*is a length out of reach"

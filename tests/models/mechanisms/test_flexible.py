@@ -47,7 +47,9 @@ def test_held_carts_leave_the_sway_of_the_frame_and_the_modes_of_the_arms():
     frequencies = held(PLACE)
     assert frequencies == pytest.approx([7.4, 10.4, 12.2, 78.4], rel=0.01)
     # at no place do these springs have a second mode of the tool below 12.1 Hz: 1.8 kg more at the wrist
-    assert held([0.9, 3.2, -0.4], plate_mass=24.2)[:3] == pytest.approx([7.4, 10.5, 11.5], abs=0.3)  # Table 6.4
+    assert held([0.9, 3.2, -0.4], plate_mass=24.2)[:3] == pytest.approx(
+        [7.4, 10.5, 11.5], abs=0.3
+    )  # Table 6.4
 
 
 def test_the_point_at_rest_is_one():

@@ -1,14 +1,18 @@
 """Devices that watch a motion: what they read at their own rate, and what a predictor makes of late readings."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import KW_ONLY, dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 
 ROUNDING = 1e-9  # of a sample: a last instant that rounding puts behind the end is still read
+BENT = 1e-2  # of their length, by which axes are too short halfway between two rotations 16 degrees apart
 EVEN = 1e-3  # of the distance of two outputs, by which they may differ
 
 
@@ -31,17 +35,28 @@ def instants(result: Result, rate: float) -> Array:
     return np.minimum(first + np.arange(count) / rate, last)
 
 
+class Readings(Result):
+    """What a device read over time, see `Result`; findings: what is to be said of it, rows from 0."""
+
+    def __init__(self, *series: Any, findings: Iterable[Finding] = (), **own: Any):
+        super().__init__(*series, **own)
+        self.findings = tuple(findings)
+
+
 @dataclass(frozen=True, eq=False)
 class SampledDevice:
-    """A device such as LaserTracker or LengthGauge that reads a motion again and again.
+    """A device such as LaserTracker, TMac or LengthGauge that reads a motion again and again.
 
-    device: what reads; position: name of the watched point in the result, a vector in m whose axes do not turn. play: half
-    the width in m by which the tip of a length gauge stays behind after each reversal, as friction holds it.
+    device: what reads; position: name of the watched point in the result, a vector in m; orientation: name of its axes in
+    the world, a matrix; if None the one beside the position, `tool.R` for `tool.r`, and axes that do not turn where the
+    result has none. play: half the width in m by which the tip of a length gauge stays behind after each reversal, as
+    friction holds it.
     """
 
     device: Device
     _: KW_ONLY
     position: str = "tool.r"
+    orientation: str | None = None
     play: float = 0.0
 
     def __post_init__(self):
@@ -55,19 +70,21 @@ class SampledDevice:
                 "nothing else touches what it measures"
             )
 
-    def measure(self, result: Result, *, rate: float, seed: int = 0) -> Result:
-        """What the device reads of a simulated motion at a rate in Hz: its readings, position `r` in m, `seen`.
+    def measure(self, result: Result, *, rate: float, seed: int = 0) -> Readings:
+        """What the device reads of a simulated motion at a rate in Hz: its readings, `seen`, and the pose as it finds it,
+        `r` in m and `R`.
 
-        Values of what it does not see are NaN; behind a jump it reads what is there then. Equal seeds give equal series.
-        Raises ModelError for a rate that is not above zero and for a position that the result does not have.
+        Values of what it does not see are NaN, and `.findings` tell of it (kinds "unseen" and "lost"); behind a jump it
+        reads what is there then. Equal seeds give equal series. Raises ModelError for a rate that is not above zero and for
+        names that the result does not have.
         """
         t = instants(result, rate)
-        found = self.device.measure(result.at(t, self.position), seed=seed)
+        found = self.device.measure(*self._poses(result, t), seed=seed)
         readings = found.readings
         if self.play and isinstance(self.device, LengthGauge):
             # friction remembers reversals between two readings: all times of the result count
             times = np.union1d(t, result.time)
-            exact = replace(self.device, noise=0.0).measure(result.at(times, self.position)).readings[:, 0]
+            exact = replace(self.device, noise=0.0).measure(*self._poses(result, times)).readings[:, 0]
             held = _played(exact, self.play)[np.searchsorted(times, t)]
             readings = readings + (held - exact[np.searchsorted(times, t)])[:, None]
         columns = [name.rstrip("]").split(" [") for name in found.names]
@@ -76,8 +93,52 @@ class SampledDevice:
         if found.r is not None:
             values |= {f"r[{k}]": found.r[:, k] for k in range(3)}
             units["r"] = "m"
+        if found.R is not None:
+            values |= {f"R[{i},{j}]": found.R[:, i, j] for i, j in np.ndindex(3, 3)}
+            units["R"] = "1"
         values["seen"] = found.seen.astype(float)
-        return Result(t, values, units=units, title=f"{type(self.device).__name__} at {rate:g} Hz")
+        title = f"{type(self.device).__name__} at {rate:g} Hz"
+        return Readings(t, values, units=units, title=title, findings=self._findings(result, t, found.seen))
+
+    def _poses(self, result: Result, t: Array) -> tuple[Array, Array | None]:
+        """Positions (N, 3) and orientations (N, 3, 3), None where the axes do not turn."""
+        beside = self.position[:-1] + "R" if self.position.endswith(".r") else None
+        name = self.orientation if self.orientation or beside not in result else beside
+        if name is None:
+            return result.at(t, self.position), None
+        R = np.asarray(result.at(t, name))
+        if R.shape != (len(t), 3, 3):
+            raise ModelError(
+                f"SampledDevice: found orientation={name!r} of shape {R.shape[1:]}, expected a matrix (3, 3)"
+            )
+        # straight lines between two rotations leave them by the square of the turn: the nearest rotation
+        U, sizes, Vt = np.linalg.svd(R)
+        if np.any(np.abs(sizes - 1) > BENT) or np.any(np.linalg.det(R) < 0):
+            raise ModelError(
+                f"SampledDevice: found {name} that is no rotation at all times, expected one, from the axes of the tool to "
+                "the world, and outputs a few degrees apart at most"
+            )
+        return result.at(t, self.position), U @ Vt
+
+    def _findings(self, result: Result, t: Array, seen: Array) -> Iterator[Finding]:
+        lost = np.flatnonzero(~seen)
+        if not lost.size:
+            return
+        name, place = type(self.device).__name__, ", ".join(f"{x:.3g}" for x in self.device.r)
+        away = np.linalg.norm(result.at(t[lost], self.position) - self.device.r, axis=1)
+        remedy = "look at its place r, its axes R and ranges, its target and what stands in between"
+        where = f"{self.position} is then {away.min():.3g} to {away.max():.3g} m away from it; {remedy}"
+        if lost.size == len(t):
+            yield Finding(
+                "unseen", lost, f"the {name} at [{place}] m sees none of {len(t)} readings: {where}"
+            )
+        else:
+            have = agreeing(lost, "are")
+            yield Finding(
+                "lost",
+                lost,
+                f"{rows_in_words(lost)} of {len(t)} {have} not seen by the {name} at [{place}] m: {where}",
+            )
 
 
 def predict_late(readings: Result, name: str, *, latency: float, degree: int = 1) -> Array:

@@ -7,7 +7,7 @@ from gantrytau import ModelError, Result
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
 from gantrytau_optimica.calibration.devices.cameras import stereo_cameras
-from gantrytau_optimica.calibration.devices.devices import LaserTracker
+from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
 
@@ -46,6 +46,72 @@ def test_rate_that_does_not_divide_and_times_that_repeat():
     for rate in (0.0, -1.0, np.nan):
         with pytest.raises(ModelError, match="expected a number above 0 in Hz"):
             exact.measure(jump, rate=rate)
+
+
+def turning(t, angle) -> Result:
+    """A tool that turns about an axis while it moves; `flange` is elsewhere and does not turn."""
+    R = turned(np.broadcast_to(np.eye(3), (len(t), 3, 3)), angle[:, None] * np.array([0.0, 0.6, 0.8]))
+    values = {f"tool.R[{i},{j}]": R[:, i, j] for i in range(3) for j in range(3)}
+    values |= {f"tool.r[{k}]": x + 0.1 * t for k, x in enumerate((3.0, 0.2, -0.1))}
+    return Result(t, values | {f"flange.r[{k}]": 1.0 + 0 * t for k in range(3)})
+
+
+def test_devices_that_see_orientation_tell_it_over_time():
+    t = np.linspace(0.0, 1.0, 251)
+    path = turning(t, np.sin(2 * t))
+    about = np.array([0.1, 0.0, 0.05])
+    quiet = dict.fromkeys(
+        ("range_noise", "range_noise_per_metre", "transverse_noise", "transverse_noise_per_metre"), 0.0
+    )
+    exact = TMac(rotation_noise=0.0, **quiet, target=about)
+    series = SampledDevice(exact).measure(path, rate=200.0)
+    assert series.findings == ()
+    assert series["r"] == pytest.approx(path.at(series.time, "tool.r"), abs=1e-12)  # by lever and orientation
+    R = series["R"]
+    assert R @ R.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(3), R.shape), abs=1e-12)
+    true = turning(series.time, np.sin(2 * series.time))["tool.R"]
+    assert R == pytest.approx(true, abs=2 * 0.004**2 / 8 * 4)  # between outputs: h2 / 8 of second derivatives
+    noisy = SampledDevice(TMac(rotation_noise=1e-4, target=about)).measure(path, rate=200.0, seed=2)
+    turn = R.transpose(0, 2, 1) @ noisy["R"]
+    assert np.std(turn[:, 2, 1]) == pytest.approx(1e-4, rel=0.2)  # 201 readings: 5 %
+    # a tracker of the same target does without orientation, but its target goes round with the tool
+    point = SampledDevice(LaserTracker(**quiet, target=about))
+    reflector = path.at(series.time, "tool.r") + true @ about
+    assert point.measure(path, rate=200.0)["r"] == pytest.approx(reflector, abs=1e-6)
+    assert "R[0,0]" not in point.measure(path, rate=200.0)
+    beside = SampledDevice(exact, position="flange.r", orientation="tool.R").measure(path, rate=200.0)
+    assert beside["R"] == pytest.approx(R, abs=1e-12)
+
+
+def test_wrong_orientations_are_told():
+    t = np.linspace(0.0, 1.0, 101)
+    path = turning(t, 0.0 * t)
+    with pytest.raises(ModelError, match=r"has no variable 'plate\.R'"):
+        SampledDevice(TMac(), orientation="plate.R").measure(path, rate=100.0)
+    with pytest.raises(ModelError, match=r"found orientation='tool.r' of shape \(3,\), expected a matrix"):
+        SampledDevice(TMac(), orientation="tool.r").measure(path, rate=100.0)
+    with pytest.raises(
+        ModelError, match=r"found tool\.R that is no rotation at all times, .* a few degrees apart"
+    ):
+        SampledDevice(TMac()).measure(turning(t, 100.0 * t), rate=40.0 + 1 / 3)
+
+
+def test_what_a_device_does_not_see_is_told():
+    t = np.linspace(0.0, 1.0, 101)
+    near, far = (motion("tool.r", [x + 10.0 * t, 0.0, 0.0], t) for x in (3.0, 300.0))
+    unseen = SampledDevice(LaserTracker()).measure(far, rate=100.0)
+    assert [(f.kind, len(f.rows)) for f in unseen.findings] == [("unseen", 101)]
+    assert (
+        "the LaserTracker at [0, 0, 0] m sees none of 101 readings: tool.r is then 300 to 310 m away"
+        in str(unseen.findings[0])
+    )
+    assert np.all(np.isnan(unseen["r"]))
+    partly = SampledDevice(LaserTracker(farthest=8.05)).measure(near, rate=100.0)
+    (finding,) = partly.findings
+    assert finding.kind == "lost"
+    assert finding.rows == pytest.approx(np.flatnonzero(partly["seen"] == 0))
+    assert "rows 51 to 100 of 101 are not seen by the LaserTracker" in finding.message
+    assert SampledDevice(LaserTracker()).measure(near, rate=100.0).findings == ()
 
 
 def test_outputs_farther_apart_than_readings_are_refused():
