@@ -243,7 +243,7 @@ for title, numbers in (("as drawn", {}), ("as identified", found.model_values)):
     left[title] = (test.f - foretold.f)[t > 1.0]  # where the reference has been caught up with
     axes.plot(t, foretold.f[:, 2], linewidth=1, label=f"{title}: off by {left[title].std():.1f} N")
 axes.set(xlim=(0, 6), xlabel="time [s]", ylabel="force of the third cart [N]")
-axes.legend(loc="upper right")
+figure.legend(loc="outside upper right", ncols=3)
 plt.show()
 print({title: f"{off.std():.1f} N" for title, off in left.items()})
 assert left["as identified"].std() < 1.05 * NOISE["force"] < 0.2 * left["as drawn"].std()

@@ -1,7 +1,9 @@
 """Pictures of linear systems: gain and phase over frequency, poles and zeros in the plane."""
 
 import os
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -31,6 +33,16 @@ class Drawn(Protocol):
     @property
     def zeros(self) -> np.ndarray: ...
     def unit(self, name: str) -> str: ...
+    def response(self, frequencies: Any) -> np.ndarray: ...
+
+
+class Spectrum(Protocol):
+    """A frequency response that was measured: hertz (N,), response (outputs, inputs, N) complex."""
+
+    @property
+    def hertz(self) -> np.ndarray: ...
+    @property
+    def response(self) -> np.ndarray: ...
 
 
 def frequencies_to_draw(system: Drawn) -> np.ndarray:
@@ -52,9 +64,70 @@ def frequencies_to_draw(system: Drawn) -> np.ndarray:
     return np.unique(np.concatenate([grid, near[(near >= low) & (near <= high)]]))
 
 
-def draw_bode(
-    system: Drawn, hertz: np.ndarray, response: np.ndarray, file: str | os.PathLike[str] | None
-) -> "Figure":
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """A frequency response (outputs, inputs, N) at frequencies (N,) in Hz: a line, or points that were measured."""
+
+    label: str
+    hertz: np.ndarray
+    response: np.ndarray
+    points: bool = False
+
+
+def beside_each_other(
+    system: Drawn, verb: str, beside: Mapping[str, Any] | None, spectra: bool = False
+) -> dict[str, Any]:
+    """A system under its title, and others by their names; ModelError for what is none, or of another shape."""
+    found: dict[str, Any] = {system.title: system}
+    place = f"{system.title}.{verb}"
+    expected = "systems or measured spectra" if spectra else "systems"
+    if not isinstance(beside, Mapping | None):
+        raise ModelError(
+            f"{place}: found beside={type(beside).__name__}, expected {expected} by their names, {{'measured': ...}}"
+        )
+    for label, other in (beside or {}).items():
+        if label in found:
+            raise ModelError(f"{place}: found the name {label!r} twice; give the other one a name of its own")
+        measured = spectra and hasattr(other, "hertz")
+        if not measured and not (hasattr(other, "poles") and hasattr(other, "outputs")):
+            raise ModelError(f"{place}: found {label}={type(other).__name__}, expected {expected}")
+        shape = np.shape(other.response)[:2] if measured else (len(other.outputs), len(other.inputs))
+        own = (len(system.outputs), len(system.inputs))
+        if spectra and shape != own:
+            raise ModelError(
+                f"{place}: found {shape[0]} outputs and {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
+            )
+        found[label] = other
+    return found
+
+
+def curves_of(systems: Mapping[str, Any], frequencies: Any) -> list["Curves"]:
+    """What is drawn of each: systems at the frequencies (N,) in Hz or around all their poles, spectra where they are known.
+
+    Of other systems than the first, the part below half of their sampling frequency.
+    """
+    models = [one for one in systems.values() if not hasattr(one, "hertz")]
+    hertz = (
+        np.unique(np.concatenate([frequencies_to_draw(one) for one in models]))
+        if frequencies is None
+        else np.atleast_1d(np.asarray(frequencies, dtype=float))
+    )
+    if frequencies is None and len(models) < len(systems):
+        seen = np.concatenate([one.hertz for one in systems.values() if hasattr(one, "hertz")])
+        hertz = hertz[(hertz >= seen[seen > 0].min() / 2) & (hertz <= 2 * seen.max())]
+    found = []
+    for k, (label, one) in enumerate(systems.items()):
+        if hasattr(one, "hertz"):
+            kept = (one.hertz > 0) & (one.hertz >= hertz.min()) & (one.hertz <= hertz.max())
+            found.append(Curves(label, one.hertz[kept], one.response[:, :, kept], points=True))
+        else:
+            half = np.inf if one.period is None else 0.5 / one.period
+            known = hertz if k == 0 and frequencies is not None else hertz[hertz <= half]
+            found.append(Curves(label, known, one.response(known)))
+    return found
+
+
+def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None) -> "Figure":
     """Gain in the units of the quantities and phase in degrees over frequency in Hz, a column for each input."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import MaxNLocator
@@ -79,49 +152,84 @@ def draw_bode(
     for i, output in enumerate(system.outputs):
         for j, name in enumerate(system.inputs):
             gain, phase = axes[2 * i, j], axes[2 * i + 1, j]
-            values = response[i, j]
-            gain.loglog(hertz, np.abs(values))
-            if not np.any(np.abs(values) > 0):
-                gain.set_yscale("linear")
+            for one in curves:
+                _draw_curve(gain, phase, one, one.response[i, j])
+            gain.set_xscale("log")
+            gain.set_yscale(
+                "log" if any(np.any(np.abs(one.response[i, j]) > 0) for one in curves) else "linear"
+            )
             gain.set_ylabel(f"gain [{_ratio(system.unit(output), system.unit(name))}]")
             gain.set_title(f"{output} over {name}", fontsize="medium")
-            phase.semilogx(hertz, _phase(values))
             phase.set_ylabel("phase [deg]")
             phase.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 3, 4.5, 9, 10]))
             for axis in (gain, phase):
                 axis.grid(alpha=0.3, which="both")
     for axis in axes[-1]:
         axis.set_xlabel("frequency [Hz]")
+    if len(curves) > 1:
+        axes[0, 0].legend(fontsize="small")
     figure.suptitle(system.title)
     return finished(figure, file)
 
 
-def draw_poles(system: Drawn, file: str | os.PathLike[str] | None) -> "Figure":
-    """Poles as crosses, zeros as circles; the edge of stability is the imaginary axis or the unit circle."""
+def _draw_curve(gain: "Axes", phase: "Axes", curve: Curves, values: np.ndarray) -> None:
+    """One response; points have no line, as neighbours scatter. Phases are in the turn of the first curve."""
+    line, marker = ("none", ".") if curve.points else ("-", "none")
+    gain.plot(curve.hertz, np.abs(values), linestyle=line, marker=marker, markersize=3, label=curve.label)
+    angles = _phase(values)
+    if phase.lines and np.any(np.isfinite(angles)):
+        x, first = (np.asarray(of, dtype=float) for of in phase.lines[0].get_data())
+        turns = np.round((angles - np.interp(curve.hertz, x, first)) / 360)  # of noise, each point by itself
+        angles = angles - 360 * (turns if curve.points else np.nanmedian(turns))
+    phase.semilogx(curve.hertz, angles, linestyle=line, marker=marker, markersize=3)
+
+
+def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None) -> "Figure":
+    """Poles as crosses, zeros as circles; the edge of stability is the imaginary axis or the unit circle.
+
+    Of several systems in the plane of z where they share a period, else in that of s, where those of z have no zeros:
+    s = log(z) / period holds for poles alone.
+    """
     import matplotlib.pyplot as plt
 
     if file is not None:
         check_suffix(file)
     figure, axis = plt.subplots(figsize=(6.0, 5.5), layout="constrained")
-    poles, zeros = system.poles, system.zeros
+    first, *others = systems.values()
+    period = first.period if all(other.period == first.period for other in others) else None
     axis.axhline(0.0, color="0.7", linewidth=0.8)
     axis.axvline(0.0, color="0.7", linewidth=0.8)
-    if system.period is not None:
+    if period is not None:
         angle = np.linspace(0.0, 2 * np.pi, 400)
         axis.plot(np.cos(angle), np.sin(angle), color="0.5", linewidth=0.8)
         axis.set_aspect("equal")
-    axis.plot(np.real(poles), np.imag(poles), "x", markersize=9, label=f"{len(poles)} poles")
-    axis.plot(
-        np.real(zeros), np.imag(zeros), "o", markersize=8, fillstyle="none", label=f"{len(zeros)} zeros"
-    )
-    if system.period is None:
-        _around(axis, np.concatenate([poles, zeros]))
-    unit = " [1/s]" if system.period is None else f" of z, {1 / system.period:g} Hz"
+    shown = []
+    for k, (label, system) in enumerate(systems.items()):
+        of = f" of {label}" if others else ""
+        for points, kind, marker in ((system.poles, "poles", "x"), (system.zeros, "zeros", "o")):
+            if period is None and system.period is not None:
+                points = in_s(points, system.period)[: len(points) if kind == "poles" else 0]
+                points = points[np.isfinite(points)]  # z = 0 is no point of s
+            if others and not points.size:
+                continue
+            axis.plot(
+                np.real(points),
+                np.imag(points),
+                marker,
+                color=f"C{k}" if others else None,
+                markersize=9 - 2 * k if k < 3 else 4,
+                fillstyle="none",
+                label=f"{len(points)} {kind}{of}",
+            )
+            shown.append(points)
+    if period is None:
+        _around(axis, np.concatenate(shown))
+    unit = " [1/s]" if period is None else f" of z, {1 / period:g} Hz"
     axis.set_xlabel(f"real part{unit}")
     axis.set_ylabel(f"imaginary part{unit}")
     axis.grid(alpha=0.3)
-    axis.legend()
-    axis.set_title(system.title)
+    axis.legend(fontsize="small" if others else None)
+    axis.set_title(first.title)
     return finished(figure, file)
 
 

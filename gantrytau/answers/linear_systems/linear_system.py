@@ -155,17 +155,34 @@ class LinearSystem:
             )
         return driven(self.A, self.B, self.C, self.D, times, values, start)
 
-    def plot_bode(self, frequencies: Any = None, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+    def plot_bode(
+        self,
+        frequencies: Any = None,
+        *,
+        beside: "Mapping[str, LinearSystem | bode_and_poles.Spectrum] | None" = None,
+        file: str | os.PathLike[str] | None = None,
+    ) -> "Figure":
         """Gain and phase over frequency in Hz, each output over each input; saved to `file` if one is named.
 
-        frequencies: (N,) in Hz, else around all poles and zeros.
+        frequencies: (N,) in Hz, else around all poles and zeros. beside: other systems of as many outputs and inputs by
+        their names, and spectra that were measured, which have `hertz` (N,) and a complex `response` (outputs, inputs, N).
+        ModelError for others of another shape.
         """
-        hertz = bode_and_poles.frequencies_to_draw(self) if frequencies is None else np.asarray(frequencies)
-        return bode_and_poles.draw_bode(self, hertz, self.response(hertz), file)
+        systems = bode_and_poles.beside_each_other(self, "plot_bode", beside, spectra=True)
+        return bode_and_poles.draw_bode(self, bode_and_poles.curves_of(systems, frequencies), file)
 
-    def plot_poles(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
-        """Poles (crosses) and zeros (circles) in the complex plane; saved to `file` if one is named."""
-        return bode_and_poles.draw_poles(self, file)
+    def plot_poles(
+        self,
+        *,
+        beside: "Mapping[str, LinearSystem] | None" = None,
+        file: str | os.PathLike[str] | None = None,
+    ) -> "Figure":
+        """Poles (crosses) and zeros (circles) in the complex plane; saved to `file` if one is named.
+
+        beside: other systems by their names; where periods differ, poles are drawn in the plane of s = log(z) / period.
+        """
+        systems = bode_and_poles.beside_each_other(self, "plot_poles", beside)
+        return bode_and_poles.draw_poles(systems, file)
 
     def unit(self, name: str) -> str:
         """The unit of a state, input or output; "" where none was declared."""

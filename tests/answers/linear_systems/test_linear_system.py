@@ -1,5 +1,7 @@
 """Linear systems against scipy.signal and the textbook."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import scipy.signal as signal
@@ -184,6 +186,44 @@ def test_bode_picture_shows_the_peak_of_a_hardly_damped_resonance():
     assert np.max(line.get_ydata()) == pytest.approx(1 / (2e-4 * 1e4), rel=1e-3)
 
 
+@dataclass
+class Points:
+    """A frequency response as it might have been measured."""
+
+    hertz: np.ndarray
+    response: np.ndarray
+
+
+def test_pictures_of_systems_beside_each_other_and_of_what_was_measured():
+    system, sampled = StateSpace(*OSCILLATOR), StateSpace(*OSCILLATOR).discrete(0.1)
+    hertz = np.linspace(0.1, 4.0, 30)
+    measured = Points(hertz, system.response(hertz))
+    gain, phase = system.plot_bode(beside={"sampled": sampled, "measured": measured}).axes[:2]
+    own, held, points = gain.lines
+    assert [line.get_label() for line in gain.lines] == ["StateSpace", "sampled", "measured"]
+    assert held.get_xdata().max() <= 5.0 < own.get_xdata().max()  # half of 10 Hz
+    assert points.get_linestyle() == "None"
+    assert np.allclose(points.get_ydata(), np.abs(measured.response[0, 0]))
+    turned = np.interp(hertz, phase.lines[0].get_xdata(), phase.lines[0].get_ydata())
+    assert np.allclose(phase.lines[2].get_ydata(), turned, atol=0.1)  # between the points of the grid
+    axis = system.plot_poles(beside={"sampled": sampled}).axes[0]
+    assert axis.get_xlabel() == "real part [1/s]"
+    crosses = [line for line in axis.lines if line.get_marker() == "x"]
+    assert np.allclose(crosses[0].get_xdata(), crosses[1].get_xdata())  # as both have the same poles
+    axis = sampled.plot_poles(beside={"other": StateSpace(0.5, 1, 1, period=0.1)}).axes[0]
+    assert axis.get_xlabel() == "real part of z, 10 Hz"
+
+
+def test_phases_of_measured_points_are_in_the_turn_of_the_line():
+    system = StateSpace(*OSCILLATOR)
+    hertz = np.linspace(2.0, 4.0, 20)
+    noise = np.where(np.arange(20) % 2, np.exp(1j), np.exp(-1j))  # about -180 degrees, to both sides
+    measured = Points(hertz, system.response(hertz) * noise)
+    line, points = system.plot_bode(beside={"measured": measured}).axes[1].lines
+    off = points.get_ydata() - np.interp(hertz, line.get_xdata(), line.get_ydata())
+    assert np.allclose(np.abs(off), np.degrees(1.0), atol=0.1)
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -229,6 +269,19 @@ def test_bode_picture_shows_the_peak_of_a_hardly_damped_resonance():
         (
             lambda: StateSpace(1, np.ones((1, 9)), np.ones((2, 1))).plot_bode(),
             "found 2 outputs and 9 inputs, expected 1",
+        ),
+        (
+            lambda: StateSpace(1, 1, 1).plot_bode(beside=[StateSpace(2, 1, 1)]),
+            "found beside=list, expected systems or measured spectra by their names",
+        ),
+        (lambda: StateSpace(1, 1, 1).plot_poles(beside={"b": 3}), "found b=int, expected systems"),
+        (
+            lambda: StateSpace(1, 1, 1).plot_bode(beside={"StateSpace": StateSpace(2, 1, 1)}),
+            "found the name 'StateSpace' twice",
+        ),
+        (
+            lambda: StateSpace(1, 1, 1).plot_bode(beside={"b": StateSpace(2, [[1.0, 2.0]], 1)}),
+            "found 1 outputs and 2 inputs of b, expected 1 and 1",
         ),
         (lambda: StateSpace(1, 1, 1).plot_poles(file="poles.xyz"), "with the suffix '.xyz'"),
     ],
