@@ -117,6 +117,16 @@ def test_noise_does_not_draw_the_pole_to_zero():
     assert np.all(np.abs(np.mean(output, axis=0)) < 0.001)
 
 
+def test_a_delay_is_found_where_the_grid_of_poles_would_have_another():
+    """10 kHz: half a time constant is 500 samples, and 10 of them of delay make up for a pole that is 1e-5 off."""
+    t = 1e-4 * np.arange(20_000)
+    u = np.where(t > 0.1, 1.0, 0.0)
+    y = np.where(t > 0.1 + 30e-4, 1 - 0.999 ** np.maximum(np.round((t - 0.1) / 1e-4) - 30, 0), 0.0)
+    servo = identify_servo(StepResponse(t, u, y + 1e-3 * np.random.default_rng(0).normal(size=t.shape)))
+    assert abs(servo.delay[0] - 30) <= 1
+    assert servo.pole[0] == pytest.approx(0.999, abs=3e-6)
+
+
 @pytest.mark.parametrize("factor", [1e-9, 1e9])
 def test_units_of_length_do_not_matter(factor, exact):
     scaled = [StepResponse(s.t, factor * s.reference, factor * s.position) for s in steps()]
@@ -197,6 +207,7 @@ def altered(change):
         ("not at rest", lambda: altered(lambda s: s.position + 1e-3 * np.minimum(s.t, 0.2)[:, None])),
         ("one size", lambda: steps(sizes=(0.001,) * 2)),
         ("delay", lambda: steps(delay=100)),
+        ("fast", lambda: steps(pole=0 * POLE, gain=np.ones(3))),
     ],
 )
 def test_what_is_doubtful_is_told(kind, measured):

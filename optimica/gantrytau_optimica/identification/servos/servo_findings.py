@@ -11,7 +11,7 @@ NOISY = 20.0  # deviations of noise that a step should have
 ALIKE = 0.01  # of its size, by which steps of one size may differ
 SURE = 3.0  # deviations, and
 CHANGED = 0.02  # of the lag, by which the lags of small and large steps differ for a reason
-CLEAR = 1.05  # times the squares of the best delay, that its neighbours leave
+FAST = 1e-6  # pole of what follows within a sample
 SETTLED = 3.0  # time constants, that a step should be followed for
 FOLLOWED = 90.0  # % of the motion, that the law should explain
 UNIT = 2.0  # to either side: servos bring actuators to their references
@@ -20,7 +20,11 @@ Told = Iterator[tuple[str, np.ndarray | None, str]]  # kind, some of the steps o
 
 
 def servo_findings(i: int, rows: Sequence[ServoRows], fit: ServoFit, period: float) -> tuple[Finding, ...]:
-    """Kinds "delay", "unit", "sign", "fit", "noise", "not settled", "not at rest", "one size", "friction", "saturation"."""
+    """What is doubtful about one actuator.
+
+    Kinds "delay", "fast", "unit", "sign", "fit", "noise", "not settled", "not at rest", "one size", "friction",
+    "saturation".
+    """
     steps = np.array([r.step for r in rows])
     told = [*_delay(fit), *_gain(fit), *_small(rows, fit, period), *_amplitudes(rows, period)]
     return tuple(
@@ -48,7 +52,11 @@ def _delay(fit: ServoFit) -> Told:
             None,
             f"the best delay is the longest looked at, {fit.latest} samples; log for longer, or take samples less often",
         )
-    others = [d for d, squares in fit.left.items() if d != fit.delay and squares <= CLEAR * fit.squares]
+    # the squares of two laws differ by SURE^2 variances of a residual without colour
+    clear = 1 + SURE**2 / _independent(fit.residuals)
+    others = [
+        d for d, squares in sorted(fit.left.items()) if d != fit.delay and squares <= clear * fit.squares
+    ]
     if others:
         near = ", ".join(map(str, others))
         yield (
@@ -59,6 +67,8 @@ def _delay(fit: ServoFit) -> Told:
 
 
 def _gain(fit: ServoFit) -> Told:
+    if fit.pole < FAST:
+        yield "fast", None, "its pole is at 0, faster than samples show; take samples more often"
     static = fit.gain / (1 - fit.pole)
     if static < 0:
         yield "sign", None, "it moves against its reference; change the sign of one of them"
@@ -147,6 +157,14 @@ def _lag(fit: ServoFit) -> tuple[float, float]:
     """Time in samples until 1 - 1/e of a step is done, d - 1 / log(a), and its deviation."""
     log = float(np.log(fit.pole))
     return fit.delay - 1 / log, float(np.sqrt(fit.covariance[0, 0])) / (fit.pole * log**2)
+
+
+def _independent(residuals: Sequence[np.ndarray]) -> float:
+    """Samples without colour that say as much as the residuals, by the correlation r of neighbours: N (1 - r) / (1 + r)."""
+    square = sum(float(left @ left) for left in residuals)
+    both = sum(float(left[1:] @ left[:-1]) for left in residuals)
+    r = float(np.clip(both / square, 0.0, 0.999)) if square else 0.0
+    return sum(len(left) for left in residuals) * (1 - r) / (1 + r)
 
 
 def _noise(y: np.ndarray) -> float:

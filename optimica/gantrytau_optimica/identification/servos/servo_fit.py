@@ -17,7 +17,7 @@ from gantrytau_optimica.identification.rigid.residual_covariance import BAND, Lo
 LATEST = 100  # samples of delay that are looked at
 POLES = 120  # on the grid
 SLOWEST = 1e4  # samples, the longest time constant on the grid
-NEAR = 2  # samples to either side of the best delay on the grid, that are looked at closely
+NEAR = 2  # samples to either side of the best delay, that are looked at closely
 STEPS = 50  # of Gauss and Newton
 DONE = 1e-13  # change of the pole
 
@@ -59,9 +59,13 @@ def fit_servo(rows: Sequence[ServoRows], period: float) -> ServoFit:
     grid = 1 - np.geomspace(1 / SLOWEST, 1.0, POLES)
     left = _on_grid(rows, grid, latest)
     best, pole = (int(k) for k in np.unravel_index(np.argmin(left), left.shape))
-    near = range(max(0, best - NEAR), min(latest, best + NEAR) + 1)
-    fits = {d: _refined(rows, d, grid[pole if d == best else int(np.argmin(left[d]))]) for d in near}
-    delay = min(fits, key=lambda d: fits[d][1])
+    fits: dict[int, tuple[np.ndarray, float]] = {}
+    delay, start = best, float(grid[pole])
+    while missing := [d for d in range(delay - NEAR, delay + NEAR + 1) if 0 <= d <= latest and d not in fits]:
+        # a pole between those of the grid may make another delay the best, so its neighbours are looked at in turn
+        fits |= {d: _refined(rows, d, start) for d in missing}
+        delay = min(fits, key=lambda d: fits[d][1])
+        start = float(fits[delay][0][0])
     p = fits[delay][0]
     residuals = tuple(_left(rows, p, delay))
     return ServoFit(

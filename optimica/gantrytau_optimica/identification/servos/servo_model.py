@@ -102,7 +102,7 @@ class ServoModel:
         return draw_steps(self.steps, [self.simulated(k) for k in range(len(self.steps))], self.rest, file)
 
     def __repr__(self) -> str:
-        lines = [f"<Servos of {len(self.pole)} actuators, every {self.period:g} s"]
+        lines = [f"<Servos of {len(self.pole)} actuator{'s' * (len(self.pole) > 1)}, every {self.period:g} s"]
         deviation = self.deviations
         for i, pole in enumerate(self.pole):
             lines.append(
