@@ -35,4 +35,5 @@ def stribeck_friction(speed: Any, smoothing: Any, coulomb: Any, static: Any, fal
 
 def dahl_rate(speed: Any, z: Any, stiffness: Any, coulomb: Any) -> Any:
     """The rate of the deflection z before sliding (Dahl 1968): speed - stiffness |speed| z / coulomb."""
+    # no event where the speed changes its sign: the rate only bends there, by as much as a step can bear
     return speed - stiffness * if_else(speed > 0, speed, -speed, smooth=True) * z / coulomb

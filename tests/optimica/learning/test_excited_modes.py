@@ -1,0 +1,48 @@
+"""From carts to the tool the robot is linear, whatever friction does to its carts: a run against the equations."""
+
+import numpy as np
+import pytest
+
+from gantrytau import linearize
+from gantrytau_models import FlexibleGantryTau
+from gantrytau_models.mechanisms.flexible import unstretched
+from gantrytau_optimica import Scatter
+from tests.optimica.learning.flexible_runs import (
+    PERIOD,
+    PLACE,
+    RECORD,
+    WRIST,
+    excited,
+    flexible_rig,
+    kinematic_motion,
+)
+
+LENGTH = 5 * (2**10 - 1)  # samples of a period of the sequences
+
+
+def from_carts_to_gauge(hertz: np.ndarray) -> np.ndarray:
+    """Response of the gauge to positions of the carts, (3, 3, F), of the robot without friction."""
+    robot = FlexibleGantryTau(RECORD, friction=None, plate_mass=WRIST)
+    carts = [f"carts[{k}].s" for k in range(3)]
+    at = dict(zip(carts, unstretched(RECORD, PLACE), strict=True))
+    H = linearize(robot, at=at, steady=True, outputs=[*carts, "gauge.r"]).response(hertz)
+    # forces cancel between the two, and so does any friction that acts between cart and guideway
+    return np.stack([H[3:, :, k] @ np.linalg.inv(H[:3, :, k]) for k in range(len(hertz))], axis=-1)
+
+
+def test_gauge_follows_the_carts_as_the_linear_equations_say():
+    run = excited(flexible_rig(noise=Scatter()))
+    carts = run["measured.q"]
+    assert np.std(carts - run["q_ref"], axis=0).min() > 2e-4  # m: friction and servos let them follow badly
+    # the last period repeats the one before, so that its spectra have lines only
+    lines = np.arange(1, int(30.0 * LENGTH * PERIOD))
+    Q, Y = (np.fft.rfft(x[-LENGTH:], axis=0)[lines] for x in (carts, run["measured.r"]))
+    predicted = np.einsum("ijk,kj->ki", from_carts_to_gauge(lines / (LENGTH * PERIOD)), Q)
+    left = np.linalg.norm(Y - predicted, axis=0) / np.linalg.norm(Y, axis=0)
+    assert left == pytest.approx(np.zeros(3), abs=0.03)  # where it begins has not died out, 1 mm is not small
+    held = np.linalg.norm(Y - kinematic_lines(run, lines), axis=0) / np.linalg.norm(Y, axis=0)
+    assert np.all(held > 0.5)  # and stiff arms explain little of it
+
+
+def kinematic_lines(run, lines) -> np.ndarray:
+    return np.fft.rfft(kinematic_motion(run)[-LENGTH:], axis=0)[lines]
