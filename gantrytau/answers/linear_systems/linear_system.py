@@ -122,7 +122,8 @@ class LinearSystem:
         if not np.all(np.abs(again - self.A) <= LOST * np.abs(self.A).max(initial=0.0)):
             raise ModelError(
                 f"{self.title}: found poles whose logarithm is lost to rounding (|z| from {np.abs(poles).min():.2g} to "
-                f"{np.abs(poles).max():.2g}), expected poles of similar size; reduce the order of the system"
+                f"{np.abs(poles).max():.2g}), expected poles and states "
+                "of similar size; scale states, or reduce the order of the system"
             )
         return _Plain(self, A, B, None)
 

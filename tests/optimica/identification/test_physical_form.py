@@ -193,6 +193,31 @@ def test_modes_that_do_not_swing():
     assert free.indefinite == ("D", "K")
 
 
+@pytest.mark.parametrize(
+    "true",
+    [
+        MechanicalForm(
+            np.eye(2), np.diag([0.1, 10.0]), np.array([[40.0, 10.0], [10.0, 4e7]])
+        ),  # 1 Hz and 1 kHz
+        MechanicalForm(np.diag([1e-3, 1e4]), np.diag([0.01, 10.0]), np.array([[40.0, 10.0], [10.0, 4e7]])),
+        MechanicalForm(np.eye(2), np.eye(2), np.diag([1e3, 1e3])),  # the same mode twice
+        MechanicalForm(np.eye(2), 2 * np.sqrt(1e3) * np.eye(2), np.diag([1e3, 1e3])),  # twice critical
+    ],
+    ids=["slow and fast", "light and heavy", "double", "critical"],
+)
+def test_coordinates_that_are_far_apart_or_alike(true):
+    form = physical_form(other_states(true.system.discrete(1e-4)))
+    assert max(*off(form, true), *off(form.direct, true)) < 1e-5
+    assert form.definite
+
+
+def test_a_body_that_is_held_by_nothing():
+    free = MechanicalForm(np.eye(2), np.eye(2), np.diag([0.0, 1e3]))
+    form = physical_form(other_states(free.system.discrete(0.01)))
+    assert max(off(form, free)) < 1e-6
+    assert form.direct.indefinite == ("K",)
+
+
 @pytest.mark.parametrize("damping", [0.0, 1.0, 2000.0])
 def test_one_coordinate_with_no_damping_and_with_much(damping):
     true = MechanicalForm(10.0, damping, 9e4)

@@ -20,7 +20,7 @@ LEAST = 20  # samples for each coordinate
 
 @dataclass(frozen=True, eq=False)
 class KnownResponse:
-    """The response G (N, n, n) of a continuous system at points s (N,), with weights (N,) by which its squares sum to one.
+    """The response G (N, n, n) of a continuous system at points s (N,), with weights (N, n, n).
 
     Over s = e + j w these squares are, by Parseval, those of impulse responses weighed by exp(-e t): an output error for a
     white input. e > 0 blunts resonances that have no damping. frequency: a typical w in 1/s.
@@ -43,12 +43,16 @@ class KnownResponse:
         )
         s = SHIFT * slow + 1j * w
         G = np.moveaxis(frequency_response(system.A, system.B, system.C, system.D, s), 2, 0)
-        weight = np.sqrt(np.gradient(w))
-        return cls(s, G, weight / np.linalg.norm(weight[:, None, None] * G), float(np.median(sizes)))
+        weight = np.sqrt(np.gradient(w))[:, None, None]
+        parts = np.linalg.norm(weight * G, axis=0)
+        # coordinates in units of their motion, so that stiff ones and angles count as much as others
+        units = (np.linalg.norm(parts, axis=0) * np.linalg.norm(parts, axis=1)) ** 0.25
+        weight = weight / np.outer(units, units)
+        return cls(s, G, weight / np.linalg.norm(weight * G), float(np.median(sizes)))
 
     def left(self, form: MechanicalForm) -> np.ndarray:
         """What a form leaves of the response, as real numbers."""
-        found = ((form.response(self.s) - self.G) * self.weight[:, None, None]).ravel()
+        found = ((form.response(self.s) - self.G) * self.weight).ravel()
         return np.concatenate([np.real(found), np.imag(found)])
 
 
@@ -85,7 +89,7 @@ class KnownMotion:
         return cls(u, y, system.period, frequency)
 
     def left(self, form: MechanicalForm) -> np.ndarray:
-        """What the best start and rest leave of the positions, in units of their motion about the mean."""
+        """What the best start and rest leave of the positions, each in units of its motion about the mean."""
         n, count = len(form.M), len(self.y)
         sampled = form.system.discrete(self.period)
         powers = _powers(sampled.A, np.hstack([sampled.B, np.eye(2 * n)]), sampled.C, count)
@@ -95,9 +99,10 @@ class KnownMotion:
         free = np.concatenate([powers[:, :, n:], np.tile(np.eye(n), (count, 1, 1))], axis=2).reshape(
             count * n, -1
         )
+        sizes = np.sqrt(n) * np.linalg.norm(self.y - self.y.mean(axis=0), axis=0)
+        free, left = free / np.tile(sizes, count)[:, None], (left / sizes).ravel()
         free = free / np.maximum(np.linalg.norm(free, axis=0), np.finfo(float).tiny)
-        rest = left.ravel() - free @ np.linalg.lstsq(free, left.ravel(), rcond=None)[0]
-        return rest / np.linalg.norm(self.y - self.y.mean(axis=0))
+        return left - free @ np.linalg.lstsq(free, left, rcond=None)[0]
 
 
 def _powers(A: np.ndarray, B: np.ndarray, C: np.ndarray, count: int) -> np.ndarray:

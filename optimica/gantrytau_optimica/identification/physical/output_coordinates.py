@@ -10,6 +10,7 @@ from gantrytau_optimica.identification.physical.mechanical_form import Mechanica
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 POSITION = 0.5  # |C B| w / |C A B| at the fastest mode; 0 for positions, 1 / (2 zeta) for speeds
+GROWS = 1e-6  # of the largest pole, beyond the edge of stability: double poles on it are off by 1e-8
 SEEN = 1e-10  # of the largest, singular values of [C; C A] in equal units below which a mode is not seen
 
 
@@ -32,7 +33,7 @@ def continuous_of(system: LinearSystem) -> LinearSystem:
         )
     poles = system.poles
     edge = np.real(poles).max() if system.period is None else np.abs(poles).max() - 1
-    if edge > 1e-9 * np.abs(poles).max():
+    if edge > GROWS * np.abs(poles).max():
         worst = poles[np.argmax(np.real(poles) if system.period is None else np.abs(poles))]
         raise IdentificationError(
             f"{name}: found the unstable pole {'s' if system.period is None else 'z'} = {worst:.6g}, expected a structure "

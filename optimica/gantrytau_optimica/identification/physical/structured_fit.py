@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
+from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm, is_definite
 
-LEAST = 1e-3  # of the largest eigenvalue, that starts are raised to
+LEAST = 1e-9  # of the largest eigenvalue, that starts are raised to
 STEPS = 100  # of the fit
 DONE = 1e-13  # change of squares and of unknowns
 
@@ -73,7 +73,10 @@ class Unknowns:
 
 
 def _root(x: np.ndarray) -> np.ndarray:
-    """Lower triangle S of S S', nearest to a matrix, with eigenvalues above a small part of the largest."""
-    values, vectors = np.linalg.eigh((x + x.T) / 2)
-    values = np.maximum(values, LEAST * np.abs(values).max())
-    return np.linalg.cholesky(vectors @ np.diag(values) @ vectors.T)
+    """Lower triangle S of S S', the symmetric part of a matrix, with eigenvalues of the other sign turned."""
+    whole = (x + x.T) / 2
+    if not is_definite(whole):
+        values, vectors = np.linalg.eigh(whole)
+        size = np.abs(values)
+        whole = vectors @ np.diag(np.maximum(size, LEAST * size.max())) @ vectors.T
+    return np.linalg.cholesky(whole)

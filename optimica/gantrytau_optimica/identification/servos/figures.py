@@ -34,7 +34,7 @@ def draw_steps(
         layout="constrained",
     )
     for i, (motion, left) in enumerate(axes):
-        took = np.flatnonzero(np.isfinite(rest[:, i]))
+        took = np.flatnonzero(np.isfinite(rest[:, i])).tolist()
         for number, k in enumerate(took):
             step, law = steps[k], simulated[k][:, i] - rest[k, i]
             t, colour, first = step.t - step.t[0], f"C{number % 10}", number == 0
