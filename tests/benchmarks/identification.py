@@ -1,4 +1,4 @@
-"""Masses of the three-link robot from 10,250 rows, beside scipy with differences on the same inverse dynamics."""
+"""Masses of the three-link robot from 10,250 rows, beside scipy with differences; servos, and what they move."""
 
 import time
 from collections.abc import Iterator
@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 
 from gantrytau import translate
 from gantrytau_models import GantryTau, prototypes
+from gantrytau_optimica import identify_servo, physical_form
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
     RobotDynamics,
     candidates,
@@ -16,8 +17,26 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
     frictions,
     model_name,
 )
-from tests.benchmarks.table import Row, at_least
+from tests.benchmarks.table import Row, at_least, at_most
 from tests.optimica.identification import gantry_logs as logs
+from tests.optimica.identification import test_identify_servo as servos
+from tests.optimica.identification import test_physical_form as structures
+
+
+def servo_and_structure() -> Iterator[Row]:
+    """Processor time of three servos from nine steps, and of mass, damping and stiffness from 4000 samples."""
+    steps = 3 * servos.steps(servos.NOISE)
+    u, y = structures.measured(structures.TRUE, 1, 5e-5)
+    box = structures.black_box(u, y)
+    begin = time.process_time()
+    servo = identify_servo(steps)
+    middle = time.process_time()
+    form = physical_form(box, measured=(u, y))
+    end = time.process_time()
+    assert np.allclose(servo.pole, servos.POLE, rtol=0, atol=1e-4)
+    assert max(structures.off(form)) < 0.01
+    yield at_most("three servos from nine steps of 400 samples", middle - begin, 2.0, "s")
+    yield at_most("mass, damping and stiffness from 4000 samples", end - middle, 2.0, "s")
 
 
 def rows() -> Iterator[Row]:
@@ -45,3 +64,4 @@ def rows() -> Iterator[Row]:
     end = time.process_time()
     assert np.allclose(found.x, p, rtol=1e-3, atol=1e-3)  # the same masses, as closely as differences go
     yield at_least("masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0)
+    yield from servo_and_structure()

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from gantrytau import ModelError
-from gantrytau.answers.linear_systems.state_space import StateSpace
+from gantrytau import ModelError, StateSpace, linearize
+from gantrytau_models import prototypes
 from gantrytau_optimica import IdentificationError, MechanicalForm, physical_form
+from tests.models.mechanisms.test_impulses import at_rest
 
 PERIOD = 0.004  # s
 MASS = 10.5 * np.eye(2)  # kg, a plate without wrist
@@ -135,6 +136,23 @@ def test_a_mode_that_is_not_modelled_is_told():
     form = physical_form(black_box(u, y), measured=(u, y))
     assert "fit" in kinds(form)
     assert form.fit < 85
+
+
+def test_modes_of_a_robot_under_its_servos_are_those_of_its_linearization():
+    """Two routes: forces at the plate with positions of 1 um noise, and exact derivatives of the model's equations."""
+    model, starts = at_rest()
+    linear = linearize(model, at=starts, inputs=["f"], outputs=["robot.tool.r"])
+    sampled = linear.discrete(PERIOD)
+    rng = np.random.default_rng(0)
+    u = 50.0 * np.repeat(rng.choice([-1.0, 1.0], (2000, 3)), 3, axis=0)
+    y = sampled.simulate(u) + 1e-6 * rng.normal(size=u.shape)
+    form = physical_form(black_box(u, y, order=6, taps=200), measured=(u, y))
+    exact = linear.eigenfrequencies[(linear.eigenfrequencies > 5) & (linear.eigenfrequencies < 20)][::2]
+    assert form.modes.frequencies == pytest.approx(exact, rel=2e-3)  # frame 7.4, arms 10.0 and 12.0 Hz
+    assert form.definite
+    assert form.fit > 98
+    # seen from the plate, the frame is a part of the mass along x
+    assert form.M[0, 0] > 10 * prototypes.L1_flexible.plate_mass
 
 
 def test_what_is_not_definite_is_never_hidden():
