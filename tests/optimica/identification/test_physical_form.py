@@ -131,6 +131,14 @@ def swaying(share):
     )
 
 
+def test_noise_is_no_mode():
+    u, y = measured(TRUE, 1, 2e-4)
+    form = physical_form(black_box(u, y), measured=(u, y))
+    assert form.fit < 88
+    assert "fit" not in kinds(form)
+    assert max(off(form)) < 0.06
+
+
 def test_a_mode_that_is_not_modelled_is_told():
     u, y = measured(swaying(1e5), 1, 1e-6)
     form = physical_form(black_box(u, y), measured=(u, y))

@@ -9,7 +9,7 @@ from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
 
 APART = 0.2  # of M and of K by norm, by which two routes may differ
-FITTED = 90.0  # % of the response, that M, D and K should explain
+MISSED = 0.1  # of the response by norm, that M, D and K may leave
 SKEW = 0.1  # |X - X'| / |X + X'| of M and K
 ALIASED = 0.8  # of half of the sampling frequency, above which a mode may be that of another
 WORDS = {"M": "mass", "D": "damping", "K": "stiffness"}
@@ -17,13 +17,17 @@ NONE = np.zeros(0, dtype=int)
 
 
 def form_findings(
-    form: MechanicalForm, direct: MechanicalForm, fit: float, system: LinearSystem, continuous: LinearSystem
+    form: MechanicalForm,
+    direct: MechanicalForm,
+    missed: float,
+    system: LinearSystem,
+    continuous: LinearSystem,
 ) -> tuple[Finding, ...]:
     """Kinds "indefinite", "not symmetric", "disagreement", "fit", "aliased"."""
     told = (
         *_indefinite(form, direct),
         *_apart(form, direct),
-        *_unexplained(fit),
+        *_unexplained(missed),
         *_aliased(system, continuous),
     )
     return tuple(Finding(kind, NONE, words) for kind, words in told)
@@ -67,12 +71,12 @@ def _apart(form: MechanicalForm, direct: MechanicalForm) -> Iterator[tuple[str, 
         )
 
 
-def _unexplained(fit: float) -> Iterator[tuple[str, str]]:
-    if fit < FITTED:
+def _unexplained(missed: float) -> Iterator[tuple[str, str]]:
+    if missed > MISSED:
         yield (
             "fit",
-            f"M, D and K explain {max(fit, 0.0):.1f} % only, expected {FITTED:.0f} % at least: it has more modes, "
-            "inputs are no forces along the outputs, or noise is large; give a position for each mode",
+            f"M, D and K leave {missed:.0%} of the motion, besides noise, expected {MISSED:.0%} at most: more modes, or "
+            "inputs are no forces along the outputs; give a position for each mode",
         )
 
 

@@ -55,6 +55,10 @@ class KnownResponse:
         found = ((form.response(self.s) - self.G) * self.weight).ravel()
         return np.concatenate([np.real(found), np.imag(found)])
 
+    def missed(self, form: MechanicalForm) -> float:
+        """Share of the response, by norm, that a form does not explain."""
+        return float(np.linalg.norm(self.left(form)))
+
 
 @dataclass(frozen=True, eq=False)
 class KnownMotion:
@@ -103,6 +107,16 @@ class KnownMotion:
         free, left = free / np.tile(sizes, count)[:, None], (left / sizes).ravel()
         free = free / np.maximum(np.linalg.norm(free, axis=0), np.finfo(float).tiny)
         return left - free @ np.linalg.lstsq(free, left, rcond=None)[0]
+
+    def missed(self, form: MechanicalForm) -> float:
+        """Share of the motion, by norm, that a form does not explain and that is no white noise.
+
+        Second differences of white noise have six times its variance; those of modes far below half of the sampling
+        frequency have next to none.
+        """
+        left = np.reshape(self.left(form), self.y.shape)
+        white = np.sum(np.diff(left, 2, axis=0) ** 2) / 6 * len(left) / (len(left) - 2)
+        return float(np.sqrt(max(np.sum(left**2) - white, 0.0)))
 
 
 def _powers(A: np.ndarray, B: np.ndarray, C: np.ndarray, count: int) -> np.ndarray:

@@ -59,5 +59,5 @@ def physical_form(
         known = KnownMotion.of(measured, system, known.frequency)
     form = structured_form(known, direct) if structured else direct
     fit = explained(known, form)
-    findings = form_findings(form, direct, fit, system, continuous)
+    findings = form_findings(form, direct, known.missed(form), system, continuous)
     return PhysicalForm(form.M, form.D, form.K, direct, fit, findings)
