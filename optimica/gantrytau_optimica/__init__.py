@@ -56,6 +56,8 @@ from gantrytau_optimica.identification.servos.identify_servo import identify_ser
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
+from gantrytau_optimica.identification.spectra.resonances import resonances
+from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
 from gantrytau_optimica.learning.rig import Rig
 from gantrytau_optimica.learning.scatter import Scatter
 from gantrytau_optimica.optimize import optimize, prepare
@@ -108,6 +110,7 @@ __all__ = [
     "Friction",
     "Identification",
     "IdentificationError",
+    "IdentifiedSystem",
     "LaserTracker",
     "LengthGauge",
     "MeasuredPlan",
@@ -157,6 +160,7 @@ __all__ = [
     "identify",
     "identify_friction",
     "identify_servo",
+    "identify_system",
     "in_lines",
     "initial",
     "integral_of_squares",
@@ -184,6 +188,7 @@ __all__ = [
     "read_arms",
     "read_cell",
     "report_numbers",
+    "resonances",
     "run_record",
     "save_optimum",
     "select_poses",

@@ -1,15 +1,18 @@
 """Masses of the three-link robot from 10,250 rows, beside scipy with differences; servos, and what they move."""
 
 import time
+import warnings
 from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
+import pandas
+from nfoursid.nfoursid import NFourSID
 from scipy.optimize import least_squares
 
 from gantrytau import translate
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import identify_servo, physical_form
+from gantrytau_optimica import identify_servo, identify_system, physical_form
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
     RobotDynamics,
     candidates,
@@ -20,6 +23,7 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 from tests.benchmarks.table import Row, at_least, at_most
 from tests.optimica.identification import gantry_logs as logs
 from tests.optimica.identification import test_identify_servo as servos
+from tests.optimica.identification import test_identify_system as systems
 from tests.optimica.identification import test_physical_form as structures
 
 
@@ -37,6 +41,27 @@ def servo_and_structure() -> Iterator[Row]:
     assert max(structures.off(form)) < 0.01
     yield at_most("three servos from nine steps of 400 samples", middle - begin, 2.0, "s")
     yield at_most("mass, damping and stiffness from 4000 samples", end - middle, 2.0, "s")
+
+
+def subspaces() -> Iterator[Row]:
+    """Processor time of a model of order 8 from 1500 samples, of nfoursid's, and of one of order 10 from 6000."""
+    count, hankel = 1500, 12
+    u, y = systems.INPUTS, systems.noisy(0.05)
+    frame = pandas.DataFrame(np.hstack([u, y])[:count], columns=["u0", "u1", "u2", "y0", "y1"])
+    begin = time.process_time()
+    identify_system(u[:count], y[:count], order=8, period=systems.PERIOD, block_rows=hankel)
+    middle = time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        other = NFourSID(frame, ["y0", "y1"], ["u0", "u1", "u2"], num_block_rows=hankel)
+        other.subspace_identification()
+        other.system_identification(rank=8)
+    end = time.process_time()
+    found = identify_system(u, y, order=10, period=systems.PERIOD)
+    last = time.process_time()
+    assert np.all(found.fit(u, systems.OUTPUTS) > 95)
+    yield at_least("linear model of order 8, nfoursid takes", (end - middle) / (middle - begin), 5.0)
+    yield at_most("linear model of order 10 from 6000 samples", last - end, 1.0, "s")
 
 
 def rows() -> Iterator[Row]:
@@ -65,3 +90,4 @@ def rows() -> Iterator[Row]:
     assert np.allclose(found.x, p, rtol=1e-3, atol=1e-3)  # the same masses, as closely as differences go
     yield at_least("masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0)
     yield from servo_and_structure()
+    yield from subspaces()

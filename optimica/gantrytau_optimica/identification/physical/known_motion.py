@@ -10,6 +10,7 @@ from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.responses import frequency_response
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
+from gantrytau_optimica.identification.systems.linear_fit import followed
 
 SHIFT = 0.02  # e, of the slowest eigenfrequency
 POINTS = 400
@@ -94,8 +95,51 @@ class KnownMotion:
 
     def left(self, form: MechanicalForm) -> np.ndarray:
         """What the best start and rest leave of the positions, each in units of its motion about the mean."""
-        n, count = len(form.M), len(self.y)
         sampled = form.system.discrete(self.period)
+        rest = self.y - followed((sampled.A, sampled.B, sampled.C, sampled.D), self.u, self.y)
+        return (rest / np.linalg.norm(self.y - self.y.mean(axis=0), axis=0)).ravel() / np.sqrt(len(form.M))
+
+    def missed(self, form: MechanicalForm) -> float:
+        """Share of the response, by norm, that a form does not explain."""
+        return float(np.linalg.norm(self.left(form)))
+
+
+@dataclass(frozen=True, eq=False)
+class KnownMotion:
+    """Positions y (N, n) measured every period in s while forces u (N, n) were held in between.
+
+    Where the motion began and what positions are at rest is estimated with each form, as it is linear. frequency: a
+    typical one in 1/s.
+    """
+
+    u: np.ndarray
+    y: np.ndarray
+    period: float
+    frequency: float
+
+    @classmethod
+    def of(cls, measured: Any, system: LinearSystem, frequency: float) -> Self:
+        """Checked (u, y) that belong to a sampled system; ModelError for others."""
+        name = f"physical_form of {system.title}"
+        if system.period is None:
+            raise ModelError(
+                f"{name}: found measured= for a continuous system, expected one with the period of the samples; give "
+                f"system.discrete(period)",
+                argument="measured",
+            )
+        if not isinstance(measured, tuple) or len(measured) != 2:
+            raise ModelError(
+                f"{name}: found measured={type(measured).__name__}, expected (u, y), forces and positions, (N, n) each",
+                argument="measured",
+            )
+        n = len(system.C)
+        u, y = sampled_motion(name, *measured, least=LEAST * n, columns=n)
+        return cls(u, y, system.period, frequency)
+
+    def left(self, form: MechanicalForm) -> np.ndarray:
+        """What the best start and rest leave of the positions, each in units of its motion about the mean."""
+        sampled = form.system.discrete(self.period)
+<<<<<<< HEAD
         powers = _powers(sampled.A, np.hstack([sampled.B, np.eye(2 * n)]), sampled.C, count)
         forced = np.zeros((count, n))
         forced[1:] = _convolved(powers[: count - 1, :, :n], self.u[: count - 1])
@@ -117,19 +161,3 @@ class KnownMotion:
         left = np.reshape(self.left(form), self.y.shape)
         white = np.sum(np.diff(left, 2, axis=0) ** 2) / 6 * len(left) / (len(left) - 2)
         return float(np.sqrt(max(np.sum(left**2) - white, 0.0)))
-
-
-def _powers(A: np.ndarray, B: np.ndarray, C: np.ndarray, count: int) -> np.ndarray:
-    """C A^k B for k = 0 to count - 1, (count, outputs, inputs), by doubling."""
-    found, power = B[None], A
-    while len(found) < count:
-        found = np.concatenate([found, power @ found])
-        power = power @ power
-    return C @ found[:count]
-
-
-def _convolved(h: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Sum over j of h[j] u[k - j], (N, outputs), for h (N, outputs, inputs) and u (N, inputs)."""
-    length = 2 ** int(np.ceil(np.log2(2 * len(u))))
-    product = np.fft.rfft(h, length, axis=0) @ np.fft.rfft(u, length, axis=0)[:, :, None]
-    return np.fft.irfft(product[:, :, 0], length, axis=0)[: len(u)]

@@ -1,0 +1,1 @@
+"""Linear models without physics, from measured inputs and outputs."""
