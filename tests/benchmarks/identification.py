@@ -60,7 +60,7 @@ def subspaces() -> Iterator[Row]:
     found = identify_system(u, y, order=10, period=systems.PERIOD)
     last = time.process_time()
     assert np.all(found.fit(u, systems.OUTPUTS) > 95)
-    yield at_least("linear model of order 8, nfoursid takes", (end - middle) / (middle - begin), 5.0)
+    yield at_least("linear model of order 8, nfoursid takes", (end - middle) / (middle - begin), 3.0)
     yield at_most("linear model of order 10 from 6000 samples", last - end, 1.0, "s")
 
 

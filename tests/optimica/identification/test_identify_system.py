@@ -107,7 +107,7 @@ def test_beside_nfoursid():
     [
         (INPUTS, OUTPUTS[:100], {}, "found 6000 samples of u and 100 of y"),
         (INPUTS[:200], OUTPUTS[:200], {}, "found 200 samples of 3 inputs and 2 outputs, expected 299 at least"),
-        (INPUTS, OUTPUTS, dict(order=60), "order=60 with 2 outputs and block_rows=25, expected 48 at most; take block_rows=31"),
+        (INPUTS, OUTPUTS, dict(order=60), "order=60 with 2 outputs and block_rows=25, expected 48 at most; take .*=31"),
         (INPUTS, OUTPUTS, dict(order=0), "found order=0"),
         (INPUTS, OUTPUTS, dict(block_rows=1), "found block_rows=1"),
         (INPUTS, OUTPUTS, dict(period=0.0), "period"),

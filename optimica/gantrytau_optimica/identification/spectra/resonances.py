@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import find_peaks
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import check_period
@@ -22,6 +21,8 @@ def resonances(
     Hz are one; start later to see what is damped least. Empty where nothing rings. Dressler (2012), Table 6.4.
     Raises ModelError for what is too short or not finite, and for a band without frequencies.
     """
+    from scipy.signal import find_peaks
+
     check_period("resonances", period)
     y = np.asarray(y, dtype=float)
     columns = y[:, None] if y.ndim == 1 else y
