@@ -100,59 +100,6 @@ class KnownMotion:
         return (rest / np.linalg.norm(self.y - self.y.mean(axis=0), axis=0)).ravel() / np.sqrt(len(form.M))
 
     def missed(self, form: MechanicalForm) -> float:
-        """Share of the response, by norm, that a form does not explain."""
-        return float(np.linalg.norm(self.left(form)))
-
-
-@dataclass(frozen=True, eq=False)
-class KnownMotion:
-    """Positions y (N, n) measured every period in s while forces u (N, n) were held in between.
-
-    Where the motion began and what positions are at rest is estimated with each form, as it is linear. frequency: a
-    typical one in 1/s.
-    """
-
-    u: np.ndarray
-    y: np.ndarray
-    period: float
-    frequency: float
-
-    @classmethod
-    def of(cls, measured: Any, system: LinearSystem, frequency: float) -> Self:
-        """Checked (u, y) that belong to a sampled system; ModelError for others."""
-        name = f"physical_form of {system.title}"
-        if system.period is None:
-            raise ModelError(
-                f"{name}: found measured= for a continuous system, expected one with the period of the samples; give "
-                f"system.discrete(period)",
-                argument="measured",
-            )
-        if not isinstance(measured, tuple) or len(measured) != 2:
-            raise ModelError(
-                f"{name}: found measured={type(measured).__name__}, expected (u, y), forces and positions, (N, n) each",
-                argument="measured",
-            )
-        n = len(system.C)
-        u, y = sampled_motion(name, *measured, least=LEAST * n, columns=n)
-        return cls(u, y, system.period, frequency)
-
-    def left(self, form: MechanicalForm) -> np.ndarray:
-        """What the best start and rest leave of the positions, each in units of its motion about the mean."""
-        sampled = form.system.discrete(self.period)
-<<<<<<< HEAD
-        powers = _powers(sampled.A, np.hstack([sampled.B, np.eye(2 * n)]), sampled.C, count)
-        forced = np.zeros((count, n))
-        forced[1:] = _convolved(powers[: count - 1, :, :n], self.u[: count - 1])
-        left = self.y - forced
-        free = np.concatenate([powers[:, :, n:], np.tile(np.eye(n), (count, 1, 1))], axis=2).reshape(
-            count * n, -1
-        )
-        sizes = np.sqrt(n) * np.linalg.norm(self.y - self.y.mean(axis=0), axis=0)
-        free, left = free / np.tile(sizes, count)[:, None], (left / sizes).ravel()
-        free = free / np.maximum(np.linalg.norm(free, axis=0), np.finfo(float).tiny)
-        return left - free @ np.linalg.lstsq(free, left, rcond=None)[0]
-
-    def missed(self, form: MechanicalForm) -> float:
         """Share of the motion, by norm, that a form does not explain and that is no white noise.
 
         Second differences of white noise have six times its variance; those of modes far below half of the sampling
