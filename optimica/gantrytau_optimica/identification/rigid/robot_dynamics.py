@@ -18,7 +18,7 @@ from gantrytau import GantryTauError, ModelError
 from gantrytau.dae import Dae
 from gantrytau.errors import did_you_mean
 
-BLOCK = 1024  # rows of one call
+BLOCK = 1024  # rows of one call, as many as caches hold
 PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records
 PLATE = ("plate_mass", "tool.m", "platform.m")  # what a robot calls its plate
 LAWS = re.compile(r"\.(f_c|f_v|f_s)(\[\d\])?$")  # as all laws of friction name their parameters
@@ -81,34 +81,40 @@ class RobotDynamics:
         x, p = kind.sym("x", 3 * len(q)), kind.sym("p", len(wanted))
         y = ca.vertcat(*whole.call([*ca.vertsplit(x), *ca.vertsplit(p), *map(kind, self.values.values())]))
         slopes = ca.densify(ca.jacobian(y, p))
-        return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True}).map(BLOCK)
+        return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True})
 
     def slopes(self, motion: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slopes (N, n, k) and forces (N, n) of rows (N, 3 n) of q, q', q''; NaN where the model has no answer."""
         n, k, rows = len(self.coordinates), len(self.names), len(motion)
-        A, y = np.empty((rows, n, k)), np.empty((rows, n))
-        values = np.tile(np.asarray(p, dtype=float)[:, None], (1, BLOCK))
+        A, y = np.empty((rows, k, n)), np.empty((rows, n))
+        x = np.ascontiguousarray(motion, dtype=float)
+        values = np.tile(np.asarray(p, dtype=float), (min(rows, BLOCK), 1))
         for begin in range(0, rows, BLOCK):
-            part = motion[begin : begin + BLOCK]
-            full = np.concatenate([part, np.repeat(part[-1:], BLOCK - len(part), axis=0)])
-            a, f = self._function(full.T, values)
-            A[begin : begin + BLOCK] = np.asarray(a).reshape(n, BLOCK, k).transpose(1, 0, 2)[: len(part)]
-            y[begin : begin + BLOCK] = np.asarray(f).T[: len(part)]
-        return A, y
+            block = slice(begin, min(begin + BLOCK, rows))
+            # rows as columns, read and written where they stand
+            buffer, evaluate = self._function.map(block.stop - begin).buffer()
+            for i, given in enumerate((x[block], values)):
+                buffer.set_arg(i, memoryview(given).cast("B").cast("d"))
+            for i, found in enumerate((A[block], y[block])):
+                buffer.set_res(i, memoryview(found))
+            evaluate()
+        return A.transpose(0, 2, 1), y
 
     def not_linear(self, motion: np.ndarray) -> tuple[str, ...]:
         """Parameters along which slopes change, at these rows: forces are not linear in them."""
         begin = self.nominal
         first, _ = self.slopes(motion, begin)
         sizes = np.nanmax(np.abs(first), axis=(0, 1), initial=0.0)
-        found = []
-        for j, name in enumerate(self.names):
-            p = begin.copy()
-            p[j] = 1.5 * p[j] + 0.5  # away from zero, where a product would hide
+        away = 1.5 * begin + 0.5  # from zero, where a product would hide
+
+        def bends(p: np.ndarray) -> bool:
             changed = np.nanmax(np.abs(self.slopes(motion, p)[0] - first), axis=(0, 1), initial=0.0)
-            if np.any(changed > LINEAR * np.maximum(sizes, 1e-3 * np.max(sizes, initial=0.0))):
-                found.append(name)
-        return tuple(found)
+            return bool(np.any(changed > LINEAR * np.maximum(sizes, 1e-3 * np.max(sizes, initial=0.0))))
+
+        if not bends(away):
+            return ()
+        single = np.where(np.eye(len(begin), dtype=bool), away, begin)
+        return tuple(name for name, p in zip(self.names, single, strict=True) if bends(p))
 
 
 def model_name(dae: Dae, name: str) -> str:
