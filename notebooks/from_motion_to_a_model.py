@@ -23,15 +23,22 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from gantrytau import Input, simulate, translate
+from gantrytau import Input, linearize, prbs, simulate, translate
+from gantrytau.kinematics import Kinematics
 from gantrytau.mechanics.filters import LowPass
-from gantrytau_models import GantryTau, prototypes
+from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_optimica import (
     MotionLog,
+    Rig,
+    Scatter,
+    StepResponse,
     compare,
     design_excitation,
     identify,
     identify_friction,
+    identify_servo,
+    identify_system,
+    measured_response,
     printed_models,
 )
 
@@ -247,3 +254,67 @@ figure.legend(loc="outside upper right", ncols=3)
 plt.show()
 print({title: f"{off.std():.1f} N" for title, off in left.items()})
 assert left["as identified"].std() < 1.05 * NOISE["force"] < 0.2 * left["as drawn"].std()
+
+# %% [markdown]
+# ## Servos
+#
+# Now the robot as it gives way: a frame that sways on its feet, arms like springs, and carts that rest in friction under
+# servos that sample every 4 ms. `Rig` runs references on it and reads sensors, with noise and friction drawn by a seed.
+# First steps of each cart, of three sizes, and the law q_m = q^-d b / (1 - a q^-1) q_r of the thesis (6.11).
+
+# %%
+SOFT = prototypes.L1_flexible
+rig = Rig(
+    FlexibleGantryTau(SOFT, friction=PreslidingFriction), cart_servos(SOFT), period=PERIOD, noise=Scatter()
+)
+home = Kinematics(GantryTau(SOFT)).ik([[0.9, 2.7, -0.7]])[0]
+steps = []
+for seed in range(9):
+    reference = np.tile(home, (300, 1))
+    reference[25:, seed % 3] += (0.001, 0.0015, 0.002)[seed // 3]  # m
+    run = rig.run(reference, seed=seed)
+    steps.append(StepResponse(run.time, run["q_ref"], run["measured.q"]))
+servos = identify_servo(steps)
+print(servos)
+servos.plot()
+assert set(servos.delay) <= {5, 6}
+assert np.abs(servos.pole - [0.9647, 0.9656, 0.9728]).max() < 0.002  # as printed
+
+# %% [markdown]
+# ## Resonances
+#
+# Steps of the carts shake the plate, and most of what it does its drives do not see: kinematics of the measured carts say
+# where stiff arms would hold it. Random binary references excite everything at once; what is between that place and the
+# gauges at the wrist is a linear model, found by subspaces.
+
+# %%
+count = 6000
+clock = PERIOD * np.arange(count)
+shakes = [prbs(10, 0.02, 1e-3, seed=5 + 341 * i).values(clock).ravel() for i in ARMS]
+shaken = rig.run(home + np.column_stack(shakes), seed=7)
+stiff, _ = Kinematics(GantryTau(SOFT)).fk(shaken["measured.q"])
+wrist = shaken["measured.r"]
+half = slice(0, count // 2), slice(count // 2, count)
+black_box = identify_system(stiff[half[0]], wrist[half[0]], order=10, period=PERIOD)
+print("Hz:", black_box.eigenfrequencies.round(2), "damping:", black_box.damping.round(3))
+print("explains", black_box.fit(stiff[half[1]], wrist[half[1]]).round(1), "% of the other half")
+black_box.plot_singular_values()
+assert np.all(black_box.fit(stiff[half[1]], wrist[half[1]]) > 90)
+assert black_box.singular_values[7] > 1.5 * black_box.singular_values[8]
+
+# %% [markdown]
+# Beside it stands what was measured, without a model, and what the equations of the component model say: modes in which
+# forces move everything but the carts are zeros of the way from forces to carts.
+
+# %%
+soft = FlexibleGantryTau(SOFT, friction=None)
+carts = [f"carts[{i}].s" for i in ARMS]
+equations = linearize(soft, at=dict(zip(carts, home, strict=True)), steady=True, outputs=carts)
+modes = np.unique((np.abs(equations.zeros) / (2 * np.pi)).round(6))
+print("carts held, by the equations:", modes.round(2), "Hz")
+for hertz in modes[modes < 20]:
+    assert np.abs(black_box.eigenfrequencies - hertz).min() < 0.1  # Hz
+black_box.plot_bode(
+    np.geomspace(2.0, 60.0, 300),
+    beside={"measured": measured_response(stiff, wrist, period=PERIOD, blocks=8)},
+)

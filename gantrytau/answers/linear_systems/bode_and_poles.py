@@ -130,7 +130,7 @@ def curves_of(systems: Mapping[str, Any], frequencies: Any) -> list["Curves"]:
 def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None) -> "Figure":
     """Gain in the units of the quantities and phase in degrees over frequency in Hz, a column for each input."""
     import matplotlib.pyplot as plt
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     if file is not None:
         check_suffix(file)
@@ -164,8 +164,13 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
             phase.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 3, 4.5, 9, 10]))
             for axis in (gain, phase):
                 axis.grid(alpha=0.3, which="both")
+    ends = axes[0, 0].get_xlim()
     for axis in axes[-1]:
         axis.set_xlabel("frequency [Hz]")
+        if ends[1] < 500 * ends[0]:  # few powers of ten: 2 and 5 between them, in plain numbers
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.xaxis.set_minor_formatter(NullFormatter())
     if len(curves) > 1:
         axes[0, 0].legend(fontsize="small")
     figure.suptitle(system.title)

@@ -6,7 +6,7 @@ import pytest
 from gantrytau import linearize
 from gantrytau_models import FlexibleGantryTau
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_optimica import Scatter
+from gantrytau_optimica import Scatter, identify_system
 from tests.optimica.learning.flexible_runs import (
     PERIOD,
     PLACE,
@@ -46,3 +46,31 @@ def test_gauge_follows_the_carts_as_the_linear_equations_say():
 
 def kinematic_lines(run, lines) -> np.ndarray:
     return np.fft.rfft(kinematic_motion(run)[-LENGTH:], axis=0)[lines]
+
+
+def test_identified_resonances_are_the_printed_ones():
+    """Table 6.4 and (6.13): 7.4, 10.5 and 11.5 Hz from a black box of order 10, and what it says of other data."""
+    run = excited(flexible_rig(noise=Scatter()))
+    z, y = kinematic_motion(run), run["measured.r"]
+    first, second = slice(0, 3000), slice(3000, None)
+    found = identify_system(z[first], y[first], order=10, period=PERIOD)
+    for printed in (7.4, 10.5, 11.5):
+        assert np.abs(found.eigenfrequencies - printed).min() < 0.3
+    assert np.all(found.fit(z[second], y[second]) > 95)
+    assert found.singular_values[7] > 1.5 * found.singular_values[8]  # four modes, and what is between
+    # without the third input a part of the motion has no cause
+    blind = identify_system(z[first, :2], y[first, :2], order=10, period=PERIOD)
+    assert np.all(blind.fit(z[second, :2], y[second, :2]) < found.fit(z[second], y[second])[:2])
+
+
+def test_servos_hide_the_pair_of_modes():
+    """(6.12), order 7: from references poles of the servos come first, and one pair near 10 Hz is left."""
+    run = excited(flexible_rig(noise=Scatter()))
+    r, y = run["q_ref"], run["measured.r"]
+    found = identify_system(r[:3000], y[:3000], order=7, period=PERIOD)
+    swings = found.poles[np.imag(found.poles) > 0]
+    hertz = np.abs(np.log(swings)) / (2 * np.pi * PERIOD)
+    assert np.sum((hertz > 9.0) & (hertz < 11.5)) == 1
+    assert not np.any(np.abs(hertz - 7.4) < 0.5)
+    real = found.poles[np.imag(found.poles) == 0].real
+    assert np.any((real > 0.94) & (real < 0.99))
