@@ -14,7 +14,7 @@ from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, re
 from gantrytau.mechanics.friction_laws import dahl_rate
 from gantrytau.mechanics.translational import Friction
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_models.prototypes import FlexiblePrototype
+from gantrytau_models.prototypes import Prototype
 
 POLES = (0.9647, 0.9656, 0.9728)  # of (6.11), from sample to sample
 
@@ -88,7 +88,7 @@ class PreslidingFriction(Friction):
 
 
 def cart_servos(
-    prototype: FlexiblePrototype,
+    prototype: Prototype,
     *,
     r: ArrayLike = (0.9, 2.7, -0.7),
     poles: Sequence[float] = POLES,
@@ -112,7 +112,7 @@ def cart_servos(
     ]
 
 
-def moved_masses(prototype: FlexiblePrototype, r: np.ndarray) -> np.ndarray:
+def moved_masses(prototype: Prototype, r: np.ndarray) -> np.ndarray:
     """Masses that the actuators move one by one, (3,) in kg: each cart and its share of the tool at r (3,) in m."""
     positions = unstretched(prototype, r)
     rows, carts = [], []

@@ -14,7 +14,7 @@ from gantrytau.errors import ModelError
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
 from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction
 from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, WrongRecord, driven_carts, in_words
-from gantrytau_models.prototypes import FlexiblePrototype
+from gantrytau_models.prototypes import FlexiblePrototype, Prototype
 
 
 class ElasticRod(TwoFrames):
@@ -183,7 +183,7 @@ class FlexibleGantryTau(Model):
         yield self.accelerometer.a == der(self.tool.v)
 
 
-def unstretched(prototype: FlexiblePrototype, r: np.ndarray) -> np.ndarray:
+def unstretched(prototype: Prototype, r: np.ndarray) -> np.ndarray:
     """Carts behind the tool at r (3,) in m with links as long as without force, (3,) in m.
 
     Raises ModelError for a tool that a link does not reach.

@@ -15,6 +15,8 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
     Raises ModelError for controllers that are not one for each joint, with the ports q_ref, v_ref, q, v, f_ff and f.
     """
     n = len(joints)
+    if not isinstance(controllers, Sequence):
+        raise ModelError(f"Rig: found controllers={controllers!r}, expected a list, one for each joint")
     if len(controllers) != n:
         raise ModelError(
             f"Rig: found {len(controllers)} controllers, expected one for each joint: {', '.join(joints)}"

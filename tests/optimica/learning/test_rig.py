@@ -11,6 +11,7 @@ from gantrytau_models import (
     CartServo,
     F1GantryTau,
     FlexibleGantryTau,
+    GantryTau,
     PreslidingFriction,
     cart_servos,
     prototypes,
@@ -75,6 +76,15 @@ def test_steps_without_friction_have_the_poles_of_the_servos(start):
     assert prompt.delay == pytest.approx(np.full(3, 1), abs=0)
 
 
+def test_a_rigid_robot_follows_steps_alike(start):
+    stiff = GantryTau(RECORD, friction=None, tool=dict(r=dict(start=[0.9, 2.7, -0.7])))
+    rigid = Rig(stiff, cart_servos(RECORD), period=0.004)
+    model = identify_servo(steps(rigid, start, seed=0)[:3])
+    assert model.pole == pytest.approx(POLES, abs=3e-4)
+    assert model.delay == pytest.approx(np.full(3, 4), abs=0)
+    assert repr(rigid) == "<Rig: GantryTau under 3 servos, every 0.004 s>"
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_steps_with_friction_come_later_and_keep_their_poles(rubbed, start, seed):
     model = identify_servo(steps(rubbed, start, seed))
@@ -131,6 +141,8 @@ def test_wrong_rigs_are_told(start):
         Rig(robot, servos, period=0)
     with wrong("Rig: found noise=1e-06, expected a Scatter, or None for none"):
         Rig(robot, servos, period=0.004, noise=1e-6)  # pyright: ignore[reportArgumentType]
+    with wrong("Rig: found controllers=None, expected a list, one for each joint"):
+        Rig(robot, None, period=0.004)  # pyright: ignore[reportArgumentType]
     with wrong("Rig: found 2 controllers, expected one for each joint: carts[0].s, carts[1].s, carts[2].s"):
         Rig(robot, servos[:2], period=0.004)
     with wrong(
@@ -163,6 +175,11 @@ def test_wrong_references_are_told(rubbed, start):
         rubbed.run(start)
     with wrong("Rig.run: found velocity of shape (9, 3), expected that of position, (10, 3)"):
         rubbed.run(reference, reference[:9])
+    with wrong("Rig.run: found position='here', expected numbers in rows of 3"):
+        rubbed.run("here")
+    for seed in (-1, 1.5, None, True):
+        with wrong(f"Rig.run: found seed={seed!r}, expected a whole number, 0 and more"):
+            rubbed.run(reference, seed=seed)
     reference[4, 1] = np.nan
     with wrong("Rig.run: row 4 of position is not finite, expected numbers"):
         rubbed.run(reference)
