@@ -17,11 +17,11 @@ INPUTS = np.column_stack([prbs(10, 0.02, 1e-3, seed=k + 5).values(T).ravel() for
 
 def plant(hertz=HERTZ, damping=DAMPING):
     """Modes that three inputs drive and two outputs see."""
-    random = np.random.default_rng(1)
+    random, order = np.random.default_rng(1), 2 * len(hertz)
     w = 2 * np.pi * np.array(hertz)
     A = block_diag(*[[[0, 1], [-(x**2), -2 * d * x]] for x, d in zip(w, damping, strict=True)])
-    B = random.standard_normal((len(A), 3)) * np.tile([0, 1], len(w))[:, None]
-    C = random.standard_normal((2, len(A))) * np.tile([1, 0], len(w)) * np.repeat(w, 2)
+    B = random.standard_normal((order, 3)) * np.tile([0, 1], len(w))[:, None]
+    C = random.standard_normal((2, order)) * np.tile([1, 0], len(w)) * np.repeat(w, 2)
     return StateSpace(A, B, C, 0).discrete(PERIOD)
 
 

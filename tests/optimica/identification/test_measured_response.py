@@ -1,5 +1,7 @@
 """Frequency responses of measured motion, beside those of the systems that moved."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -53,10 +55,9 @@ def test_one_of_each_and_an_input_without_power():
 def test_it_stands_beside_the_system():
     found = measured_response(*motion(2, count=8000), period=PERIOD)
     gain = SYSTEM.plot_bode(beside={"measured": found}).axes[0]
-    points = gain.lines[1]
-    near = np.interp(points.get_xdata(), gain.lines[0].get_xdata(), gain.lines[0].get_ydata())
-    low = points.get_xdata() < 10
-    assert np.allclose(points.get_ydata()[low], near[low], rtol=0.3)
+    (x, line), (hertz, points) = (np.asarray(one.get_data(), dtype=float) for one in gain.lines[:2])
+    low = hertz < 10
+    assert np.allclose(points[low], np.interp(hertz, x, line)[low], rtol=0.3)
 
 
 X = np.random.default_rng(0).normal(size=(400, 2))
@@ -79,7 +80,7 @@ X = np.random.default_rng(0).normal(size=(400, 2))
             "found blocks=1, expected a whole number from 2 on",
         ),
         (lambda: measured_response(X, X, period=0.1, blocks=3), "blocks=3 for 2 inputs, expected 4 at least"),
-        (lambda: measured_response(X, X, period=0.1, blocks=2.5), "found blocks=2.5"),
+        (lambda: measured_response(X, X, period=0.1, blocks=cast(int, 2.5)), "found blocks=2.5"),
         (lambda: measured_response(0 * X, X, period=0.1), r"found that u\[0\] never changes"),
         (lambda: measured_response(np.log(X.clip(0)), X, period=0.1), "u that is not finite in row"),
         (lambda: measured_response("u", X, period=0.1), "found u that is no array of numbers"),

@@ -72,5 +72,5 @@ def test_servos_hide_the_pair_of_modes():
     hertz = np.abs(np.log(swings)) / (2 * np.pi * PERIOD)
     assert np.sum((hertz > 9.0) & (hertz < 11.5)) == 1
     assert not np.any(np.abs(hertz - 7.4) < 0.5)
-    real = found.poles[np.imag(found.poles) == 0].real
+    real = np.real(found.poles[np.imag(found.poles) == 0])
     assert np.any((real > 0.94) & (real < 0.99))

@@ -94,9 +94,9 @@ class RobotDynamics:
             # rows as columns, read and written where they stand
             buffer, evaluate = self._function.map(block.stop - begin).buffer()
             for i, given in enumerate((x[block], values)):
-                buffer.set_arg(i, memoryview(given).cast("B").cast("d"))
+                buffer.set_arg(i, given.data.cast("B").cast("d"))
             for i, found in enumerate((A[block], y[block])):
-                buffer.set_res(i, memoryview(found))
+                buffer.set_res(i, found.data)
             evaluate()
         return A.transpose(0, 2, 1), y
 

@@ -11,7 +11,6 @@ Gamma = [C; C A; ...] then gives C, and A by its shift. Van Overschee and De Moo
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr
 
 EMPTY = 1e-9  # of the largest singular value, below which data have no more directions
 
@@ -43,7 +42,7 @@ def shared_space(u: np.ndarray, y: np.ndarray, rows: int) -> SharedSpace:
     # constants of u and y are projected out with the future inputs
     stacked = np.hstack([np.ones((len(parts[0]), 1)), *parts])
     # L' of the transposed matrix, whose rows are instants
-    L = qr(stacked, mode="r")[0][: stacked.shape[1]].T
+    L = np.asarray(np.linalg.qr(stacked, mode="r")).T
     future, past = 1 + m * rows, 1 + (2 * m + p) * rows
     sizes = np.linalg.svd(L[1 : 1 + 2 * m * rows, 1 : 1 + 2 * m * rows], compute_uv=False)
     L32, L33 = L[past:, future:past], L[past:, past:]
