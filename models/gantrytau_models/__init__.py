@@ -9,6 +9,7 @@ from gantrytau_models.control.plant import MeasuredGantryTau, MotorDrivenGantryT
 from gantrytau_models.control.references import CircularReference
 from gantrytau_models.control.servos import CartServo, PreslidingFriction, cart_servos
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
+from gantrytau_models.mechanisms.bushed_links import BushedSixLinkGantryTau
 from gantrytau_models.mechanisms.delta import DeltaRobot
 from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
 from gantrytau_models.mechanisms.f1 import F1GantryTau
@@ -21,6 +22,7 @@ from gantrytau_models.mechanisms.stewart import StewartPlatform
 from gantrytau_models.mechanisms.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist
 
 __all__ = [
+    "BushedSixLinkGantryTau",
     "CartServo",
     "CascadedController",
     "CircularReference",
