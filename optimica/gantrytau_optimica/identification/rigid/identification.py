@@ -26,7 +26,7 @@ class Identification:
     rows of the logs, (n,) in N2; condition: of the normed columns; weak: parameters that the motion hardly tells from
     others, or that are less than twice their deviation; active: those at a limit; base: what is determined in place of
     parameters that no motion of this kind tells apart; nonlinear: those in which forces are not linear; model_values:
-    by names of the model, as `--set` has them;
+    what was found and what was fixed by names of the model, as `--set` has them;
     stribeck_speed: m/s, of friction "stribeck"; held_out: rms of what a fit of the first half leaves of the second, N.
     """
 

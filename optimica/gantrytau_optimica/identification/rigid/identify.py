@@ -16,6 +16,7 @@ from gantrytau_optimica.identification.rigid.chosen_parameters import (
     fixed_values,
     is_friction,
 )
+from gantrytau_optimica.identification.rigid.doubts import contradictions, delay_findings
 from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, half_against_half, usable_parts
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
@@ -89,8 +90,19 @@ def identify(
     found, rows = minimum(problem, least, nonlinear)
     judged, held_findings = _judged(rows, problem, least) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
-    noticed = (*findings, *fit_findings(problem.names, found, answer.weak), *held_findings)
-    return replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
+    doubts = [*delay_findings(rows, found), *(contradictions(problem, found, rows, given) if given else [])]
+    kinds = {f.kind for f in findings}
+    noticed = (
+        *findings,
+        *fit_findings(problem.names, found, answer.weak),
+        *held_findings,
+        *(f for f in doubts if f.kind not in kinds),
+    )
+    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    values = held | dict(answer.model_values)
+    return replace(
+        answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed, model_values=values
+    )
 
 
 def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str, ...]) -> RigidRegression:
@@ -152,7 +164,8 @@ def _identified(
             if place
             for short, word in (("f_c", "coulomb"), ("f_v", "viscous"))
         }
-        values |= {model: parameters[name] for model, name in laws.items() if name in parameters}
+        numbers = {n: v for n, v in friction.known.items() if isinstance(v, float)} | parameters
+        values |= {model: numbers[name] for model, name in laws.items() if name in numbers}
     return Identification(
         robot_name=problem.dynamics.dae.name,
         parameters=parameters,
