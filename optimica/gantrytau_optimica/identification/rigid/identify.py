@@ -90,19 +90,12 @@ def identify(
     found, rows = minimum(problem, least, nonlinear)
     judged, held_findings = _judged(rows, problem, least) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
+    findings += [*fit_findings(problem.names, found, answer.weak), *held_findings]
     doubts = [*delay_findings(rows, found), *(contradictions(problem, found, rows, given) if given else [])]
-    kinds = {f.kind for f in findings}
-    noticed = (
-        *findings,
-        *fit_findings(problem.names, found, answer.weak),
-        *held_findings,
-        *(f for f in doubts if f.kind not in kinds),
-    )
+    noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
-    values = held | dict(answer.model_values)
-    return replace(
-        answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed, model_values=values
-    )
+    answer = replace(answer, fixed=given, model_values=held | dict(answer.model_values))
+    return replace(answer, nonlinear=nonlinear, held_out=judged, findings=noticed)
 
 
 def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str, ...]) -> RigidRegression:
