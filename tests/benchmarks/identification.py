@@ -1,8 +1,12 @@
 """Masses of the three-link robot from 10,250 rows, beside scipy with differences; servos, and what they move."""
 
+import subprocess
+import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -64,6 +68,38 @@ def subspaces() -> Iterator[Row]:
     yield at_most("linear model of order 10 from 6000 samples", last - end, 1.0, "s")
 
 
+READING = """
+import resource, sys, time
+from gantrytau_optimica import MotionLog
+begin = time.process_time()
+log = MotionLog.read(sys.argv[1])
+print(time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, len(log))
+"""
+
+
+def log_files() -> Iterator[Row]:
+    """Processor time and memory (GB) of reading a million rows of three actuators, in a process of its own."""
+    count = 1_000_000
+    t = 0.004 * np.arange(count)
+    wave = np.sin(np.outer(t, [1.0, 1.1, 1.2]))
+    columns = ["t", *(f"q{k + 1} [mm]" for k in range(3)), *(f"f{k + 1}" for k in range(3))]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        table = pandas.DataFrame(np.column_stack([t, 1e3 * wave, 100 * wave]), columns=columns)
+        table.to_csv(path, index=False, float_format="%.6f")
+        told = subprocess.run(
+            [sys.executable, "-c", READING, str(path)], capture_output=True, text=True, check=True
+        )
+        begin = time.process_time()
+        np.loadtxt(path, delimiter=",", skiprows=1)
+        other = time.process_time() - begin
+    seconds, memory, found = map(float, told.stdout.split())
+    assert found == count
+    yield at_most("a million rows of a log are read", seconds, 5.0, "s")
+    yield at_most("of numpy.loadtxt, which knows no header", seconds / other, 1.5)
+    yield at_most("memory of that", memory, 2.0, "GB")
+
+
 def rows() -> Iterator[Row]:
     """Processor time of one regression, and of scipy's differences from ones to the same masses."""
     dae = translate(GantryTau(prototypes.L1))
@@ -91,3 +127,4 @@ def rows() -> Iterator[Row]:
     yield at_least("masses by regression, scipy's differences take", (end - middle) / (middle - begin), 15.0)
     yield from servo_and_structure()
     yield from subspaces()
+    yield from log_files()
