@@ -8,8 +8,10 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.dae import Dae
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters
 from gantrytau_optimica.identification.rigid.friction_columns import SIDES, Law, words
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
+    bodies_of,
     candidates,
     expanded,
     frictions,
@@ -55,14 +57,39 @@ def asked_parameters(
     if parameters is None:
         return tuple(n for n in candidates(dae) if n not in given)
     known = dict.fromkeys((*candidates(dae), *(public_name(dae, n) for n in dae.adjustable)))
+    bodies = {body.path: body for body in bodies_of(dae)}
     wanted = [parameters] if isinstance(parameters, str) else list(parameters)
-    found = expanded([n for n in wanted if not is_friction(n)], tuple(known))
+    found: tuple[str, ...] = ()
+    for name in (n for n in wanted if not is_friction(n)):
+        if name in bodies:
+            _check_body(dae, bodies[name], wanted, given)
+            found += tuple(n for n in bodies[name].names if n not in given)
+        else:
+            found += expanded(name, (*known, *bodies))
+    found = tuple(dict.fromkeys(found))
     both = [n for n in found if n in given]
     if both:
         raise ModelError(
             f"identify: {', '.join(both)} stand in parameters= and in fixed=; leave them out of one"
         )
     return found
+
+
+def _check_body(dae: Dae, body: BodyParameters, wanted: Sequence[str], given: Mapping[str, Any]) -> None:
+    """ModelError where the ten parameters of a body would be set from elsewhere too, or have no mass to begin with."""
+    own = [*body.elements[1:], f"{body.path}.r_cm", f"{body.path}.J"]
+    twice = [n for n in own if n in wanted or n in given]
+    if twice:
+        raise ModelError(
+            f"identify: {', '.join(twice)} and the body {body.path} stand together, whose ten parameters are identified; "
+            "leave out one. Only its mass can be fixed"
+        )
+    mass = given.get(body.mass, dae.parameter_values[body.elements[0]])
+    if not mass > 0:
+        raise ModelError(
+            f"identify: the body {body.path} has a mass of {mass:g} kg, expected more than 0 to begin with; "
+            f"give {body.elements[0]} a value"
+        )
 
 
 def fixed_values(dae: Dae, fixed: Mapping[str, Any], n: int, friction: Law | None) -> dict[str, Any]:

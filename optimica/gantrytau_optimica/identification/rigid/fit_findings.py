@@ -66,18 +66,30 @@ def fit_findings(names: Sequence[str], found: LimitedFit, weak: Sequence[str]) -
     findings = []
     silent = found.base.silent(names)
     if silent:
-        words = f"no force of this motion depends on {', '.join(silent)}, which stay as they are in the robot; move them"
+        words = (
+            f"no force of this motion depends on {', '.join(silent)}, which stay as in the robot, "
+            "or as close as a body can; move them"
+        )
         findings.append(Finding("silent", np.arange(0), words))
     together = found.base.words(names)
     if together:
         words = f"only {'; '.join(together)} are determined, not the parts; what follows the first keeps its nominal value"
         findings.append(Finding("base parameters", np.arange(0), words))
-    if weak:
+    hardly = [n for n in weak if n not in silent]
+    if hardly:
         words = (
-            f"the motion hardly tells {', '.join(weak)} from others, or from zero: small errors of the model move them far; "
-            "excite them more, or fix them"
+            f"the motion hardly tells {', '.join(hardly)} from others, or from zero: small errors of the model move them "
+            "far; excite them more, or fix them"
         )
         findings.append(Finding("weak", np.arange(0), words))
+    for path in found.tight:
+        of_body = ", ".join(n for n in weak if n.startswith(f"{path}."))
+        words = (
+            f"least squares alone give {path} inertial parameters that no body has; those of the nearest that has a density "
+            f"leave {found.cost:.6g} times the sum of squares. "
+            f"The motion hardly tells {of_body or 'them'}: turn it further and faster"
+        )
+        findings.append(Finding("no such body", np.arange(0), words))
     carts = [k for k, n in enumerate(names) if n.startswith("cart_masses[")]
     if carts and all(found.p[k] < 0 or found.active[k] for k in carts):
         words = "no cart has a mass above zero: forces have the opposite sign, or another unit; give them along q, in N"

@@ -24,8 +24,9 @@ class Identification:
     parameters: masses in kg, `coulomb[i]` in N, `viscous[i]` in kg/s, by public name; residuals: what is left of the
     filtered forces in the rows that count, (N, n) in N, NaN elsewhere; squares: their sums for each joint, as of all
     rows of the logs, (n,) in N2; condition: of the normed columns; weak: parameters that the motion hardly tells from
-    others, or that are less than twice their deviation; active: those at a limit; base: what is determined in place of
-    parameters that no motion of this kind tells apart; nonlinear: those in which forces are not linear; model_values:
+    others, or that are less than twice their deviation; active: those at a limit, where deviations are zero; those of
+    bodies are without the condition that they have a density; base: what is determined in place of parameters that no
+    motion of this kind tells apart; nonlinear: those in which forces are not linear; model_values:
     what was found and what was fixed by names of the model, as `--set` has them;
     stribeck_speed: m/s, of friction "stribeck"; held_out: rms of what a fit of the first half leaves of the second, N.
     """
@@ -69,7 +70,7 @@ class Identification:
                 f"robot: {self.robot_name} was identified from what translate made of it, expected the model; give that to "
                 "identify, or use .model_values"
             )
-        return with_numbers(self.nominal, self.model_values)
+        return with_numbers(self.nominal, {n.replace(",", "]["): x for n, x in self.model_values.items()})
 
     def prototype(self, record: Any) -> Any:
         """A record such as `prototypes.L1` with the identified numbers; what was not identified stays as it is."""

@@ -21,7 +21,7 @@ from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, h
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
-from gantrytau_optimica.identification.rigid.regression import LimitedFit, fit
+from gantrytau_optimica.identification.rigid.regression import LimitedFit, ParameterLimits, fit
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
@@ -55,11 +55,13 @@ def identify(
     with `s` or `phi` beside them;
     log: one or several, q and f in the order of these inputs. parameters: names or families, `plate_mass`,
     `cart_masses`, `link_masses[0]` or the model's own, by default all masses and inertias that move the forces.
-    fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0 leaves links out.
-    friction: the law that is identified in place of the model's; None keeps the model's. physical: no mass and no
-    friction below the limits that the model declares. cutoff: Hz, of the zero-phase filter of both sides; minimum_speed:
-    m/s or rad/s, below which a joint's rows do not count. holdout: the part that judges a fit of the rest; the
-    parameters are of all. Gautier (1991); Dressler (2012), section 6.1.
+    The name of a body, `tool`, stands for its ten: mass, `tool.moment[i]` in kg.m, `tool.inertia[i,j]` in kg.m2 about the
+    origin of its frame. fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0
+    leaves links out. friction: the law that is identified in place of the model's; None keeps the model's. physical: no
+    mass and no friction below the limits that the model declares, no body without a density (pseudo-inertia).
+    cutoff: Hz, of the zero-phase filter of both sides; minimum_speed: m/s or rad/s, below which a joint's rows do not
+    count. holdout: the part that judges a fit of the rest; the parameters are of all. Gautier (1991); Dressler (2012),
+    section 6.1.
 
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """
@@ -84,11 +86,11 @@ def identify(
     if nonlinear:
         words = f"forces are not linear in {', '.join(nonlinear)}; found by Gauss-Newton from the robot's own values"
         findings.append(Finding("not linear", np.arange(0), words))
-    least = problem.least if physical else np.full(len(problem.names), -np.inf)
+    limits = problem.limits if physical else ParameterLimits(np.full(len(problem.names), -np.inf))
     if friction == "stribeck":
-        problem = _with_fall(problem, least, nonlinear)
-    found, rows = minimum(problem, least, nonlinear)
-    judged, held_findings = _judged(rows, problem, least) if holdout else (np.nan, [])
+        problem = _with_fall(problem, limits, nonlinear)
+    found, rows = minimum(problem, limits, nonlinear)
+    judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
     findings += [*fit_findings(problem.names, found, answer.weak), *held_findings]
     doubts = [*delay_findings(rows, found), *(contradictions(problem, found, rows, given) if given else [])]
@@ -98,7 +100,9 @@ def identify(
     return replace(answer, nonlinear=nonlinear, held_out=judged, findings=noticed)
 
 
-def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str, ...]) -> RigidRegression:
+def _with_fall(
+    problem: RigidRegression, limits: ParameterLimits, nonlinear: tuple[str, ...]
+) -> RigidRegression:
     """The regression with the Stribeck speed that leaves the least; everything else is minimised at each."""
     from scipy.optimize import minimize_scalar
 
@@ -107,7 +111,7 @@ def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str
         return replace(problem, friction=replace(problem.friction, fall=float(np.exp(logarithm))))
 
     def left(logarithm: float) -> float:
-        found, rows = minimum(at(logarithm), least, nonlinear)
+        found, rows = minimum(at(logarithm), limits, nonlinear)
         return factors_of(rows).squares(found.p)
 
     # several minima are possible: the best of a coarse row of speeds is where to look
@@ -118,13 +122,15 @@ def _with_fall(problem: RigidRegression, least: np.ndarray, nonlinear: tuple[str
     return at(float(found.x))
 
 
-def _judged(rows: list[LogRows], problem: RigidRegression, least: np.ndarray) -> tuple[float, list[Finding]]:
+def _judged(
+    rows: list[LogRows], problem: RigidRegression, limits: ParameterLimits
+) -> tuple[float, list[Finding]]:
     """What a fit of the first half of each log leaves of the second."""
     halves = [[r.part(s) for r in rows for s in (half(len(r.b)),)] for half in (_first, _second)]
     if not all(any(np.any(r.moving) for r in half) for half in halves):
         return np.nan, []
     first, second = map(factors_of, halves)
-    return half_against_half((first, second), fit(first, problem.nominal, least).p)
+    return half_against_half((first, second), fit(first, problem.nominal, limits).p)
 
 
 def _first(count: int) -> slice:
@@ -147,7 +153,7 @@ def _identified(
     told = (found.inflation <= INFLATED) & (2 * deviations <= np.abs(p))
     left = [np.where(r.moving, r.left(p), np.nan) for r in rows]
     own = problem.dynamics.names
-    values = {model_name(problem.dynamics.dae, n): float(x) for n, x in zip(own, p, strict=False)}
+    values = {n: float(x) for n, x in problem.dynamics.in_model(p[: len(own)].tolist()).items()}
     parameters = dict(zip(names, p.tolist(), strict=True))
     friction = problem.friction
     if friction and friction.law == "symmetric":

@@ -10,6 +10,11 @@ from scipy.linalg import qr
 
 from gantrytau_optimica.identification.rigid.base_parameters import BaseParameters, base_parameters
 
+ROUNDING = 1e-9  # of a normed matrix, below zero
+AT_LIMIT = 1e-6  # of the forces, which a parameter at its limit may explain
+GAP = 1e-8  # of the sum of squares, which a minimum within conditions may leave too much
+FALL, STEPS = 10.0, 50  # of the weight of the barrier; Newton steps for each
+
 
 @dataclass(frozen=True, eq=False)
 class Factors:
@@ -39,10 +44,52 @@ class Factors:
 
 
 @dataclass(frozen=True, eq=False)
+class Condition:
+    """A matrix C (n, n) that must have no negative eigenvalue, constant + sum_j slopes[j] p[places[j]], by name."""
+
+    name: str
+    constant: np.ndarray
+    places: np.ndarray
+    slopes: np.ndarray
+
+    def at(self, p: np.ndarray) -> np.ndarray:
+        """The matrix at parameters p."""
+        return self.constant + np.tensordot(p[self.places], self.slopes, 1)
+
+    def interior(self, p: np.ndarray) -> np.ndarray:
+        """Values at these places by which the matrix is positive definite, as close to p as it takes."""
+        second = np.zeros(self.constant.shape)
+        second[range(len(second) - 1), range(len(second) - 1)] = (
+            1.0  # a body that is larger in all directions
+        )
+        away = np.linalg.lstsq(self.slopes.reshape(len(self.places), -1).T, second.ravel(), rcond=None)[0]
+        begin, share = self.at(p), 1e-6 * max(np.trace(self.at(p) * second), 0.01 * self.at(p)[-1, -1])
+        while np.linalg.eigvalsh(begin + share * second)[0] <= 1e-3 * share:
+            share *= 10
+        return p[self.places] + share * away
+
+    def eigenvalues(self, p: np.ndarray) -> np.ndarray:
+        """Of the matrix whose diagonal is normed, (n,)."""
+        C = self.at(p)
+        size = np.sqrt(np.abs(np.diag(C)))
+        size = np.maximum(size, 1e-9 * np.max(size))  # a thin plate has none across
+        return np.linalg.eigvalsh(C / np.outer(size, size))
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterLimits:
+    """What parameters can be: least (k,), -inf for none, and conditions on several together."""
+
+    least: np.ndarray
+    conditions: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class LimitedFit:
     """Parameters p (k,), of those that are not determined the nominal value.
 
-    active: at a limit; inflation: deviation of each over that if it were alone (inf where not determined);
+    active: at a limit; tight: of bodies that least squares alone make impossible, by path; cost: sum of squares over that
+    without their condition; inflation: deviation of each over that if it were alone (inf where not determined);
     condition: of the normed columns that are determined.
     """
 
@@ -51,27 +98,36 @@ class LimitedFit:
     active: np.ndarray
     inflation: np.ndarray
     condition: float
+    tight: tuple[str, ...] = ()
+    cost: float = 1.0
 
 
-def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> LimitedFit:
-    """Least squares with lower limits, -inf for none."""
+def fit(factors: Factors, nominal: np.ndarray, limits: ParameterLimits) -> LimitedFit:
+    """Least squares within limits."""
     from scipy.optimize import lsq_linear
 
     base = base_parameters(factors.R)
-    free, held = base.independent, base.dependent
+    free, held, least = base.independent, base.dependent, limits.least
     p = np.array(nominal, dtype=float)
     p[held] = np.maximum(p[held], least[held])
     norms = np.linalg.norm(factors.R[:, free], axis=0)
     normed, right = factors.R[:, free] / norms, factors.d - factors.R[:, held] @ p[held]
     best = np.linalg.lstsq(normed, right, rcond=None)[0]
-    limits = least[free] * norms
-    if np.any(best < limits):
-        found = lsq_linear(normed, right, bounds=(limits, np.inf), method="bvls", tol=1e-14)
-        best = np.maximum(found.x, limits)
-        at_limit = best <= limits + 1e-12 * np.max(np.abs(best))
+    lowest = least[free] * norms
+    if np.any(best < lowest):
+        found = lsq_linear(normed, right, bounds=(lowest, np.inf), method="bvls", tol=1e-14)
+        best = np.maximum(found.x, lowest)
+        at_limit = best <= lowest + 1e-12 * np.max(np.abs(best))
     else:
         at_limit = np.zeros(len(free), dtype=bool)
     p[free] = best / norms
+    tight = tuple(c.name for c in limits.conditions if np.min(c.eigenvalues(p)) < -ROUNDING)
+    cost = 1.0
+    if tight:
+        alone, of_bodies = factors.squares(p), np.concatenate([c.places for c in limits.conditions])
+        p = within(factors, p, nominal, limits, np.union1d(free, of_bodies))
+        cost = float(factors.squares(p) / alone) if alone > 0 else np.inf
+        at_limit = (p[free] - least[free]) * norms <= AT_LIMIT * np.linalg.norm(right)
     active = np.zeros(len(p), dtype=bool)
     active[free] = at_limit
     p[active] = least[active]
@@ -80,4 +136,91 @@ def fit(factors: Factors, nominal: np.ndarray, least: np.ndarray) -> LimitedFit:
         inverse = np.linalg.inv(np.linalg.qr(normed, mode="r"))
         inflation[free] = np.linalg.norm(inverse, axis=1)
     condition = float(np.linalg.cond(normed)) if len(free) else np.nan
-    return LimitedFit(p, base, active, inflation, condition)
+    return LimitedFit(p, base, active, inflation, condition, tight, cost)
+
+
+def within(
+    factors: Factors, begin: np.ndarray, nominal: np.ndarray, limits: ParameterLimits, free: np.ndarray
+) -> np.ndarray:
+    """Least squares within limits and conditions, in the free parameters; others stay as they begin.
+
+    min |R p - d|^2 / 2 + mu (sum_i tr(C_i0^-1 C_i) - log det C_i - sum_j log(p_j - least_j)), mu falling to 0
+
+    each by Newton's method. The first two are the distance of a body from that of the robot, so what the motion does not
+    tell stays close to it. Lee, Wensing, Park (2020), Geometric robot dynamic identification, IEEE Trans. Robotics 36.
+    """
+    bodies = {int(j) for c in limits.conditions for j in c.places}
+    bounded = np.array([j for j in free if limits.least[j] > -np.inf and j not in bodies], dtype=int)
+    p = begin.copy()
+    p[bounded] = np.maximum(p[bounded], limits.least[bounded] + 1e-3 * np.maximum(1.0, np.abs(p[bounded])))
+    for c in limits.conditions:
+        p[c.places] = c.interior(nominal)
+    barrier = _Barrier(limits, bounded, [np.linalg.inv(c.at(p)) for c in limits.conditions])
+    least = GAP * (factors.squares(begin) + GAP * float(factors.d @ factors.d))
+    mu = factors.squares(p) / barrier.count
+    while mu * barrier.count > least:
+        mu /= FALL
+        for _ in range(STEPS):
+            S, right = barrier.linear(p)
+            A = np.vstack([factors.R, np.sqrt(mu) * S])[:, free]
+            norms = np.linalg.norm(A, axis=0) + 1e-300
+            b = np.concatenate([factors.d - factors.R @ p, np.sqrt(mu) * right])
+            step = np.zeros(len(p))
+            step[free] = np.linalg.lstsq(A / norms, b, rcond=None)[0] / norms
+            now, decrement = (
+                factors.squares(p) / 2 + mu * barrier.value(p),
+                float(np.sum((A @ step[free]) ** 2)),
+            )
+            share = 1.0
+            while share > 1e-9 and not (
+                factors.squares(p + share * step) / 2 + mu * barrier.value(p + share * step)
+                <= now - 1e-4 * share * decrement
+            ):
+                share /= 2
+            if share <= 1e-9 or decrement < 1e-3 * mu:
+                break
+            p = p + share * step
+    return p
+
+
+@dataclass(frozen=True, eq=False)
+class _Barrier:
+    """What keeps parameters inside of limits, and bodies close to those of the robot, with its slopes."""
+
+    limits: ParameterLimits
+    bounded: np.ndarray
+    references: list[np.ndarray]
+
+    @property
+    def count(self) -> int:
+        """Dimensions of all that must not be negative: mu of them is what a minimum with the barrier can be too large."""
+        return len(self.bounded) + sum(len(c.constant) for c in self.limits.conditions)
+
+    def value(self, p: np.ndarray) -> float:
+        """The barrier over mu, inf outside."""
+        found, inside = 0.0, p[self.bounded] - self.limits.least[self.bounded]
+        if np.any(inside <= 0):
+            return np.inf
+        for c, reference in zip(self.limits.conditions, self.references, strict=True):
+            C = c.at(p)
+            try:
+                L = np.linalg.cholesky(C)
+            except np.linalg.LinAlgError:
+                return np.inf
+            found += float(np.sum(reference * C)) - 2 * float(np.sum(np.log(np.diag(L))))
+        return found - float(np.sum(np.log(inside)))
+
+    def linear(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """S and r of which S'S is the Hessian and -S'r the gradient at p."""
+        inside = p[self.bounded] - self.limits.least[self.bounded]
+        rows = np.zeros((len(inside), len(p)))
+        rows[np.arange(len(inside)), self.bounded] = 1 / inside
+        parts, right = [rows], [np.ones(len(inside))]
+        for c, reference in zip(self.limits.conditions, self.references, strict=True):
+            L = np.linalg.cholesky(c.at(p))
+            inverse = np.linalg.inv(L)
+            S = np.zeros((L.size, len(p)))
+            S[:, c.places] = (inverse @ c.slopes @ inverse.T).reshape(len(c.places), -1).T
+            parts.append(S)
+            right.append((np.eye(len(L)) - L.T @ reference @ L).ravel())
+        return np.vstack(parts), np.concatenate(right)

@@ -10,9 +10,16 @@ from functools import reduce
 
 import numpy as np
 
+from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns
 from gantrytau_optimica.identification.rigid.parallel_filter import FilteredMotion
-from gantrytau_optimica.identification.rigid.regression import Factors, LimitedFit, fit
+from gantrytau_optimica.identification.rigid.regression import (
+    Condition,
+    Factors,
+    LimitedFit,
+    ParameterLimits,
+    fit,
+)
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError, RobotDynamics
 
@@ -44,6 +51,21 @@ class RigidRegression:
     def least(self) -> np.ndarray:
         """Lower limits, (k,): what the model declares, and frictions that brake."""
         return np.concatenate([self.dynamics.least, np.zeros(len(self.names) - len(self.dynamics.names))])
+
+    @property
+    def limits(self) -> ParameterLimits:
+        """What masses, inertias and frictions there can be."""
+        return ParameterLimits(self.least, tuple(self._condition(body) for body in self.dynamics.bodies))
+
+    def _condition(self, body: BodyParameters) -> Condition:
+        columns = np.eye(len(self.dynamics.names))
+
+        def at(p: np.ndarray) -> np.ndarray:
+            return pseudo_inertia(self.dynamics.ten(body, p))
+
+        constant = at(np.zeros(len(columns)))
+        places = np.array([j for j, n in enumerate(self.dynamics.names) if n in body.names])
+        return Condition(body.path, constant, places, np.array([at(columns[j]) - constant for j in places]))
 
     def _some_rows(self) -> np.ndarray:
         rows = np.concatenate([m.motion for m in self.motions])
@@ -100,17 +122,17 @@ def factors_of(rows: Sequence[LogRows]) -> Factors:
 
 
 def minimum(
-    problem: RigidRegression, least: np.ndarray, nonlinear: Sequence[str]
+    problem: RigidRegression, limits: ParameterLimits, nonlinear: Sequence[str]
 ) -> tuple[LimitedFit, list[LogRows]]:
     """The least squares and the rows at it. Raises IdentificationError where Gauss-Newton does not settle."""
     nominal = problem.nominal
     rows = problem.rows(nominal)
     factors = factors_of(rows)
     if not nonlinear:
-        return fit(factors, nominal, least), rows
+        return fit(factors, nominal, limits), rows
     p, left = nominal, factors.squares(nominal)
     for _ in range(STEPS):
-        found = fit(factors, p, least)
+        found = fit(factors, p, limits)
         step = found.p - p
         share = 1.0
         while True:
@@ -121,7 +143,7 @@ def minimum(
             share /= 2
         p, rows, factors, left = p + share * step, tried, new, new.squares(p + share * step)
         if np.linalg.norm(step) <= SETTLED * max(1.0, np.linalg.norm(p)):
-            return fit(factors, p, least), rows
+            return fit(factors, p, limits), rows
     raise IdentificationError(
         f"identify: {', '.join(nonlinear)} did not settle in {STEPS} steps of Gauss-Newton, as forces are not linear in "
         "them; fix some, or start from a robot whose parameters are closer"

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,6 +18,8 @@ import numpy as np
 from gantrytau import GantryTauError, ModelError
 from gantrytau.dae import Dae
 from gantrytau.errors import did_you_mean
+from gantrytau.flattening.flat_model import FlatParameter
+from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters
 
 BLOCK = 1024  # rows of one call, as many as caches hold
 PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records
@@ -43,10 +46,37 @@ class RobotDynamics:
     names: tuple[str, ...]
     values: Mapping[str, float]
 
+    @cached_property
+    def bodies(self) -> tuple[BodyParameters, ...]:
+        """Bodies of which all ten parameters are asked, or all but the mass."""
+        return tuple(body for body in bodies_of(self.dae) if body.names[1] in self.names)
+
+    @cached_property
+    def _own(self) -> dict[str, float]:
+        """Numbers of all parameters, by model name and, those of bodies, by public one."""
+        found = {**self.dae.parameter_values, **self.values}
+        for body in self.bodies:
+            found |= dict(zip(body.names, body.of_model(found).tolist(), strict=True))
+        return found
+
     @property
     def nominal(self) -> np.ndarray:
         """Values of the parameters in the model, (k,)."""
-        return np.array([self.dae.parameter_values[model_name(self.dae, n)] for n in self.names])
+        return np.array([self._own[model_name(self.dae, n)] for n in self.names])
+
+    def in_model(self, p: Sequence[Any]) -> dict[str, Any]:
+        """What the model is given for parameters p, by model name; numbers or expressions, as p is."""
+        asked = dict(zip(self.names, p, strict=True))
+        found: dict[str, Any] = {}
+        for body in self.bodies:
+            found |= body.in_model([asked.get(n, self._own[n]) for n in body.names])
+        of_bodies = {n for body in self.bodies for n in body.names}
+        return found | {model_name(self.dae, n): x for n, x in asked.items() if n not in of_bodies}
+
+    def ten(self, body: BodyParameters, p: np.ndarray) -> np.ndarray:
+        """The ten parameters of a body where those of the robot are p."""
+        asked = dict(zip(self.names, p, strict=True))
+        return np.array([asked.get(n, self._own[n]) for n in body.names])
 
     @property
     def least(self) -> np.ndarray:
@@ -72,14 +102,16 @@ class RobotDynamics:
     def _function(self) -> ca.Function:
         q = self.coordinates
         motion = [*q, *(f"der({n})" for n in q), *(f"der(der({n}))" for n in q)]
-        wanted = [model_name(self.dae, n) for n in self.names]
-        whole = self.dae.function(given=[*motion, *wanted, *self.values], find=list(self.forces))
+        wanted = self.in_model(self.nominal.tolist())
+        known = {n: value for n, value in self.values.items() if n not in wanted}
+        whole = self.dae.function(given=[*motion, *wanted, *known], find=list(self.forces))
         try:
             whole, kind = whole.expand(), ca.SX
         except RuntimeError:  # loops without closed form are solved by a call, which has no written form
             kind = ca.MX
-        x, p = kind.sym("x", 3 * len(q)), kind.sym("p", len(wanted))
-        y = ca.vertcat(*whole.call([*ca.vertsplit(x), *ca.vertsplit(p), *map(kind, self.values.values())]))
+        x, p = kind.sym("x", 3 * len(q)), kind.sym("p", len(self.names))
+        given = [kind(value) for value in (*self.in_model(ca.vertsplit(p)).values(), *known.values())]
+        y = ca.vertcat(*whole.call([*ca.vertsplit(x), *given]))
         slopes = ca.densify(ca.jacobian(y, p))
         return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True})
 
@@ -94,7 +126,7 @@ class RobotDynamics:
             # rows as columns, read and written where they stand
             buffer, evaluate = self._function.map(block.stop - begin).buffer()
             for i, given in enumerate((x[block], values)):
-                buffer.set_arg(i, given.data.cast("B").cast("d"))
+                buffer.set_arg(i, given.data)
             for i, found in enumerate((A[block], y[block])):
                 buffer.set_res(i, found.data)
             evaluate()
@@ -166,6 +198,19 @@ def candidates(dae: Dae) -> tuple[str, ...]:
         if declared.unit in ("kg", "kg.m2") and not LAWS.search(name):
             found.append(public_name(dae, name))
     return tuple(dict.fromkeys(found))
+
+
+def bodies_of(dae: Dae) -> tuple[BodyParameters, ...]:
+    """Bodies of a robot whose mass, centre of mass and inertia can all be adjusted."""
+    found, adjustable = [], set(dae.adjustable)
+    for path in (n.removesuffix(".r_cm[0]") for n in dae.adjustable if n.endswith(".r_cm[0]")):
+        element, declared = f"{path}.m", dae.flat.find(f"{path}.m")
+        if element not in adjustable and isinstance(declared, FlatParameter) and declared.value:
+            element = str(declared.value[0])  # where the mass is that of a parameter of the robot
+        body = BodyParameters(path, public_name(dae, element), element)
+        if adjustable.issuperset(body.elements):
+            found.append(body)
+    return tuple(found)
 
 
 def frictions(dae: Dae) -> tuple[str, ...]:
