@@ -9,7 +9,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import IdentificationError, MotionLog, identify
-from gantrytau_optimica.identification.rigid.base_parameters import base_parameters
+from gantrytau_optimica.identification.least_squares.base_parameters import base_parameters
 from tests.optimica.identification import gantry_logs as logs
 
 WITHOUT_LINKS = dict(link_masses=0)

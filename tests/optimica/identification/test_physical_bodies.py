@@ -9,8 +9,10 @@ from scipy.optimize import least_squares
 from gantrytau import ModelError, translate
 from gantrytau_models import DeltaRobot
 from gantrytau_optimica import identify
+from gantrytau_optimica.identification.least_squares.factors import Factors
+from gantrytau_optimica.identification.least_squares.parameter_limits import Condition, ParameterLimits
+from gantrytau_optimica.identification.least_squares.regression import fit
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
-from gantrytau_optimica.identification.rigid.regression import Condition, Factors, ParameterLimits, fit
 from tests.optimica.identification.bodies import CENTRE, INERTIA, MASS, Carried, log
 from tests.optimica.identification.test_identify_closed_chains import CASES, log_of
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import Finding
-from gantrytau_optimica.identification.rigid.regression import LimitedFit
+from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
+from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError, model_name
@@ -38,7 +39,7 @@ def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:
     if abs(late) < LATE * period or rest @ rest > EXPLAINED * (left @ left):
         return []
     samples, explained = late / period, 1 - (rest @ rest) / (left @ left)
-    back = -round(samples) or -int(np.sign(samples))
+    back = -round(float(samples)) or -int(np.sign(samples))
     message = (
         f"forces are {abs(samples):.1f} samples {'late' if late > 0 else 'early'} ({1e3 * abs(late):.3g} ms): that explains "
         f"{explained:.0%} of what is left; shift the columns of f by {back:+d} rows, or mend the clocks of both"
@@ -65,7 +66,7 @@ def contradictions(
     if freed.nonlinear():
         return []
     try:
-        other, others = minimum(freed, np.full(len(freed.names), -np.inf), ())
+        other, others = minimum(freed, ParameterLimits(np.full(len(freed.names), -np.inf)), ())
     except IdentificationError:  # free of them nothing is determined
         return []
     before, after = factors_of(rows).squares(found.p), factors_of(others).squares(other.p)

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.identification.least_squares.factors import Factors
+from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
-from gantrytau_optimica.identification.rigid.regression import Factors, LimitedFit
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 LEFT_OUT = ("nan", "time", "gaps")  # kinds of findings of a log, whose rows are told together

@@ -9,6 +9,8 @@ import numpy as np
 from gantrytau import Model, translate
 from gantrytau.dae import Dae
 from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
+from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.chosen_parameters import (
     asked_parameters,
@@ -21,7 +23,6 @@ from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, h
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
-from gantrytau_optimica.identification.rigid.regression import LimitedFit, ParameterLimits, fit
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
@@ -52,9 +53,8 @@ def identify(
     """Masses and friction of a robot of rigid bodies, by least squares of its forces along measured motion.
 
     robot: any model, or what `translate` made of it, of any loops, whose inputs are the forces or torques of its drives,
-    with `s` or `phi` beside them;
-    log: one or several, q and f in the order of these inputs. parameters: names or families, `plate_mass`,
-    `cart_masses`, `link_masses[0]` or the model's own, by default all masses and inertias that move the forces.
+    with `s` or `phi` beside them; log: one or several, q and f in the order of these inputs. parameters: names or
+    families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces.
     The name of a body, `tool`, stands for its ten: mass, `tool.moment[i]` in kg.m, `tool.inertia[i,j]` in kg.m2 about the
     origin of its frame. fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0
     leaves links out. friction: the law that is identified in place of the model's; None keeps the model's. physical: no

@@ -10,16 +10,12 @@ from functools import reduce
 
 import numpy as np
 
+from gantrytau_optimica.identification.least_squares.factors import Factors
+from gantrytau_optimica.identification.least_squares.parameter_limits import Condition, ParameterLimits
+from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns
 from gantrytau_optimica.identification.rigid.parallel_filter import FilteredMotion
-from gantrytau_optimica.identification.rigid.regression import (
-    Condition,
-    Factors,
-    LimitedFit,
-    ParameterLimits,
-    fit,
-)
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError, RobotDynamics
 
