@@ -50,10 +50,18 @@ class Rig:
         self._laws = tuple(self._law(joint) for joint in self.joints)
         self._started = dict[tuple[float, ...], tuple[Dae, np.ndarray]]()
 
-    def run(self, position: ArrayLike, velocity: ArrayLike | None = None, seed: int = 0) -> Result:
+    def run(
+        self,
+        position: ArrayLike,
+        velocity: ArrayLike | None = None,
+        seed: int = 0,
+        *,
+        push: ArrayLike | None = None,
+    ) -> Result:
         """What the robot does for references of its joints, position (N, n) in m and velocity (N, n) in m/s, none if None.
 
-        It rests at the first position before. Row k of a reference is given at k times the period, and held. The result
+        It rests at the first position before. Row k of a reference is given at k times the period, and held; so is that
+        of `push`, a force (N, 3) in N on the tool, resolved in the world, as of a hammer. The result
         has N rows, at these times: joints, forces and friction by their names in the robot, `tool.r`, `gauge.r` and
         `accelerometer.a` where it has them, `q_ref` and `v_ref`; readings with noise are `measured.q`, `measured.r` (of
         the gauge, else of the tool) and `measured.a`. Equal seeds draw the same friction and noise: take another for each
@@ -74,6 +82,12 @@ class Rig:
         drawn = {name: [value] for name, value in self._drawn(forces, random).items()}
         # all are samples, so that the equations of one run serve for the next
         series = {"q_ref": q_ref, "v_ref": v_ref, **drawn}
+        if "push.f" in self.loop.vectors:
+            series["push.f"] = np.zeros((1, 3)) if push is None else self._force(push, len(t))
+        elif push is not None:
+            raise ModelError(
+                f"Rig.run: found a push and {self.robot.name}, expected a robot with a tool that has a frame"
+            )
         inputs = {name: Samples(t[: len(u)], u, kind="constant") for name, u in series.items()}
         found = simulate(
             loop,
@@ -88,6 +102,15 @@ class Rig:
         values = {name.removeprefix("robot."): found[name][rows] for name in found.names}
         units = {name.removeprefix("robot."): found.unit(name) for name in found.names}
         return self._with_readings(t, values, units, random)
+
+    def _force(self, push: ArrayLike, rows: int) -> np.ndarray:
+        found = np.asarray(push, dtype=float)
+        if found.shape != (rows, 3) or not np.all(np.isfinite(found)):
+            raise ModelError(
+                f"Rig.run: found push of shape {found.shape}, expected finite forces in N, ({rows}, 3), a row for each of "
+                "position"
+            )
+        return found
 
     def __repr__(self) -> str:
         return f"<Rig: {self.robot.name} under {len(self.joints)} servos, every {self.period:g} s>"

@@ -4,7 +4,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from gantrytau import Array, Input, Model, ModelError
+from gantrytau import Array, Input, Model, ModelError, connect
+from gantrytau.mechanics.multibody import WorldForce
 
 PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
 
@@ -12,6 +13,7 @@ PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
 def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]) -> Model:
     """The model `robot` with `controllers`, driven by the references q_ref (n,) and v_ref (n,) of its joints.
 
+    Where the robot has a `tool` with a frame, a force `push.f` acts on it.
     Raises ModelError for controllers that are not one for each joint, with the ports q_ref, v_ref, q, v, f_ff and f.
     """
     n = len(joints)
@@ -33,7 +35,7 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
         raise ModelError(
             f"Rig: found the joints {', '.join(turning)} that turn, expected joints that move, x.s"
         )
-    one_each = list(controllers)
+    one_each, struck = list(controllers), tool_frame(model)
 
     class ServoLoop(Model):
         """A robot under its servos."""
@@ -53,7 +55,24 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
                 yield one.v == moved.v
                 yield moved.f == one.f
 
-    return ServoLoop()
+    class PushedLoop(ServoLoop):
+        """The same with a force on the tool."""
+
+        push = WorldForce()
+
+        def equations(self):
+            yield from super().equations()
+            yield connect(self.push.frame_b, _member(self.robot, struck or ""))
+
+    return PushedLoop() if struck else ServoLoop()
+
+
+def tool_frame(model: Model) -> str | None:
+    """The frame of the tool of a robot, None where it has none."""
+    tool = type(model).members().get("tool")
+    if not isinstance(tool, Model):
+        return None
+    return next((f"tool.{name}" for name in ("frame", "frame_a") if name in type(tool).members()), None)
 
 
 def _member(owner: Any, path: str) -> Any:

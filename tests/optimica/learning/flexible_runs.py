@@ -6,6 +6,7 @@ At `PLACE` with `WRIST` kg the modes of held carts are the 7.4, 10.5 and 11.5 Hz
 import numpy as np
 
 from gantrytau import Result, prbs
+from gantrytau.mechanics.translational import Friction
 from gantrytau_models import FlexibleGantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_models.mechanisms.flexible import unstretched
 from gantrytau_optimica import Rig, Scatter
@@ -15,7 +16,7 @@ PERIOD = 0.004
 PLACE, WRIST = np.array([0.9, 3.2, -0.4]), 24.2
 
 
-def flexible_rig(friction=PreslidingFriction, noise: Scatter | None = None) -> Rig:
+def flexible_rig(friction: type[Friction] | None = PreslidingFriction, noise: Scatter | None = None) -> Rig:
     """The robot near `PLACE`, its servos tuned there."""
     robot = FlexibleGantryTau(RECORD, friction=friction, plate_mass=WRIST)
     return Rig(robot, cart_servos(RECORD, r=PLACE), period=PERIOD, noise=noise)
