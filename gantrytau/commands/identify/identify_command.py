@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
 LAWS = ("symmetric", "asymmetric", "stribeck", "none")
 SPELLING = Spelling(
-    ("identify",), {name: f"--{name}" for name in ("friction", "fixed", "cutoff")} | {"robot": "--robot"}
+    ("identify",),
+    {name: f"--{name}" for name in ("friction", "fixed", "cutoff")}
+    | {"robot": "--robot", "minimum_speed": "--minimum-speed"},
 )
 Logs = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILE...",
-        help="Logs of motion, as log.csv with the header t,q1,...,f1,... in SI, or with units, as 'q1 [mm]'.",
+        help="Logs of motion, as log.csv with the header t,q1,...,f1,... in SI, or with units, as 'q1 (mm)'.",
         show_default=False,
     ),
 ]
@@ -59,6 +61,10 @@ def identify(
     ] = "symmetric",
     fixed: FixedValues = None,
     cutoff: Annotated[float, typer.Option(metavar="HZ", help="Of the filter of motion and forces.")] = 10.0,
+    minimum_speed: Annotated[
+        float,
+        typer.Option(metavar="M/S", help="Below it a joint's rows do not count; rad/s of those that turn."),
+    ] = 0.005,
     report: Report = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
@@ -66,8 +72,9 @@ def identify(
 ) -> None:
     """Identify masses and friction of a robot from logs of its motion and forces.
 
-    What is wrong with the logs, as gaps, units, late forces, is told with rows and remedy. The last line has the values as
-    options of all commands: --set carts[0].m=13.1.
+    What is wrong with the logs, as gaps, units, late forces, is told with rows and remedy.
+
+    The last line has the values as options of all commands: --set carts[0].m=13.1.
     """
     with reporting(json, source_of(robot), SPELLING):
         from gantrytau_optimica import MotionLog, check_motion
@@ -88,7 +95,9 @@ def identify(
                 for f in _once(log, check_motion(chosen.model, log))
             ]
             law: Any = None if friction == "none" else friction
-            found = identified(chosen.model, logs, fixed=known, friction=law, cutoff=cutoff)
+            found = identified(
+                chosen.model, logs, fixed=known, friction=law, cutoff=cutoff, minimum_speed=minimum_speed
+            )
         if report is not None:
             with writable(report):
                 found.report(report)

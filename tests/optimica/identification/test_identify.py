@@ -101,7 +101,7 @@ def test_the_report_says_what_is_weak(robot, tmp_path):
 @pytest.mark.parametrize(
     ("keywords", "words"),
     [
-        (dict(friction="dry"), "friction is 'dry', expected one of 'symmetric'"),
+        (dict(friction="dry"), "found friction='dry', expected one of 'symmetric'"),
         (dict(parameters="plate"), "there is no parameter 'plate'; did you mean 'plate_mass'"),
         (
             dict(parameters="plate_mass", fixed=dict(plate_mass=1)),
@@ -109,9 +109,9 @@ def test_the_report_says_what_is_weak(robot, tmp_path):
         ),
         (dict(fixed=dict(link_masses=[1, 2])), "expected a number, or one for each of link_masses[0]"),
         (dict(fixed=dict(plate_mass="heavy")), "fixed value of plate_mass is 'heavy', expected a number"),
-        (dict(minimum_speed=-1), "minimum_speed is -1, expected a speed"),
+        (dict(minimum_speed=-1), "found minimum_speed=-1, expected a speed"),
         (dict(minimum_speed=10.0), "no joint is ever faster than minimum_speed"),
-        (dict(cutoff=0.0), "cutoff is 0.0, expected a frequency"),
+        (dict(cutoff=0.0), "found cutoff=0.0, expected a frequency"),
         (dict(cutoff=80.0), "less than a fifth of the log's rate of 250 Hz"),
     ],
 )

@@ -26,10 +26,14 @@ def check_call(
 ) -> None:
     """ModelError for what no call can mean."""
     if friction not in LAWS:
-        raise ModelError(f"identify: friction is {friction!r}, expected one of {', '.join(map(repr, LAWS))}")
+        raise ModelError(
+            f"identify: found friction={friction!r}, expected one of {', '.join(map(repr, LAWS))}",
+            argument="friction",
+        )
     if not 0 <= minimum_speed < np.inf:
         raise ModelError(
-            f"identify: minimum_speed is {minimum_speed!r}, expected a speed in m/s, not negative"
+            f"identify: found minimum_speed={minimum_speed!r}, expected a speed in m/s, not negative",
+            argument="minimum_speed",
         )
     if not logs:
         raise ModelError("identify: found no log, expected one or more; give a MotionLog")

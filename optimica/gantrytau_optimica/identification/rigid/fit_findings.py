@@ -20,7 +20,9 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
     """Stretches without gaps that a filter can pass, and what was left out. IdentificationError where nothing is left."""
     kept, findings = [], []
     if not 0 < cutoff < np.inf:
-        raise IdentificationError(f"identify: cutoff is {cutoff!r}, expected a frequency in Hz above 0")
+        raise IdentificationError(
+            f"identify: found cutoff={cutoff!r}, expected a frequency in Hz above 0", argument="cutoff"
+        )
     for number, log in enumerate(logs):
         parts = log.parts()
         long = [p for p in parts if len(p) > 1 and (p.t[-1] - p.t[0]) * cutoff >= PERIODS]
