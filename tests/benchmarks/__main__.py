@@ -15,6 +15,7 @@ from tests.benchmarks import (
     mechanisms,
     motion,
     procedure,
+    rig_runs,
     sampling,
     studies,
 )
@@ -38,6 +39,6 @@ if __name__ == "__main__":
         kinematics.rows(),
         calibration.rows(),
     )
-    timed = (fmus.rows(), sampling.rows(), studies.rows(), identification.rows())
+    timed = (fmus.rows(), sampling.rows(), studies.rows(), identification.rows(), rig_runs.rows())
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))
