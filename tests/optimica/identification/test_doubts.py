@@ -65,3 +65,24 @@ def test_the_robot_that_was_found_has_what_was_fixed():
     assert values["plate_mass"] == 10.5
     assert [values[f"carts[{i}].law.f_v"] for i in range(3)] == [100.0, 350.0, 380.0]
     assert values["carts[0].law.f_c"] == pytest.approx(128.6, rel=0.05)
+
+
+def test_friction_that_is_another_near_rest_is_told_and_the_remedy_helps():
+    """A sign that is smoothed by tanh, and Stribeck friction."""
+    log = logs.log(0)
+    _, _, v, *_ = logs.motion()
+    smooth = MotionLog(log.t, log.q, log.f + logs.COULOMB * (np.tanh(v / 0.05) - np.sign(v)))
+    messages = [
+        f.message for f in identify(ROBOT, smooth, fixed=NO_LINKS).findings if f.kind == "law of friction"
+    ]
+    assert len(messages) == 3
+    assert all("falls by" in words and "friction='stribeck'" in words for words in messages)
+    rising = identify(ROBOT, logs.log(0, logs.Extras(stribeck=60.0)), fixed=NO_LINKS)
+    messages = [f.message for f in rising.findings if f.kind == "law of friction"]
+    assert any("rises by" in words for words in messages)
+    speed = max(float(words.rsplit("minimum_speed=")[1].split(",")[0]) for words in messages)
+    mended = identify(ROBOT, logs.log(0, logs.Extras(stribeck=60.0)), fixed=NO_LINKS, minimum_speed=speed)
+    assert "law of friction" not in told(mended)
+    assert abs(mended.parameters["coulomb[0]"] - logs.COULOMB[0]) < 0.5 * abs(
+        rising.parameters["coulomb[0]"] - logs.COULOMB[0]
+    )

@@ -17,6 +17,9 @@ LATE = 0.4  # samples, from which a delay is told
 EXPLAINED = 0.98  # of what is left, which a delay or freed values must go below to be told
 CONTRADICTED = 0.9
 SURE = 4.0  # deviations
+FALLS = np.geomspace(0.01, 0.3, 8)  # m/s or rad/s, within which friction may rise or fall towards rest
+BENT = 0.25  # of what is left of a joint, that such a change must explain to be told
+FALLEN = 3.0  # times this speed, where a ten-thousandth of the change is left
 
 
 def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:
@@ -45,6 +48,47 @@ def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:
         f"{explained:.0%} of what is left; shift the columns of f by {back:+d} rows, or mend the clocks of both"
     )
     return [Finding("delay", np.arange(0), message)]
+
+
+def law_findings(problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows]) -> list[Finding]:
+    """Friction that rises or falls towards rest, sign(v) exp(-(v / v_s)^2), which the law that was fitted does not know."""
+    if problem.friction is None or problem.friction.law == "stribeck":
+        return []
+    free = found.base.independent
+    changes = [
+        [
+            m.filtered(m.thin((np.sign(m.speed) * np.exp(-((m.v / fall) ** 2)))[:, :, None]))[:, :, 0]
+            for fall in FALLS
+        ]
+        for m in problem.motions
+    ]
+    findings = []
+    for i, coordinate in enumerate(problem.dynamics.coordinates):
+        X = np.concatenate([r.A[r.moving[:, i], i][:, free] for r in rows])
+        left = np.concatenate([r.left(found.p)[r.moving[:, i], i] for r in rows])
+        basis, _ = np.linalg.qr(X / np.maximum(np.linalg.norm(X, axis=0), np.finfo(float).tiny))
+        best = (0.0, 0.0, 0.0)
+        for k, fall in enumerate(FALLS):
+            column = np.concatenate([c[k][r.moving[:, i], i] for c, r in zip(changes, rows, strict=True)])
+            own = column - basis @ (basis.T @ column)
+            if own @ own > 1e-6 * (column @ column) and left @ left > 0:
+                best = max(
+                    best,
+                    (
+                        float((own @ left) ** 2 / (own @ own) / (left @ left)),
+                        float(fall),
+                        float(own @ left / (own @ own)),
+                    ),
+                )
+        explained, fall, size = best
+        if explained > BENT:
+            message = (
+                f"friction of {coordinate} {'rises' if size > 0 else 'falls'} by {abs(size):.3g} towards rest, within about "
+                f"{fall:.2g} m/s or rad/s: that is {explained:.0%} of what is left of its force, and bends friction that "
+                f"was found; take minimum_speed={FALLEN * fall:.2g}, friction='stribeck', or friction=None, the model's law"
+            )
+            findings.append(Finding("law of friction", np.arange(0), message))
+    return findings
 
 
 def contradictions(
