@@ -22,6 +22,14 @@ BENT = 0.25  # of what is left of a joint, that such a change must explain to be
 FALLEN = 3.0  # times this speed, where a ten-thousandth of the change is left
 
 
+def second_looks(
+    problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows], given: Mapping[str, Any]
+) -> list[Finding]:
+    """Kinds "delay", "law of friction", "fixed"; given: values that were fixed, by name."""
+    findings = [*delay_findings(rows, found), *law_findings(problem, found, rows)]
+    return [*findings, *contradictions(problem, found, rows, given)] if given else findings
+
+
 def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:
     """A delay of forces against motion, to parts of a sample: b(t - s) = b - s b', so that s is one column more.
 

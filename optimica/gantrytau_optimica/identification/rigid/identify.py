@@ -18,7 +18,7 @@ from gantrytau_optimica.identification.rigid.chosen_parameters import (
     fixed_values,
     is_friction,
 )
-from gantrytau_optimica.identification.rigid.doubts import contradictions, delay_findings, law_findings
+from gantrytau_optimica.identification.rigid.doubts import second_looks
 from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, half_against_half, usable_parts
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
@@ -93,8 +93,7 @@ def identify(
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
     findings += [*fit_findings(problem.names, found, answer.weak), *held_findings]
-    doubts = [*delay_findings(rows, found), *law_findings(problem, found, rows)]
-    doubts += contradictions(problem, found, rows, given) if given else []
+    doubts = second_looks(problem, found, rows, given)
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
     answer = replace(answer, fixed=given, model_values=held | dict(answer.model_values))
