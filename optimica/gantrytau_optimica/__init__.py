@@ -47,6 +47,8 @@ from gantrytau_optimica.identification.physical.physical_form import PhysicalFor
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
 from gantrytau_optimica.identification.rigid.model_comparison import (
+    FURTHER_MODELS,
+    TABLE_6_3,
     ModelComparison,
     compare,
     printed_models,
@@ -89,6 +91,8 @@ from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivitie
 from gantrytau_optimica.studies.trade_off import TradeOff
 
 __all__ = [
+    "FURTHER_MODELS",
+    "TABLE_6_3",
     "About",
     "Accelerometer",
     "Bars",

@@ -28,7 +28,8 @@ class Identification:
     bodies are without the condition that they have a density; base: what is determined in place of parameters that no
     motion of this kind tells apart; nonlinear: those in which forces are not linear; model_values:
     what was found and what was fixed by names of the model, as `--set` has them;
-    stribeck_speed: m/s, of friction "stribeck"; held_out: rms of what a fit of the first half leaves of the second, N.
+    stribeck_speed: m/s, of friction "stribeck", deviations are those at it; held_out: rms of what a fit of the first half
+    leaves of the second, N.
     """
 
     robot_name: str

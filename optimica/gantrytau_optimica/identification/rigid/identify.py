@@ -57,11 +57,11 @@ def identify(
     families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces.
     The name of a body, `tool`, stands for its ten: mass, `tool.moment[i]` in kg.m, `tool.inertia[i,j]` in kg.m2 about the
     origin of its frame. fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0
-    leaves links out. friction: the law that is identified in place of the model's; None keeps the model's. physical: no
-    mass and no friction below the limits that the model declares, no body without a density (pseudo-inertia).
-    cutoff: Hz, of the zero-phase filter of both sides; minimum_speed: m/s or rad/s, below which a joint's rows do not
-    count. holdout: the part that judges a fit of the rest; the parameters are of all. Gautier (1991); Dressler (2012),
-    section 6.1.
+    leaves links out. friction: the law that is identified in place of the model's, None keeps that; the speed of
+    "stribeck" is one for all joints, looked for between 0.01 and 1. physical: no mass and no friction below the limits
+    that the model declares, no body without a density (pseudo-inertia). cutoff: Hz, of the zero-phase filter of both
+    sides; minimum_speed: m/s or rad/s, below which a joint's rows do not count; twice Stribeck's keeps that out of the
+    other laws. holdout: the part that judges a fit of the rest. Gautier (1991); Dressler (2012), section 6.1.
 
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """

@@ -1,12 +1,13 @@
-"""The same motion explained by several models of a robot: `compare`, and the four of Table 6.3."""
+"""The same motion explained by several models of a robot: `compare`, and those of Table 6.3."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from gantrytau import Model, ModelError, translate
+from gantrytau.dae import Dae
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
@@ -14,9 +15,13 @@ from gantrytau_optimica.identification.rigid.identify import identify
 
 @dataclass(frozen=True, eq=False)
 class ModelComparison:
-    """Fits by the name of their model; prints itself as a table."""
+    """Fits by the name of their model; prints itself as a table, with numbers of others in brackets.
+
+    beside: by model and name such numbers, sums of squares as "total" in N2.
+    """
 
     fits: Mapping[str, Identification]
+    beside: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def totals(self) -> dict[str, float]:
@@ -31,34 +36,43 @@ class ModelComparison:
     def __str__(self) -> str:
         names = list(dict.fromkeys(n for fit in self.fits.values() for n in fit.parameters))
         width = max(map(len, (*names, "sum of squares, N2")))
-        lines = [f"{'':{width}s} " + " ".join(f"{name:>14s}" for name in self.fits)]
+        lines = [f"{'':{width}s} " + " ".join(f"{name:>18s}" for name in self.fits)]
         for name in names:
-            numbers = (fit.parameters.get(name) for fit in self.fits.values())
-            lines.append(
-                f"{name:{width}s} "
-                + " ".join(f"{'' if x is None else format(x, '.5g'):>14s}" for x in numbers)
-            )
-        lines.append(
-            f"{'sum of squares, N2':{width}s} " + " ".join(f"{x:14.4g}" for x in self.totals.values())
-        )
-        return "\n".join(lines)
+            numbers = {model: fit.parameters.get(name) for model, fit in self.fits.items()}
+            lines.append(f"{name:{width}s} {self._row(numbers, name)}")
+        lines.append(f"{'sum of squares, N2':{width}s} {self._row(self.totals, 'total')}")
+        weak = "; ".join(f"{model}: {', '.join(fit.weak)}" for model, fit in self.fits.items() if fit.weak)
+        return "\n".join([*lines, *([f"weak in {weak}"] if weak else [])])
+
+    def _row(self, numbers: Mapping[str, float | None], name: str) -> str:
+        cells = []
+        for model, number in numbers.items():
+            other = self.beside.get(model, {}).get(name)
+            cell = "" if number is None else f"{number:.4g}"
+            cells.append(f"{cell if other is None else f'{cell} [{other:.4g}]':>18s}")
+        return " ".join(cells)
 
 
 def compare(
-    robot: Model, log: MotionLog | Sequence[MotionLog], models: Mapping[str, Mapping[str, Any]]
+    robot: Model | Dae,
+    log: MotionLog | Sequence[MotionLog],
+    models: Mapping[str, Mapping[str, Any]],
+    *,
+    beside: Mapping[str, Mapping[str, float]] | None = None,
 ) -> ModelComparison:
-    """Identify a robot from the same logs with several models.
+    """Identify a robot, or what `translate` made of it, from the same logs with several models.
 
-    models: by name, the keywords of `identify`, such as {"no links": dict(fixed=dict(link_masses=0))}. Raises ModelError
-    for no model, and as `identify`.
+    models: by name, the keywords of `identify`, such as {"no links": dict(fixed=dict(link_masses=0))}; beside: numbers to
+    print in brackets, such as TABLE_6_3. Raises ModelError for no model, and as `identify`.
     """
     if not models:
         raise ModelError(
             "compare: found no models, expected keywords of identify by name; see printed_models"
         )
-    dae = translate(robot)
-    fits = {name: identify(dae, log, **keywords) for name, keywords in models.items()}
-    return ModelComparison({name: replace(fit, nominal=robot) for name, fit in fits.items()})
+    dae = robot if isinstance(robot, Dae) else translate(robot)
+    nominal = None if isinstance(robot, Dae) else robot
+    fits = {name: replace(identify(dae, log, **words), nominal=nominal) for name, words in models.items()}
+    return ModelComparison(fits, beside or {})
 
 
 def printed_models(coulomb: Any, viscous: Any) -> dict[str, dict[str, Any]]:
@@ -75,3 +89,26 @@ def printed_models(coulomb: Any, viscous: Any) -> dict[str, dict[str, Any]]:
         "4": dict(viscous=viscous),
     }
     return {name: dict(fixed=dict(link_masses=0.0) | fixed) for name, fixed in given.items()}
+
+
+FURTHER_MODELS = {  # which the text beside Table 6.3 rules out: links whose masses may be negative, or not; asymmetry
+    "links": dict(physical=False),
+    "links >= 0": {},
+    "asymmetric": dict(fixed=dict(link_masses=0.0), friction="asymmetric"),
+}
+
+
+def _printed(
+    total: float, plate: float, carts: str, coulomb: str = "", viscous: str = ""
+) -> dict[str, float]:
+    families = {"cart_masses": carts, "coulomb": coulomb, "viscous": viscous}
+    numbers = {f"{word}[{i}]": float(x) for word, row in families.items() for i, x in enumerate(row.split())}
+    return {"plate_mass": plate, "total": total} | numbers
+
+
+TABLE_6_3 = {  # as printed; sums of squares, N2, over its own motion, which is not known
+    "1": _printed(5.42e7, 8.76, "14.33 14.05 38.10", "152.13 259.09 291.24"),
+    "2": _printed(3.37e7, 9.13, "13.58 13.64 38.23", "128.62 145.13 194.57", "102.43 355.25 388.77"),
+    "3": _printed(7.22e7, 8.79, "13.85 14.85 38.47"),
+    "4": _printed(4.02e7, 9.67, "12.51 12.73 37.70", "109.97 207.13 243.75"),
+}

@@ -9,7 +9,7 @@ inside, row by row. Where y is linear in p, slopes are the same at any p, which 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -100,18 +100,12 @@ class RobotDynamics:
 
     @cached_property
     def _function(self) -> ca.Function:
-        q = self.coordinates
-        motion = [*q, *(f"der({n})" for n in q), *(f"der(der({n}))" for n in q)]
-        wanted = self.in_model(self.nominal.tolist())
-        known = {n: value for n, value in self.values.items() if n not in wanted}
-        whole = self.dae.function(given=[*motion, *wanted, *known], find=list(self.forces))
-        try:
-            whole, kind = whole.expand(), ca.SX
-        except RuntimeError:  # loops without closed form are solved by a call, which has no written form
-            kind = ca.MX
-        x, p = kind.sym("x", 3 * len(q)), kind.sym("p", len(self.names))
-        given = [kind(value) for value in (*self.in_model(ca.vertsplit(p)).values(), *known.values())]
-        y = ca.vertcat(*whole.call([*ca.vertsplit(x), *given]))
+        settings = sorted({*self.values, *self.in_model(self.nominal.tolist())})
+        whole = _inverse_dynamics(self.dae, self.coordinates, self.forces, tuple(settings))
+        kind = ca.SX if whole.is_a("SXFunction") else ca.MX
+        x, p = kind.sym("x", 3 * len(self.coordinates)), kind.sym("p", len(self.names))
+        given = {**self.values, **self.in_model(ca.vertsplit(p))}
+        y = ca.vertcat(*whole.call([*ca.vertsplit(x), *(kind(given[n]) for n in settings)]))
         slopes = ca.densify(ca.jacobian(y, p))
         return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True})
 
@@ -147,6 +141,19 @@ class RobotDynamics:
             return ()
         single = np.where(np.eye(len(begin), dtype=bool), away, begin)
         return tuple(name for name, p in zip(self.names, single, strict=True) if bends(p))
+
+
+@lru_cache(maxsize=8)  # models of one robot differ in what is known, not in this
+def _inverse_dynamics(
+    dae: Dae, q: tuple[str, ...], forces: tuple[str, ...], settings: tuple[str, ...]
+) -> ca.Function:
+    """Forces of q, q', q'' and of the parameters in `settings`, all scalars."""
+    motion = [*q, *(f"der({n})" for n in q), *(f"der(der({n}))" for n in q)]
+    whole = dae.function(given=[*motion, *settings], find=list(forces))
+    try:
+        return whole.expand()
+    except RuntimeError:  # loops without closed form are solved by a call, which has no written form
+        return whole
 
 
 def model_name(dae: Dae, name: str) -> str:
