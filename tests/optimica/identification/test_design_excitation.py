@@ -7,7 +7,7 @@ import pytest
 
 from gantrytau import ModelError, SolveError, simulate
 from gantrytau.kinematics import Kinematics
-from gantrytau_models import GantryTau, prototypes
+from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import MotionLog, design_excitation
 
 CENTRE, HALF = np.array([0.9, 2.7, -0.7]), np.array([0.25, 0.15, 0.15])
@@ -144,3 +144,17 @@ def test_forces_too_weak_are_refused():
     weak = LIMITS | dict(force=1.0)  # weight alone takes tens of N
     with pytest.raises(SolveError, match="found no motion within the limits from 1 starts"):
         design_excitation(ROBOT, duration=10.0, limits=weak, harmonics=2, starts=1, parameters=["plate_mass"])
+
+
+@pytest.mark.nightly
+def test_robots_whose_loops_have_no_closed_form_are_excited_too():
+    """Six links: a minute, as Newton's method is differentiated at each point."""
+    found = design_excitation(
+        SixLinkGantryTau(prototypes.L1),
+        duration=6.0,
+        limits=LIMITS,
+        parameters=["plate_mass", "cart_masses[0]"],
+        starts=1,
+    )
+    assert found.condition < 10
+    assert max(found.used.values()) <= 1.0

@@ -86,3 +86,13 @@ def test_friction_that_is_another_near_rest_is_told_and_the_remedy_helps():
     assert abs(mended.parameters["coulomb[0]"] - logs.COULOMB[0]) < 0.5 * abs(
         rising.parameters["coulomb[0]"] - logs.COULOMB[0]
     )
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(1 / 190, "masses are a 1"), (1e3, "times those of GantryTau")]
+)
+def test_forces_in_another_unit_are_told(factor, words):
+    log = logs.log(0)
+    found = told(identify(ROBOT, MotionLog(log.t, log.q, factor * log.f), fixed=NO_LINKS))
+    assert words in found["unit of force"]
+    assert "unit of force" not in told(identify(ROBOT, log, fixed=NO_LINKS))

@@ -212,6 +212,16 @@ def test_friction_that_falls_towards_rest_is_told():
     )
 
 
+def test_a_mass_that_falls_upwards_is_told():
+    upwards = [replace(run, f=-run.f) for run in runs(poses(), TABLE_6_1[0] * 0, TABLE_6_1[1] * 0)]
+    found = identify_friction(ROBOT, upwards, mass="positions")
+    assert found.mass == pytest.approx(-MASS)
+    assert "mass below zero" in kinds(found)
+    assert "mass below zero" not in kinds(
+        identify_friction(ROBOT, runs(poses(), *TABLE_6_1), mass="positions")
+    )
+
+
 def test_missing_and_unsteady_runs_are_told():
     all_runs = runs(poses(), *TABLE_6_1)
     forth = [run for run in all_runs if run.q[-1, 0] > run.q[0, 0]]

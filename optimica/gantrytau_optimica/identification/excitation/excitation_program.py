@@ -66,7 +66,8 @@ class ExcitationProgram:
 
     def _at_points(self) -> ca.Function:
         """Shares of the limits, and the sum of squares of scaled slopes, at one point."""
-        x = ca.SX.sym("x", self.regressor.function.numel_in(0))
+        kind = ca.SX if self.regressor.function.is_a("SXFunction") else ca.MX  # loops solved by a call
+        x = kind.sym("x", self.regressor.function.numel_in(0))
         _q, v, a, f, Y = self.regressor.function.call([x])
         limits, m = self.limits, len(self.limits.low)
         centre, half = (limits.high + limits.low) / 2, (limits.high - limits.low) / 2

@@ -25,7 +25,7 @@ def friction_signs(
     found = []
     for a, left, name in zip(actuators, fit.residuals, names, strict=True):
         found += [*_missing(a, runs, name), *_stribeck(a, runs, left, name), *_load(a, fit, left, name)]
-    return (*found, *_one_position(actuators, runs, mass))
+    return (*found, *_one_position(actuators, runs, mass), *_lifted(fit, mass))
 
 
 def _missing(a: ActuatorRows, runs: ConstantRuns, name: str) -> list[Finding]:
@@ -97,6 +97,16 @@ def _one_position(actuators: Sequence[ActuatorRows], runs: ConstantRuns, mass: f
         "mass='positions'"
     )
     return [Finding("one position", runs.runs, words)]
+
+
+def _lifted(fit: FrictionFit, mass: float | str) -> list[Finding]:
+    if fit.mass > 0 or not isinstance(mass, str):
+        return []
+    words = (
+        f"the mass is {fit.mass:.3g} kg, as if it fell upwards: forces have the opposite sign, columns of q and f another "
+        "order, or the robot hangs the other way round; look at a run at rest"
+    )
+    return [Finding("mass below zero", np.zeros(0, dtype=int), words)]
 
 
 def _speeds(a: ActuatorRows) -> np.ndarray:
