@@ -10,6 +10,12 @@ from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import IdentificationError, MotionLog, identify
 from gantrytau_optimica.identification.least_squares.base_parameters import base_parameters
+from gantrytau_optimica.identification.rigid.robot_dynamics import (
+    RobotDynamics,
+    candidates,
+    drives,
+    frictions,
+)
 from tests.optimica.identification import gantry_logs as logs
 
 WITHOUT_LINKS = dict(link_masses=0)
@@ -73,6 +79,20 @@ def test_parameters_that_only_appear_together_are_named():
     assert base.silent(names) == ("none",)
     assert len(base.independent) == 2
     assert len(base.words(names)) == 2  # any two of the three stand for the third
+
+
+def test_many_rows_have_the_numbers_of_few():
+    """Two routes: CasADi row by row, and instructions on columns; NaN outside of the workspace in both."""
+    dae = logs.robot()
+    dynamics = RobotDynamics(dae, *drives(dae), candidates(dae), dict.fromkeys(frictions(dae), 0.0))
+    _, q, v, a, _ = logs.motion()
+    x = np.hstack([q, v, a])
+    x[17, 0] += 10.0
+    A, y = dynamics.slopes(x, dynamics.nominal)
+    parts = [dynamics.slopes(part, dynamics.nominal) for part in np.array_split(x, 4)]
+    assert np.array_equal(A, np.concatenate([part[0] for part in parts]), equal_nan=True)
+    assert np.array_equal(y, np.concatenate([part[1] for part in parts]), equal_nan=True)
+    assert np.flatnonzero(np.isnan(y).any(axis=1)).tolist() == [17]
 
 
 def test_the_same_columns_leave_numbers_of_the_model(robot):

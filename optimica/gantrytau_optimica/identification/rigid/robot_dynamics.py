@@ -20,6 +20,7 @@ from gantrytau.dae import Dae
 from gantrytau.errors import did_you_mean
 from gantrytau.flattening.flat_model import FlatParameter
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters
+from gantrytau_optimica.identification.rigid.many_rows import LEAST, MOST, of_columns, takes_columns
 
 BLOCK = 1024  # rows of one call, as many as caches hold
 PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records
@@ -109,22 +110,36 @@ class RobotDynamics:
         slopes = ca.densify(ca.jacobian(y, p))
         return ca.Function("y", [x, p], [slopes, ca.densify(y)], {"cse": True})
 
+    @cached_property
+    def _takes_columns(self) -> bool:
+        return takes_columns(self._function)
+
     def slopes(self, motion: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slopes (N, n, k) and forces (N, n) of rows (N, 3 n) of q, q', q''; NaN where the model has no answer."""
         n, k, rows = len(self.coordinates), len(self.names), len(motion)
         A, y = np.empty((rows, k, n)), np.empty((rows, n))
-        x = np.ascontiguousarray(motion, dtype=float)
-        values = np.tile(np.asarray(p, dtype=float), (min(rows, BLOCK), 1))
-        for begin in range(0, rows, BLOCK):
-            block = slice(begin, min(begin + BLOCK, rows))
-            # rows as columns, read and written where they stand
-            buffer, evaluate = self._function.map(block.stop - begin).buffer()
-            for i, given in enumerate((x[block], values)):
-                buffer.set_arg(i, given.data)
-            for i, found in enumerate((A[block], y[block])):
-                buffer.set_res(i, found.data)
-            evaluate()
+        x, p = np.ascontiguousarray(motion, dtype=float), np.asarray(p, dtype=float)
+        many = rows >= LEAST and self._takes_columns
+        for block in np.array_split(np.arange(rows), max(1, -(-rows // (MOST if many else BLOCK)))):
+            part = slice(block[0], block[-1] + 1) if len(block) else slice(0, 0)
+            (self._by_columns if many else self._by_rows)(x[part], p, A[part], y[part])
         return A.transpose(0, 2, 1), y
+
+    def _by_rows(self, x: np.ndarray, p: np.ndarray, A: np.ndarray, y: np.ndarray) -> None:
+        # read and written where they stand
+        buffer, evaluate = self._function.map(len(x)).buffer()
+        for i, given in enumerate((x, np.tile(p, (len(x), 1)))):
+            buffer.set_arg(i, given.data)
+        for i, found in enumerate((A, y)):
+            buffer.set_res(i, found.data)
+        evaluate()
+
+    def _by_columns(self, x: np.ndarray, p: np.ndarray, A: np.ndarray, y: np.ndarray) -> None:
+        slopes, forces = of_columns(self._function, np.ascontiguousarray(x.T), p)
+        for j, column in enumerate(slopes):
+            A[:, j // y.shape[1], j % y.shape[1]] = column
+        for i, column in enumerate(forces):
+            y[:, i] = column
 
     def not_linear(self, motion: np.ndarray) -> tuple[str, ...]:
         """Parameters along which slopes change, at these rows: forces are not linear in them."""
