@@ -16,6 +16,7 @@ from gantrytau.commands.printing.spelling import Spelling
 if TYPE_CHECKING:
     from gantrytau_optimica import Finding, Identification, MotionLog
 
+MANY = 100  # rows of a finding that are listed
 LAWS = ("symmetric", "asymmetric", "stribeck", "none")
 SPELLING = Spelling(
     ("identify",),
@@ -90,7 +91,7 @@ def identify(
             logs = [MotionLog.read(file) for file in files]
         with busy(f"identifying {type(chosen.model).__name__}"):
             noticed = [
-                (file, f)
+                (file, f, len(log))
                 for file, log in zip(files, logs, strict=True)
                 for f in _once(log, check_motion(chosen.model, log))
             ]
@@ -125,15 +126,19 @@ def _once(log: "MotionLog", against: "tuple[Finding, ...]") -> "list[Finding]":
     return [*own, *(f for f in against if f.kind not in {one.kind for one in own})]
 
 
-def summary(found: "Identification", noticed: "list[tuple[Path, Finding]]") -> dict[str, Any]:
-    """What was found as a record for programs; rows of findings count from 0."""
+def summary(found: "Identification", noticed: "list[tuple[Path, Finding, int]]") -> dict[str, Any]:
+    """What was found as a record for programs; rows of findings count from 0, lines of files from 1."""
     deviations = found.deviations
-    told = [
-        dict(file=str(file), kind=f.kind, message=f.message, rows=f.rows.tolist()[:100])
-        for file, f in noticed
-    ]
+    from gantrytau_optimica.identification.logs.log_files import lines_of
+
+    told: list[dict[str, Any]] = []
+    for file, f, count in noticed:
+        lines = lines_of(file, f.rows[:MANY]).tolist() if 0 < f.rows.size < count else []
+        told.append(
+            dict(file=str(file), kind=f.kind, message=f.message, rows=f.rows.tolist()[:MANY], lines=lines)
+        )
     told += [
-        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:100])
+        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:MANY], lines=[])
         for f in found.findings
         if f.kind not in {one["kind"] for one in told}
     ]
@@ -156,7 +161,8 @@ def _told(found: "Identification", record: dict[str, Any]) -> str:
     """The same for readers."""
     lines = [str(replace(found, findings=()))]
     for finding in record["findings"]:
-        place = f"{Path(finding['file']).name}: " if finding["file"] else ""
+        first = f", line {finding['lines'][0]}" if finding["lines"] else ""
+        place = f"{Path(finding['file']).name}{first}: " if finding["file"] else ""
         lines.append(f"  {place}{finding['kind']}: {finding['message']}")
     options = " ".join(f"--set {shlex.quote(f'{name}={value:.9g}')}" for name, value in record["set"].items())
     return "\n".join([*lines, f"As options: {options}"])

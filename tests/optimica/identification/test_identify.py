@@ -167,7 +167,7 @@ def test_gaps_and_flipped_forces_are_findings(robot):
     assert [x.kind for x in found.findings] == ["gaps"]
     assert found.findings[0].rows.tolist() == list(range(3000, 3010))
     flipped = identify(robot, replace(log, f=-log.f), fixed=WITHOUT_LINKS)
-    assert "sign of forces" in [x.kind for x in flipped.findings]
+    assert "sign of force" in [x.kind for x in flipped.findings]
 
 
 def test_what_a_log_tells_of_itself_is_told_of_the_fit(robot):

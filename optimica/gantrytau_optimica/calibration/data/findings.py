@@ -71,5 +71,5 @@ def _ranges(rows: np.ndarray) -> list[tuple[int, int]]:
 
 def agreeing(rows: Sequence[int] | np.ndarray, verb: str) -> str:
     """A verb for rows, "repeat", in the singular where it is one row."""
-    one = {"are": "is", "they are": "it is"}
+    one = {"are": "is", "they are": "it is", "go": "goes"}
     return verb if len(rows) != 1 else one.get(verb, f"{verb}s")

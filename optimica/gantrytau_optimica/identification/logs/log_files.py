@@ -41,6 +41,18 @@ def read_log(path: Path) -> Arrays:
     return dict(t=table[:, 0], q=q, f=f, v=v if columns.v else None, r=r if columns.r else None)
 
 
+def lines_of(path: Path, rows: np.ndarray) -> np.ndarray:
+    """Lines of a file, from 1, in which rows of its log, from 0, stand: headers, empty lines and comments are no rows."""
+    text = path.read_text(encoding="utf-8-sig")
+    _, _, before, start = _head(path, text)
+    kept = [
+        number
+        for number, line in enumerate(io.StringIO(text[start:]), before + 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    return np.array(kept, dtype=int)[rows]
+
+
 def write_log(path: Path, arrays: Arrays) -> None:
     """Write a log, in SI, so that it is read to the last digit."""
     names, kept = [], []

@@ -1,6 +1,7 @@
 """Checks of a log against the robot that it is said to be of, with the robot's nominal values."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import casadi as ca
 import numpy as np
@@ -14,12 +15,16 @@ from gantrytau_optimica.identification.logs.motion_log import MotionLog
 
 POSES = 5000  # rows, evenly spread, whose poses are looked at
 FORCES = 500  # rows whose forces are compared
+CROSSED = 0.1  # of the squares of forces, which a robot of the right order leaves at most
+EXPLAINED = 0.4  # of what is left, below which columns must bring it to be called exchanged
 ALIKE = 0.6  # correlation of forces with those of the nominal robot, above which their ratio says something
+ALONE = 0.8  # the same for one force by itself
 FACTOR = 4.0  # to either side: masses and friction of a robot are better known than that
 
 
 def check_motion(robot: Model | Dae, log: MotionLog) -> tuple[Finding, ...]:
-    """What of a log does not go with a robot: kinds "workspace", "unit of force", "sign of force".
+    """What of a log does not go with a robot: kinds "workspace", "order of actuators", "unit of force",
+    "sign of force".
 
     Raises ModelError where not all actuators are logged, or more than there are.
     """
@@ -53,36 +58,89 @@ def _workspace(dae: Dae, log: MotionLog) -> Iterator[Finding]:
 
 
 def _forces(dae: Dae, joints: tuple[str, ...], log: MotionLog) -> Iterator[Finding]:
-    """The ratio of measured forces to those of the robot with its nominal values, along the longest stretch."""
+    """Measured forces beside those of the robot with its nominal values, along the longest stretch."""
     part = max(log.parts(), key=len, default=log)
     width = max(int(WINDOW / part.period), 2) if len(part) > 1 else 2
     if len(part) < 5 * width:
         return
     v, a, _, inner = slopes(part.t, part.q, width)
     kept = np.unique(np.linspace(0, len(inner) - 1, FORCES).astype(int))
-    measured = part.f[inner[kept]]
-    nominal = nominal_forces(dae, joints, part.q[inner[kept]], v[kept], a[kept])
+    measured, motion = part.f[inner[kept]], (part.q[inner[kept]], v[kept], a[kept])
+    nominal = nominal_forces(dae, joints, *motion)
     good = np.isfinite(nominal).all(axis=1)
-    x, y = nominal[good].ravel(), measured[good].ravel()
-    size = float(np.linalg.norm(x) * np.linalg.norm(y))
-    if not size or abs(x @ y) < ALIKE * size:
-        return
-    ratio = float(x @ y / (x @ x))
     every = np.arange(len(log))
-    if ratio < 0:
-        yield Finding(
-            "sign of force",
-            every,
-            "forces are against those that the robot needs with its nominal values; change the sign of f, or that of q",
-        )
-    if not 1 / FACTOR < abs(ratio) < FACTOR:
-        words = f"{1 / abs(ratio):.3g} times smaller" if abs(ratio) < 1 else f"{abs(ratio):.3g} times larger"
-        yield Finding(
-            "unit of force",
-            every,
-            f"forces are {words} than those that the robot needs with its nominal values: torques of motors in N.m, or "
-            "another unit; divide torques by the radius of the transmission, or write the unit in the header, 'f1 [kN]'",
-        )
+    order = _order(dae, joints, motion, measured) if _left(nominal, measured) > CROSSED else None
+    if order:
+        yield Finding("order of actuators", every, order)
+        return
+    yield from _ratios(nominal[good], measured[good], every)
+
+
+def _ratios(nominal: np.ndarray, measured: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
+    """Signs and units, of all forces together, or of those (N, n) that stand out alone."""
+    whole, alike = _ratio(nominal.ravel(), measured.ravel())
+    each = [_ratio(x, y) for x, y in zip(nominal.T, measured.T, strict=True)]
+    sure = {k: ratio for k, (ratio, share) in enumerate(each) if share > ALONE}
+    if alike > ALIKE and all(1 / FACTOR < ratio / whole < FACTOR for ratio in sure.values()):
+        found = {"forces": whole}
+    else:
+        found = {f"forces in f{k + 1}": ratio for k, ratio in sure.items()}
+    for who, ratio in found.items():
+        if ratio < 0:
+            yield Finding(
+                "sign of force",
+                rows,
+                f"{who} are against those that the robot needs with its nominal values; change the sign of f, or that of q",
+            )
+        if not 1 / FACTOR < abs(ratio) < FACTOR:
+            words = (
+                f"{1 / abs(ratio):.3g} times smaller" if abs(ratio) < 1 else f"{abs(ratio):.3g} times larger"
+            )
+            yield Finding(
+                "unit of force",
+                rows,
+                f"{who} are {words} than those that the robot needs with its nominal values: torques of motors in N.m, "
+                "forces before or after a gear, or another unit; divide torques by the radius of the transmission, or "
+                "write the unit in the header, 'f1 [kN]'",
+            )
+
+
+def _ratio(nominal: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
+    """The ratio of forces by least squares, and how alike they are, 0 to 1; 0 where there are none."""
+    size = float(np.linalg.norm(nominal) * np.linalg.norm(measured))
+    product = float(nominal @ measured)
+    return (product / float(nominal @ nominal), abs(product) / size) if size else (1.0, 0.0)
+
+
+def _left(nominal: np.ndarray, measured: np.ndarray) -> float:
+    """Share of the squares of measured forces that nominal ones, in any unit and sign for each, leave; 1 without any."""
+    good = np.isfinite(nominal).all(axis=1)
+    if 2 * np.count_nonzero(good) < len(good):
+        return 1.0
+    shares = [_ratio(x, y)[1] ** 2 for x, y in zip(nominal[good].T, measured[good].T, strict=True)]
+    return 1 - float(np.mean(shares))
+
+
+def _order(
+    dae: Dae, joints: tuple[str, ...], motion: tuple[np.ndarray, ...], measured: np.ndarray
+) -> str | None:
+    """What two actuators, exchanged in f or in q and f, would mend; None where no exchange explains the forces."""
+    own = nominal_forces(dae, joints, *motion)
+    now, best = _left(own, measured), (1.0, "")
+    for i, j in combinations(range(len(joints)), 2):
+        exchanged = np.arange(len(joints))
+        exchanged[[i, j]] = j, i
+        both = nominal_forces(dae, joints, *(x[:, exchanged] for x in motion))
+        names = (f"f{i + 1} and f{j + 1}", f"q{i + 1}, f{i + 1} and q{j + 1}, f{j + 1}")
+        for nominal, name in zip((own, both), names, strict=True):
+            best = min(best, (_left(nominal, measured[:, exchanged]), name))
+    left, name = best
+    if left > EXPLAINED * now:
+        return None
+    return (
+        f"columns {name} are exchanged: so the robot with its nominal values explains {1 - left:.0%} of the forces by "
+        f"squares, and {1 - now:.0%} as they are; expected the order {', '.join(joints)}"
+    )
 
 
 def nominal_forces(

@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from gantrytau.dae import Dae
+from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.logs.robot_checks import check_motion
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 LEFT_OUT = ("nan", "time", "gaps")  # kinds of findings of a log, whose rows are told together
@@ -49,6 +52,23 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
             f"log longer, or raise the cutoff. {' '.join(f.message for f in findings)}"
         )
     return kept, findings
+
+
+def beside_robot(
+    dae: Dae, coordinates: Sequence[str], logs: Sequence[MotionLog], known: Sequence[Finding]
+) -> list[Finding]:
+    """What logs have that does not go with the robot and its nominal values, of kinds that are not known yet."""
+    if not all(name.endswith((".f", ".tau")) for name in dae.inputs) or driven_joints(dae) != tuple(
+        coordinates
+    ):
+        return []
+    kinds = {one.kind for one in known}
+    return [
+        replace(f, message=f"log {number}: {f.message}" if len(logs) > 1 else f.message)
+        for number, log in enumerate(logs)
+        for f in check_motion(dae, log)
+        if f.kind not in kinds
+    ]
 
 
 def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[float, list[Finding]]:
@@ -96,5 +116,5 @@ def fit_findings(names: Sequence[str], found: LimitedFit, weak: Sequence[str]) -
     carts = [k for k, n in enumerate(names) if n.startswith("cart_masses[")]
     if carts and all(found.p[k] < 0 or found.active[k] for k in carts):
         words = "no cart has a mass above zero: forces have the opposite sign, or another unit; give them along q, in N"
-        findings.append(Finding("sign of forces", np.arange(0), words))
+        findings.append(Finding("sign of force", np.arange(0), words))
     return findings

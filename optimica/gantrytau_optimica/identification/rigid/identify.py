@@ -19,7 +19,12 @@ from gantrytau_optimica.identification.rigid.chosen_parameters import (
     is_friction,
 )
 from gantrytau_optimica.identification.rigid.doubts import second_looks
-from gantrytau_optimica.identification.rigid.fit_findings import fit_findings, half_against_half, usable_parts
+from gantrytau_optimica.identification.rigid.fit_findings import (
+    beside_robot,
+    fit_findings,
+    half_against_half,
+    usable_parts,
+)
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
@@ -70,6 +75,7 @@ def identify(
     coordinates, forces = drives(dae)
     check_call(dae, logs, coordinates, friction, minimum_speed)
     parts, findings = usable_parts(logs, cutoff)
+    findings += beside_robot(dae, coordinates, logs, findings)
     given = fixed_values(dae, fixed or {}, len(coordinates), friction)
     known = {n: v for n, v in given.items() if is_friction(n)}
     rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
@@ -92,8 +98,8 @@ def identify(
     found, rows = minimum(problem, limits, nonlinear)
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
-    findings += [*fit_findings(problem.names, found, answer.weak), *held_findings]
-    doubts = second_looks(problem, found, rows, given)
+    findings += held_findings
+    doubts = (*fit_findings(problem.names, found, answer.weak), *second_looks(problem, found, rows, given))
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
     answer = replace(answer, fixed=given, model_values=held | dict(answer.model_values))
