@@ -129,11 +129,11 @@ def _once(log: "MotionLog", against: "tuple[Finding, ...]") -> "list[Finding]":
 def summary(found: "Identification", noticed: "list[tuple[Path, Finding, int]]") -> dict[str, Any]:
     """What was found as a record for programs; rows of findings count from 0, lines of files from 1."""
     deviations = found.deviations
-    from gantrytau_optimica.identification.logs.log_files import lines_of
+    from gantrytau_optimica import MotionLog
 
     told: list[dict[str, Any]] = []
     for file, f, count in noticed:
-        lines = lines_of(file, f.rows[:MANY]).tolist() if 0 < f.rows.size < count else []
+        lines = MotionLog.lines(file, f.rows[:MANY]).tolist() if 0 < f.rows.size < count else []
         told.append(
             dict(file=str(file), kind=f.kind, message=f.message, rows=f.rows.tolist()[:MANY], lines=lines)
         )

@@ -118,3 +118,10 @@ def test_what_is_no_text_is_refused(tmp_path):
     (tmp_path / "log.csv").write_bytes(b"t,q1,f1\n\xff\xfe\n")
     with pytest.raises(ModelError, match="encoding UTF-8"):
         MotionLog.read(tmp_path / "log.csv")
+
+
+def test_rows_are_found_again_as_lines_of_the_file(tmp_path):
+    file = tmp_path / "log.csv"
+    file.write_text("of Monday\n\nt,q1,f1\n0,1,2\n\n# a stop\n1,2,3\n2,3,4\n", encoding="utf-8")
+    assert len(MotionLog.read(file)) == 3
+    assert MotionLog.lines(file, [0, 1, 2]).tolist() == [4, 7, 8]

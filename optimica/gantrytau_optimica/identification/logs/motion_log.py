@@ -14,7 +14,7 @@ from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
-from gantrytau_optimica.identification.logs.log_files import read_log, write_log
+from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,6 +59,11 @@ class MotionLog:
         Raises ModelError for columns that are missing or doubtful, and cells that are no numbers, with the line.
         """
         return cls(**read_log(Path(path)))
+
+    @staticmethod
+    def lines(path: str | Path, rows: Any) -> np.ndarray:
+        """Lines of a file that `read` reads, from 1, in which rows of its log stand, which count from 0."""
+        return lines_of(Path(path), np.asarray(rows, dtype=int))
 
     @classmethod
     def of(
