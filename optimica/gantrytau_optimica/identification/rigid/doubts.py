@@ -13,7 +13,6 @@ from gantrytau_optimica.identification.rigid.residual_covariance import LogRows,
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError, model_name
 
-FACTOR = 4.0  # to either side: masses of a robot are better known than that
 LATE = 0.4  # samples, from which a delay is told
 EXPLAINED = 0.98  # of what is left, which a delay or freed values must go below to be told
 CONTRADICTED = 0.9
@@ -26,32 +25,12 @@ FALLEN = 3.0  # times this speed, where a ten-thousandth of the change is left
 def second_looks(
     problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows], given: Mapping[str, Any]
 ) -> list[Finding]:
-    """Kinds "unit of force", "delay", "law of friction", "fixed"; given: values that were fixed, by name."""
+    """Kinds "delay", "law of friction", "fixed"; given: values that were fixed, by name."""
     findings = [
-        *size_findings(problem, found),
         *delay_findings(rows, found),
         *law_findings(problem, found, rows),
     ]
     return [*findings, *contradictions(problem, found, rows, given)] if given else findings
-
-
-def size_findings(problem: RigidRegression, found: LimitedFit) -> list[Finding]:
-    """Masses that are all much larger, or much smaller, than those of the robot's own values."""
-    own = [
-        (p, nominal)
-        for k, (p, nominal) in enumerate(zip(found.p, problem.dynamics.nominal, strict=False))
-        if nominal > 0 and k in found.base.independent and not found.active[k]
-    ]
-    ratios = np.array([p / nominal for p, nominal in own])
-    if len(ratios) < 2 or not (np.all(ratios > FACTOR) or np.all((ratios > 0) & (ratios < 1 / FACTOR))):
-        return []
-    median = float(np.median(ratios))
-    words = f"{median:.3g} times" if median > 1 else f"a {1 / median:.3g}th of"
-    message = (
-        f"masses are {words} those of {problem.dynamics.dae.name} as it is: forces in another unit, as torques of motors in "
-        "N.m; divide them by the radius of the transmission, or write the unit in the header, 'f1 [kN]'"
-    )
-    return [Finding("unit of force", np.arange(0), message)]
 
 
 def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:

@@ -98,8 +98,11 @@ def identify(
     found, rows = minimum(problem, limits, nonlinear)
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
-    findings += held_findings
-    doubts = (*fit_findings(problem.names, found, answer.weak), *second_looks(problem, found, rows, given))
+    doubts = (
+        *held_findings,
+        *fit_findings(problem.names, found, answer.weak),
+        *second_looks(problem, found, rows, given),
+    )
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
     answer = replace(answer, fixed=given, model_values=held | dict(answer.model_values))

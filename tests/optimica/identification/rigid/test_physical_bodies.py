@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from tests.optimica.identification.test_identify_closed_chains import CASES, log_of
 
 from gantrytau import ModelError, translate
 from gantrytau_models import DeltaRobot
@@ -13,8 +14,7 @@ from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.parameter_limits import Condition, ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import fit
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
-from tests.optimica.identification.bodies import CENTRE, INERTIA, MASS, Carried, log
-from tests.optimica.identification.test_identify_closed_chains import CASES, log_of
+from tests.optimica.identification.rigid.bodies import CENTRE, INERTIA, MASS, Carried, log
 
 BODY = BodyParameters("tool", "plate_mass", "tool.m")
 ASKED = dict(parameters="tool", friction=None, minimum_speed=0.0)
