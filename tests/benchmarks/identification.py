@@ -26,9 +26,9 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 )
 from tests.benchmarks.table import Row, at_least, at_most
 from tests.optimica.identification import gantry_logs as logs
-from tests.optimica.identification import test_identify_servo as servos
-from tests.optimica.identification import test_identify_system as systems
-from tests.optimica.identification import test_physical_form as structures
+from tests.optimica.identification.measured import test_identify_servo as servos
+from tests.optimica.identification.measured import test_identify_system as systems
+from tests.optimica.identification.measured import test_physical_form as structures
 
 
 def servo_and_structure() -> Iterator[Row]:

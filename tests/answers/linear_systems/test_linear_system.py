@@ -1,6 +1,7 @@
 """Linear systems against scipy.signal and the textbook."""
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -194,6 +195,10 @@ class Points:
     response: np.ndarray
 
 
+def drawn(line) -> tuple[np.ndarray, np.ndarray]:
+    return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+
+
 def test_pictures_of_systems_beside_each_other_and_of_what_was_measured():
     system, sampled = StateSpace(*OSCILLATOR), StateSpace(*OSCILLATOR).discrete(0.1)
     hertz = np.linspace(0.1, 4.0, 30)
@@ -201,10 +206,10 @@ def test_pictures_of_systems_beside_each_other_and_of_what_was_measured():
     gain, phase = system.plot_bode(beside={"sampled": sampled, "measured": measured}).axes[:2]
     own, held, points = gain.lines
     assert [line.get_label() for line in gain.lines] == ["StateSpace", "sampled", "measured"]
-    assert held.get_xdata().max() <= 5.0 < own.get_xdata().max()  # half of 10 Hz
+    assert np.max(held.get_xdata()) <= 5.0 < np.max(own.get_xdata())  # half of 10 Hz
     assert points.get_linestyle() == "None"
     assert np.allclose(points.get_ydata(), np.abs(measured.response[0, 0]))
-    turned = np.interp(hertz, phase.lines[0].get_xdata(), phase.lines[0].get_ydata())
+    turned = np.interp(hertz, *drawn(phase.lines[0]))
     assert np.allclose(phase.lines[2].get_ydata(), turned, atol=0.1)  # between the points of the grid
     axis = system.plot_poles(beside={"sampled": sampled}).axes[0]
     assert axis.get_xlabel() == "real part [1/s]"
@@ -220,7 +225,7 @@ def test_phases_of_measured_points_are_in_the_turn_of_the_line():
     noise = np.where(np.arange(20) % 2, np.exp(1j), np.exp(-1j))  # about -180 degrees, to both sides
     measured = Points(hertz, system.response(hertz) * noise)
     line, points = system.plot_bode(beside={"measured": measured}).axes[1].lines
-    off = points.get_ydata() - np.interp(hertz, line.get_xdata(), line.get_ydata())
+    off = drawn(points)[1] - np.interp(hertz, *drawn(line))
     assert np.allclose(np.abs(off), np.degrees(1.0), atol=0.1)
 
 
@@ -271,10 +276,10 @@ def test_phases_of_measured_points_are_in_the_turn_of_the_line():
             "found 2 outputs and 9 inputs, expected 1",
         ),
         (
-            lambda: StateSpace(1, 1, 1).plot_bode(beside=[StateSpace(2, 1, 1)]),
+            lambda: StateSpace(1, 1, 1).plot_bode(beside=cast(Any, [StateSpace(2, 1, 1)])),
             "found beside=list, expected systems or measured spectra by their names",
         ),
-        (lambda: StateSpace(1, 1, 1).plot_poles(beside={"b": 3}), "found b=int, expected systems"),
+        (lambda: StateSpace(1, 1, 1).plot_poles(beside=cast(Any, {"b": 3})), "found b=int, expected systems"),
         (
             lambda: StateSpace(1, 1, 1).plot_bode(beside={"StateSpace": StateSpace(2, 1, 1)}),
             "found the name 'StateSpace' twice",

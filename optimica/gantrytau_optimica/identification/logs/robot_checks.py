@@ -114,7 +114,7 @@ def _ratio(nominal: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
 
 def _left(nominal: np.ndarray, measured: np.ndarray) -> float:
     """Share of the squares of measured forces that nominal ones, in any unit and sign for each, leave; 1 without any."""
-    good = np.isfinite(nominal).all(axis=1)
+    good = np.asarray(np.isfinite(nominal).all(axis=1))
     if 2 * np.count_nonzero(good) < len(good):
         return 1.0
     shares = [_ratio(x, y)[1] ** 2 for x, y in zip(nominal[good].T, measured[good].T, strict=True)]

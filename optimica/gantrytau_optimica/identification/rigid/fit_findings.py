@@ -84,9 +84,14 @@ def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[f
     return float(second), findings
 
 
-def fit_findings(names: Sequence[str], found: LimitedFit, weak: Sequence[str]) -> list[Finding]:
-    """What the motion does not tell, and what cannot be so."""
+def fit_findings(
+    names: Sequence[str], found: LimitedFit, weak: Sequence[str], nonlinear: Sequence[str]
+) -> list[Finding]:
+    """What the motion does not tell, what cannot be so, and what was found by iteration."""
     findings = []
+    if nonlinear:
+        words = f"forces are not linear in {', '.join(nonlinear)}; found by Gauss-Newton from the robot's own values"
+        findings.append(Finding("not linear", np.arange(0), words))
     silent = found.base.silent(names)
     if silent:
         words = (

@@ -80,18 +80,14 @@ def identify(
     known = {n: v for n, v in given.items() if is_friction(n)}
     rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
     rigid |= dict.fromkeys(frictions(dae), 0.0) if friction else {}
-    names = asked_parameters(dae, parameters, given)
     problem = RigidRegression(
-        RobotDynamics(dae, coordinates, forces, names, rigid),
+        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given), rigid),
         FrictionColumns(len(coordinates), friction, known) if friction else None,
         [filtered_motion(part, cutoff) for part in parts],
         minimum_speed,
     )
     problem = problem if parameters else problem.without_silent()
     nonlinear = problem.nonlinear()
-    if nonlinear:
-        words = f"forces are not linear in {', '.join(nonlinear)}; found by Gauss-Newton from the robot's own values"
-        findings.append(Finding("not linear", np.arange(0), words))
     limits = problem.limits if physical else ParameterLimits(np.full(len(problem.names), -np.inf))
     if friction == "stribeck":
         problem = _with_fall(problem, limits, nonlinear)
@@ -100,13 +96,13 @@ def identify(
     answer = _identified(problem, found, rows, robot)
     doubts = (
         *held_findings,
-        *fit_findings(problem.names, found, answer.weak),
+        *fit_findings(problem.names, found, answer.weak, nonlinear),
         *second_looks(problem, found, rows, given),
     )
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
+    answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
-    answer = replace(answer, fixed=given, model_values=held | dict(answer.model_values))
-    return replace(answer, nonlinear=nonlinear, held_out=judged, findings=noticed)
+    return replace(answer, model_values=held | dict(answer.model_values))
 
 
 def _with_fall(

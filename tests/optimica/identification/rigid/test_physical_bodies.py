@@ -1,11 +1,11 @@
 """Ten inertial parameters of a body: recovered, and never those of a body that cannot be."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from tests.optimica.identification.test_identify_closed_chains import CASES, log_of
 
 from gantrytau import ModelError, translate
 from gantrytau_models import DeltaRobot
@@ -15,9 +15,10 @@ from gantrytau_optimica.identification.least_squares.parameter_limits import Con
 from gantrytau_optimica.identification.least_squares.regression import fit
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
 from tests.optimica.identification.rigid.bodies import CENTRE, INERTIA, MASS, Carried, log
+from tests.optimica.identification.rigid.test_identify_closed_chains import CASES, log_of
 
 BODY = BodyParameters("tool", "plate_mass", "tool.m")
-ASKED = dict(parameters="tool", friction=None, minimum_speed=0.0)
+ASKED: dict[str, Any] = dict(parameters="tool", friction=None, minimum_speed=0.0)
 
 
 def ten(found) -> np.ndarray:
