@@ -1,0 +1,1 @@
+"""Filters and windows of learning control."""

@@ -1,0 +1,51 @@
+"""The part of a run that is learnt: windows that fade in and out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau import ModelError
+
+
+@dataclass(frozen=True)
+class Tukey:
+    """Weights over a run that are zero, rise, are one, fall and are zero: Dressler (2012), (7.12), (7.14).
+
+    start, stop: s, where weights begin and end to be above zero, of the run if None; lead: s of each flank; alpha: share
+    of the flanks that is a cosine, as in a Tukey window of twice their samples.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    lead: float = 0.4
+    alpha: float = 0.95
+
+    def weights(self, samples: int, period: float) -> np.ndarray:
+        """Weights (N,) of samples every period s from zero. Raises ModelError for a window that does not fit the run."""
+        from scipy.signal.windows import tukey
+
+        first = 0 if self.start is None else round(self.start / period)
+        last = samples if self.stop is None else round(self.stop / period)
+        flank = round(self.lead / period)
+        if not (0 <= first < last <= samples):
+            raise ModelError(
+                f"Tukey: found a window from {first * period:g} to {last * period:g} s, expected one within the run of "
+                f"{samples * period:g} s"
+            )
+        if not 0 <= 2 * flank <= last - first:
+            raise ModelError(
+                f"Tukey: found flanks of {flank * period:g} s in a window of {(last - first) * period:g} s, expected both "
+                "to fit; take a shorter lead"
+            )
+        if not 0 <= self.alpha <= 1:
+            raise ModelError(f"Tukey: found alpha={self.alpha!r}, expected a share from 0 to 1")
+        found = np.zeros(samples)
+        shape = tukey(2 * flank, self.alpha)
+        found[first:last] = 1.0
+        found[first : first + flank] = shape[:flank]
+        found[last - flank : last] = shape[flank:]
+        return found
+
+    def full(self, samples: int, period: float) -> np.ndarray:
+        """Where weights are one, (N,): the part by which errors are judged, (7.25)."""
+        return self.weights(samples, period) == 1.0

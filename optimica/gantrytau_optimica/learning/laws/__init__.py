@@ -1,0 +1,1 @@
+"""What is learnt from an error, and whether it converges."""

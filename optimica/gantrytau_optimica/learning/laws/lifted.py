@@ -1,0 +1,91 @@
+"""Linear systems over a whole run at once: y = T u with all samples in one vector, axis by axis.
+
+T is made of lower triangular Toeplitz blocks of pulse responses: Dressler (2012), (7.8), (7.9).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import toeplitz
+
+from gantrytau import ModelError
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
+
+Response = LinearSystem | Sequence[LinearSystem]  # of all axes, or of each alone
+FEW = 300  # rows, up to which all singular values are found
+
+
+def systems_of(response: Response) -> tuple[LinearSystem, ...]:
+    """One system of all axes, or one for each, sampled with one period. Raises ModelError for others."""
+    found = (response,) if isinstance(response, LinearSystem) else tuple(response)
+    if not found or not all(isinstance(each, LinearSystem) for each in found):
+        raise ModelError(
+            f"Learning: found the response {response!r}, expected a sampled linear system of all axes, or one for each",
+            argument="response",
+        )
+    periods = {each.period for each in found}
+    if len(periods) > 1 or None in periods:
+        words = ", ".join("none (continuous)" if p is None else f"{p:g} s" for p in sorted(periods, key=str))
+        raise ModelError(
+            f"Learning: found responses with periods of {words}, expected one of all; take system.discrete(period)",
+            argument="response",
+        )
+    for each in found:
+        p, m = each.D.shape
+        if p != m or (len(found) > 1 and p != 1):
+            raise ModelError(
+                f"Learning: found a response from {m} corrections to {p} positions, expected as many of both"
+                + (", one of each axis" if len(found) > 1 else ""),
+                argument="response",
+            )
+    return found
+
+
+def period_of(response: Response) -> float:
+    """The sampling period in s."""
+    return float(systems_of(response)[0].period or 0.0)
+
+
+def axes_of(response: Response) -> int:
+    """How many corrections there are."""
+    return sum(each.D.shape[1] for each in systems_of(response))
+
+
+def pulse_response(response: Response, samples: int) -> np.ndarray:
+    """Pulses (N, m, m): sample k of each position after one of each correction at sample 0."""
+    systems = systems_of(response)
+    found = np.zeros((samples, axes_of(systems), axes_of(systems)))
+    first = 0
+    for each in systems:
+        count = each.D.shape[1]
+        rows = slice(first, first + count)
+        for j in range(count):
+            pulse = np.zeros((samples, count))
+            pulse[0, j] = 1.0
+            found[:, rows, first + j] = each.simulate(pulse)
+        first += count
+    return found
+
+
+def lifted(response: Response, samples: int) -> np.ndarray:
+    """T (m N, m N)."""
+    h = pulse_response(response, samples)
+    return np.block([[np.tril(toeplitz(h[:, i, j])) for j in range(h.shape[2])] for i in range(h.shape[1])])
+
+
+def norm(matrix: np.ndarray) -> float:
+    """The largest singular value."""
+    from scipy.sparse.linalg import ArpackError, svds
+
+    if min(matrix.shape) <= FEW:
+        return float(np.linalg.norm(matrix, 2)) if matrix.size else 0.0
+    try:
+        start = np.random.default_rng(0).standard_normal(min(matrix.shape))
+        return float(svds(matrix, k=1, v0=start, return_singular_vectors=False)[0])
+    except ArpackError:
+        return float(np.linalg.norm(matrix, 2))
+
+
+def spectral_radius(matrix: np.ndarray) -> float:
+    """The largest eigenvalue by size; of all, as iterations do not tell those that lie close together."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
