@@ -1,0 +1,1 @@
+"""Where the tool is, by what was measured in a run."""

@@ -1,0 +1,1 @@
+"""References, and runs of a rig that learns."""
