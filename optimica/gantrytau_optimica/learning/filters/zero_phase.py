@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from scipy.signal import sosfilt, sosfreqz
 
 from gantrytau import ModelError
 
@@ -68,6 +67,8 @@ class ZeroPhase:
 
     def apply(self, x: Any, period: float) -> np.ndarray:
         """Signals (N,), (N, m) or many of these, (N, m, K), filtered forwards and backwards along time, from rest."""
+        from scipy.signal import sosfilt
+
         x = np.asarray(x, dtype=float)
         columns = x[:, None] if x.ndim == 1 else x
         found = np.empty_like(columns)
@@ -79,6 +80,8 @@ class ZeroPhase:
 
     def magnitude(self, hz: Any, period: float) -> np.ndarray:
         """Gains at frequencies hz (K,), (axes, K)."""
+        from scipy.signal import sosfreqz
+
         rows = [sosfreqz(digital(sections, period), worN=hz, fs=1 / period)[1] for sections in self.axes]
         return np.abs(np.array(rows)) ** 2
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from gantrytau import ModelError
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, lifted, norm
@@ -64,6 +63,8 @@ class NormOptimal:
     def corrections(self, error: np.ndarray) -> np.ndarray:
         if not (np.isfinite(self.weight) and self.weight > 0):
             raise ModelError(f"NormOptimal: found weight={self.weight!r}, expected a number above zero")
+        from scipy.linalg import cho_factor, cho_solve
+
         T = _model(self.response, error)
         square = T.T @ T
         square[np.diag_indices_from(square)] += self.weight * norm(T) ** 2

@@ -6,7 +6,6 @@ T is made of lower triangular Toeplitz blocks of pulse responses: Dressler (2012
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import toeplitz
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
@@ -69,6 +68,8 @@ def pulse_response(response: Response, samples: int) -> np.ndarray:
 
 def lifted(response: Response, samples: int) -> np.ndarray:
     """T (m N, m N)."""
+    from scipy.linalg import toeplitz
+
     h = pulse_response(response, samples)
     return np.block([[np.tril(toeplitz(h[:, i, j])) for j in range(h.shape[2])] for i in range(h.shape[1])])
 
