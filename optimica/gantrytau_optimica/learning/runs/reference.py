@@ -46,8 +46,8 @@ class Reference:
         moved = float(np.linalg.norm(self.r[1] - self.r[0]))
         if moved > STILL:
             raise ModelError(
-                f"Reference: found a start in motion, {moved / self.period:.3g} m/s, expected rest; begin with samples at the "
-                "first position",
+                f"Reference: found a start in motion, {moved / self.period:.3g} m/s, expected rest; begin with "
+                "samples at the first position",
                 argument="r",
             )
 
@@ -81,13 +81,13 @@ def square_reference(
     """
     if not (0 < move <= edge and begin >= 2 * period and rounds >= 1 and size > 0):
         raise ModelError(
-            f"square_reference: found size={size!r}, move={move!r}, edge={edge!r}, begin={begin!r}, rounds={rounds!r}, expected "
-            "a size above zero, a move of at most an edge, and a begin of two samples at least"
+            f"square_reference: found size={size!r}, move={move!r}, edge={edge!r}, begin={begin!r}, rounds={rounds!r}, "
+            "expected a size above zero, a move of at most an edge, and a begin of two samples at least"
         )
     if begin + 4 * rounds * edge > duration + period:
         raise ModelError(
-            f"square_reference: found duration={duration!r}, expected {begin + 4 * rounds * edge:g} s at least: {begin:g} s of "
-            f"rest and {4 * rounds} edges of {edge:g} s",
+            f"square_reference: found duration={duration!r}, expected {begin + 4 * rounds * edge:g} s at least: {begin:g} "
+            f"s of rest and {4 * rounds} edges of {edge:g} s",
             argument="duration",
         )
     t = period * np.arange(round(duration / period))

@@ -1,0 +1,74 @@
+"""Estimates of what is learnt from, by what was measured in a run.
+
+    zhat = F_r r + F_u u + F_y y                                             Dressler (2012), (7.4), (7.7)
+
+An estimator is linear: what it makes of deviations from rest it makes of the lifted response of a robot as well, so that one
+definition serves runs and the proof that learning converges.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from gantrytau import ModelError, Result
+from gantrytau.kinematics import Kinematics
+
+SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measured.r"}
+MOVED = 1e-9  # m or rad, from which a reference has left its first position
+FEW = 25  # samples of rest, below which sensors cannot be set to zero
+
+
+class Estimator:
+    """What is learnt from. joints: positions of the actuators, else of the tool.
+
+    reads: what is needed of a run, of "q", measured positions of the actuators, "z", forward kinematics of these, "a",
+    acceleration of the tool, and "r", its position.
+    """
+
+    joints: ClassVar[bool] = False
+    reads: ClassVar[tuple[str, ...]] = ("z",)
+
+    def combine(self, signals: Mapping[str, np.ndarray], period: float) -> np.ndarray:
+        """Deviations of the estimate (N, n, ...) for those of what is read, by letter, samples every period s."""
+        raise NotImplementedError
+
+    def estimate(self, run: Result, kinematics: Kinematics) -> np.ndarray:
+        """Positions (N, n) of the actuators, or (N, 3) of the tool, in m, by what was measured in a run from rest.
+
+        Sensors are set to zero at rest, where arms do not bend. Raises ModelError for a run without the sensors that are
+        read, and for one that does not rest long enough.
+        """
+        signals = {letter: self._signal(letter, run, kinematics) for letter in self.reads}
+        still = at_rest(run)
+        if len(still) < FEW and set(self.reads) & {"a", "r"}:
+            raise ModelError(
+                f"{type(self).__name__}: found {len(still)} samples of rest before the motion, expected {FEW} at least, by "
+                "which sensors are set to zero; begin the reference with rest",
+                argument="reference",
+            )
+        means = {letter: np.mean(x[still], axis=0) for letter, x in signals.items()}
+        base = means["q" if self.joints else "z"] if set(self.reads) & {"q", "z"} else None
+        if base is None:
+            base = np.mean(self._signal("z", run, kinematics)[still], axis=0)
+        period = float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
+        return base + self.combine({letter: x - means[letter] for letter, x in signals.items()}, period)
+
+    def _signal(self, letter: str, run: Result, kinematics: Kinematics) -> np.ndarray:
+        name = SENSORS[letter]
+        there = sorted({n.split("[")[0] for n in run.names if n.startswith("measured.")})
+        if name not in there:
+            raise ModelError(
+                f"{type(self).__name__}: found a run with {', '.join(there) or 'nothing measured'}, expected {name}; take a "
+                "robot with this sensor, or another estimator",
+                argument="estimator",
+            )
+        found = np.asarray(run[name])
+        return kinematics.fk(found)[0] if letter == "z" else found
+
+
+def at_rest(run: Result) -> np.ndarray:
+    """Rows before references leave their first values, (K,)."""
+    q_ref = np.asarray(run["q_ref"])
+    moved = np.flatnonzero(np.abs(q_ref - q_ref[0]).max(axis=1) > MOVED)
+    return np.arange(moved[0] if moved.size else len(q_ref))
