@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 
 from gantrytau import Model, ModelError, Result, Samples, linearize, simulate, translate
 from gantrytau.dae import Dae
+from gantrytau.errors import StructureError
+from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.learning.scatter import STILL, Scatter
 from gantrytau_optimica.learning.servo_loop import servo_loop
@@ -23,20 +25,28 @@ class Rig:
 
     controllers: components such as `gantrytau_models.CartServo`, one for each force x.f beside x.s, with q_ref, v_ref, q,
     v, f_ff and f. noise: what differs from run to run (`Scatter`), nothing if None; friction that differs is one with the
-    inputs `level` and `z_0`, such as `PreslidingFriction`.
+    inputs `level` and `z_0`, such as `PreslidingFriction`. stiff: the robot that does not give way, whose `kinematics`
+    the controllers go by; by default the model itself.
     Translation takes about a second, once; each run some tenths of one.
     Raises ModelError for a period that is not above zero or not that of the controllers, controllers that do not fit, and
     friction that cannot differ although it should.
     """
 
     def __init__(
-        self, model: Model, controllers: Sequence[Model], *, period: float, noise: Scatter | None = None
+        self,
+        model: Model,
+        controllers: Sequence[Model],
+        *,
+        period: float,
+        noise: Scatter | None = None,
+        stiff: Model | None = None,
     ):
         if not (isinstance(period, (int, float)) and 0 < period < np.inf):
             raise ModelError(f"Rig: found period={period!r}, expected a number above zero, in s")
         if not isinstance(noise, Scatter | None):
             raise ModelError(f"Rig: found noise={noise!r}, expected a Scatter, or None for none")
         self.period = float(period)
+        self._stiff = stiff
         self.noise = STILL if noise is None else noise
         self.robot = translate(model)
         self.joints = driven_joints(self.robot)
@@ -102,6 +112,18 @@ class Rig:
         values = {name.removeprefix("robot."): found[name][rows] for name in found.names}
         units = {name.removeprefix("robot."): found.unit(name) for name in found.names}
         return self._with_readings(t, values, units, random)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Those of the robot that does not give way. Raises ModelError for a robot that gives way without such a one."""
+        try:
+            return Kinematics(self.robot if self._stiff is None else self._stiff)
+        except StructureError:
+            raise ModelError(
+                f"Rig: found {self.robot.name}, whose joints do not determine its tool, as it gives way; name the "
+                "robot that does not, Rig(..., stiff=GantryTau(record))",
+                argument="stiff",
+            ) from None
 
     def _force(self, push: ArrayLike, rows: int) -> np.ndarray:
         found = np.asarray(push, dtype=float)

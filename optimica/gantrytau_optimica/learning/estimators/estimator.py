@@ -39,6 +39,21 @@ class Estimator:
         Sensors are set to zero at rest, where arms do not bend. Raises ModelError for a run without the sensors that are
         read, and for one that does not rest long enough.
         """
+        means, signals = self._deviations(run, kinematics)
+        letter = "q" if self.joints else "z"
+        still = at_rest(run)
+        base = means[letter] if letter in means else self._signal(letter, run, kinematics)[still].mean(axis=0)
+        period = float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
+        return base + self.combine(signals, period)
+
+    def signals(self, run: Result, kinematics: Kinematics) -> dict[str, np.ndarray]:
+        """Deviations from rest (N, n) of what is read, by letter; raises as `estimate` does."""
+        return self._deviations(run, kinematics)[1]
+
+    def _deviations(
+        self, run: Result, kinematics: Kinematics
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Means at rest, and deviations from them, by letter."""
         signals = {letter: self._signal(letter, run, kinematics) for letter in self.reads}
         still = at_rest(run)
         if len(still) < FEW and set(self.reads) & {"a", "r"}:
@@ -48,11 +63,7 @@ class Estimator:
                 argument="reference",
             )
         means = {letter: np.mean(x[still], axis=0) for letter, x in signals.items()}
-        base = means["q" if self.joints else "z"] if set(self.reads) & {"q", "z"} else None
-        if base is None:
-            base = np.mean(self._signal("z", run, kinematics)[still], axis=0)
-        period = float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
-        return base + self.combine({letter: x - means[letter] for letter, x in signals.items()}, period)
+        return means, {letter: x - means[letter] for letter, x in signals.items()}
 
     def _signal(self, letter: str, run: Result, kinematics: Kinematics) -> np.ndarray:
         name = SENSORS[letter]

@@ -45,7 +45,7 @@ class Shifted:
 class Gradient:
     """Down the slope of the squared error by the response of a model: gains below 2 are safe, small answers slow."""
 
-    response: Response
+    response: Response | None = None  # measured by `learn` if None
     gain: float = 1.0
 
     def corrections(self, error: np.ndarray) -> np.ndarray:
@@ -57,7 +57,7 @@ class Gradient:
 class NormOptimal:
     """The correction of least error and effort by the response of a model; weight: of effort, relative."""
 
-    response: Response
+    response: Response | None = None  # measured by `learn` if None
     weight: float = 1e-2
 
     def corrections(self, error: np.ndarray) -> np.ndarray:
@@ -71,8 +71,13 @@ class NormOptimal:
         return _apart(cho_solve(cho_factor(square), T.T @ _stacked(error)), error)
 
 
-def _model(response: Response, error: np.ndarray) -> np.ndarray:
+def _model(response: Response | None, error: np.ndarray) -> np.ndarray:
     """T (m N, m N) for errors (N, m, ...)."""
+    if response is None:
+        raise ModelError(
+            "Learning: found a law without a response, expected one such as Gradient(response); `learn` measures it",
+            argument="law",
+        )
     samples, axes = error.shape[:2]
     if axes_of(response) != axes:
         raise ModelError(

@@ -7,14 +7,16 @@
 Stable where the spectral radius of M is below one, monotone where its largest singular value is.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
-from gantrytau_optimica.learning.laws.correction_laws import CorrectionLaw, Shifted
+from gantrytau_optimica.learning.laws.correction_laws import CorrectionLaw, Gradient, NormOptimal, Shifted
 from gantrytau_optimica.learning.laws.lifted import (
     Response,
     axes_of,
@@ -25,22 +27,27 @@ from gantrytau_optimica.learning.laws.lifted import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stability:
     """What a learning law does to corrections from run to run.
 
-    sigma: largest singular value of M with all axes coupled; rho: its spectral radius; diagonal: largest singular value of
-    each axis alone, (m,).
+    sigma: largest singular value of M with all axes coupled; diagonal: that of each axis alone, (m,); parts: M, or one
+    matrix for each axis where axes do not move each other.
     """
 
     sigma: float
-    rho: float
     diagonal: np.ndarray
+    parts: Sequence[np.ndarray] = field(repr=False)
+
+    @cached_property
+    def rho(self) -> float:
+        """Spectral radius of M; seconds for a thousand samples."""
+        return max(map(spectral_radius, self.parts))
 
     @property
     def stable(self) -> bool:
         """Corrections come to an end, perhaps after growing at first."""
-        return self.rho < 1
+        return self.monotone or self.rho < 1
 
     @property
     def monotone(self) -> bool:
@@ -55,7 +62,7 @@ class Stability:
             words = "stable, but corrections may grow before they converge; lower the cut-off of q"
         else:
             words = "unstable: corrections grow from run to run; lower the cut-off of q, or notch it at the resonances"
-        return f"sigma {self.sigma:.4f} (axes alone {alone}), rho {self.rho:.4f}: {words}"
+        return f"sigma {self.sigma:.4f} (axes alone {alone}): {words}"
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,12 @@ class Learning:
     def corrections_of(self) -> CorrectionLaw:
         """L."""
         return Shifted(self.gain, self.shift) if self.law is None else self.law
+
+    def with_response(self, response: Response) -> "Learning":
+        """With this response in a law that goes by one and has none."""
+        if isinstance(self.law, Gradient | NormOptimal) and self.law.response is None:
+            return replace(self, law=replace(self.law, response=response))
+        return self
 
     def next(self, u: np.ndarray, error: np.ndarray, period: float) -> np.ndarray:
         """Corrections (N, m) of the next run, for those of this one and its errors, samples every period s.
@@ -123,5 +136,5 @@ class Learning:
         own = [parts[i, :, i] for i in range(m)]
         alone = [norm(part) for part in own]
         if sum(map(np.count_nonzero, own)) == np.count_nonzero(M):  # axes do not move each other
-            return Stability(max(alone), max(map(spectral_radius, own)), np.array(alone))
-        return Stability(norm(M), spectral_radius(M), np.array(alone))
+            return Stability(max(alone), np.array(alone), own)
+        return Stability(norm(M), np.array(alone), [M])

@@ -4,17 +4,38 @@ T is made of lower triangular Toeplitz blocks of pulse responses: Dressler (2012
 """
 
 from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 
-Response = LinearSystem | Sequence[LinearSystem]  # of all axes, or of each alone
+
+@runtime_checkable
+class Liftable(Protocol):
+    """A linear response over a whole run that no causal system has, as that of estimators that look ahead."""
+
+    @property
+    def period(self) -> float:
+        """The sampling period in s."""
+        ...
+
+    @property
+    def axes(self) -> int:
+        """How many corrections there are."""
+        ...
+
+    def lifted(self, samples: int) -> np.ndarray:
+        """T (m N, m N), axis by axis."""
+        ...
+
+
+Response = LinearSystem | Sequence[LinearSystem] | Liftable  # of all axes, or of each alone
 FEW = 300  # rows, up to which all singular values are found
 
 
-def systems_of(response: Response) -> tuple[LinearSystem, ...]:
+def systems_of(response: LinearSystem | Sequence[LinearSystem]) -> tuple[LinearSystem, ...]:
     """One system of all axes, or one for each, sampled with one period. Raises ModelError for others."""
     found = (response,) if isinstance(response, LinearSystem) else tuple(response)
     if not found or not all(isinstance(each, LinearSystem) for each in found):
@@ -42,36 +63,48 @@ def systems_of(response: Response) -> tuple[LinearSystem, ...]:
 
 def period_of(response: Response) -> float:
     """The sampling period in s."""
+    if isinstance(response, Liftable):
+        return response.period
     return float(systems_of(response)[0].period or 0.0)
 
 
 def axes_of(response: Response) -> int:
     """How many corrections there are."""
+    if isinstance(response, Liftable):
+        return response.axes
     return sum(each.D.shape[1] for each in systems_of(response))
 
 
-def pulse_response(response: Response, samples: int) -> np.ndarray:
-    """Pulses (N, m, m): sample k of each position after one of each correction at sample 0."""
-    systems = systems_of(response)
-    found = np.zeros((samples, axes_of(systems), axes_of(systems)))
-    first = 0
-    for each in systems:
-        count = each.D.shape[1]
-        rows = slice(first, first + count)
-        for j in range(count):
-            pulse = np.zeros((samples, count))
-            pulse[0, j] = 1.0
-            found[:, rows, first + j] = each.simulate(pulse)
-        first += count
+def pulses(system: LinearSystem, samples: int) -> np.ndarray:
+    """Pulse responses (N, p, m) of a sampled system: sample k of each output after one of each input at sample 0."""
+    p, m = system.D.shape
+    found = np.empty((samples, p, m))
+    for j in range(m):
+        pulse = np.zeros((samples, m))
+        pulse[0, j] = 1.0
+        found[:, :, j] = system.simulate(pulse)
     return found
+
+
+def toeplitz_blocks(h: np.ndarray) -> np.ndarray:
+    """Pulse responses (N, p, m) as one matrix (p N, m N), axis by axis."""
+    from scipy.linalg import toeplitz
+
+    return np.block([[np.tril(toeplitz(h[:, i, j])) for j in range(h.shape[2])] for i in range(h.shape[1])])
 
 
 def lifted(response: Response, samples: int) -> np.ndarray:
     """T (m N, m N)."""
-    from scipy.linalg import toeplitz
-
-    h = pulse_response(response, samples)
-    return np.block([[np.tril(toeplitz(h[:, i, j])) for j in range(h.shape[2])] for i in range(h.shape[1])])
+    if isinstance(response, Liftable):
+        return response.lifted(samples)
+    found = np.zeros((axes_of(response) * samples,) * 2)
+    first = 0
+    for each in systems_of(response):
+        block = toeplitz_blocks(pulses(each, samples))
+        rows = slice(first, first + len(block))
+        found[rows, rows] = block
+        first += len(block)
+    return found
 
 
 def norm(matrix: np.ndarray) -> float:

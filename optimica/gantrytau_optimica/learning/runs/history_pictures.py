@@ -1,0 +1,141 @@
+"""Pictures of learning: Dressler (2012), Figures 7.5 to 7.18."""
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.errors import did_you_mean
+from gantrytau.results.figures import check_suffix, finished
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gantrytau_optimica.learning.runs.history import History
+
+MILLI = 1e3
+
+
+def draw(history: "History", what: str, file: str | os.PathLike[str] | None) -> "Figure":
+    """One of PICTURES. Raises ModelError for another."""
+    if what not in PICTURES:
+        raise ModelError(
+            f"History.plot: found '{what}', expected one of {', '.join(PICTURES)}{did_you_mean(what, PICTURES)}",
+            argument="what",
+        )
+    if file is not None:
+        check_suffix(file)
+    return finished(PICTURES[what](history), file)
+
+
+def plot_learning(
+    histories: Mapping[str, "History"], *, file: str | os.PathLike[str] | None = None
+) -> "Figure":
+    """Errors of the measured tool over runs, by axis, of several ways to learn: Dressler (2012), Figures 7.16 to 7.18."""
+    import matplotlib.pyplot as plt
+
+    if not histories:
+        raise ModelError("plot_learning: found no histories, expected one at least, by name")
+    if file is not None:
+        check_suffix(file)
+    moved = [k for k in range(3) if any(np.isfinite(h.tool_relative[0, k]) for h in histories.values())]
+    figure, axes = plt.subplots(
+        1, len(moved), figsize=(4.2 * len(moved), 3.4), layout="constrained", squeeze=False
+    )
+    for axis, k in zip(axes[0], moved, strict=True):
+        for name, history in histories.items():
+            axis.plot(history.tool_relative[:, k], "o-", label=name)
+        axis.set(title=f"tool {'xyz'[k]}", xlabel="run", ylabel="error [% of the first run]", ylim=(0, None))
+        axis.xaxis.get_major_locator().set_params(integer=True)
+    axes[0, -1].legend()
+    return finished(figure, file)
+
+
+def _errors(history: "History") -> "Figure":
+    import matplotlib.pyplot as plt
+
+    figure, axis = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+    for name, values in zip(history.names, history.relative.T, strict=True):
+        axis.plot(values, "o-", label=name)
+    for k in range(3):
+        if (not history.columns or k not in history.columns) and np.isfinite(history.tool_relative[0, k]):
+            axis.plot(history.tool_relative[:, k], "s--", mfc="none", label=f"tool {'xyz'[k]}")
+    axis.set(xlabel="run", ylabel="error [% of the first run]", ylim=(0, None))
+    axis.xaxis.get_major_locator().set_params(integer=True)
+    axis.legend()
+    return figure
+
+
+def _over_time(history: "History", rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
+    """An axis for each of rows, with lines over time in mm; what is applied in full is shaded."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(
+        len(rows), 1, figsize=(7.0, 1.9 * len(rows) + 0.6), layout="constrained", sharex=True, squeeze=False
+    )
+    t = history.reference.t
+    within = t[history.full]
+    for axis, (name, lines) in zip(axes[:, 0], rows, strict=True):
+        axis.axvspan(within[0], within[-1], color="0.94")
+        for label, values in lines:
+            axis.plot(t, MILLI * values, label=label)
+        axis.set_ylabel(f"{name} [mm]")
+    axes[0, 0].legend(loc="upper right")
+    axes[-1, 0].set_xlabel("time [s]")
+    return figure
+
+
+def _ends(history: "History") -> list[int]:
+    return sorted({0, len(history) - 1})
+
+
+def _error(history: "History") -> "Figure":
+    return _over_time(
+        history,
+        [
+            (name, [(f"run {k}", history.error(k)[:, i]) for k in _ends(history)])
+            for i, name in enumerate(history.names)
+        ],
+    )
+
+
+def _input(history: "History") -> "Figure":
+    shown = sorted({min(1, len(history) - 1), len(history) - 1})
+    return _over_time(
+        history,
+        [
+            (name, [(f"run {k}", history.inputs[k][:, i]) for k in shown])
+            for i, name in enumerate(history.names)
+        ],
+    )
+
+
+def _tool(history: "History") -> "Figure":
+    moved = [k for k in range(3) if np.ptp(history.reference.r[:, k]) > 0]
+    return _over_time(
+        history,
+        [
+            (f"tool {'xyz'[i]}", [(f"run {k}", history.tool_error(k)[:, i]) for k in _ends(history)])
+            for i in moved
+        ],
+    )
+
+
+def _path(history: "History") -> "Figure":
+    import matplotlib.pyplot as plt
+
+    first, second = np.sort(np.argsort(-np.ptp(history.reference.r, axis=0), kind="stable")[:2])
+    figure, axis = plt.subplots(figsize=(5.2, 4.8), layout="constrained")
+    centre = history.reference.r[0]
+    lines = [("reference", history.reference.r), *((f"run {k}", history.tool[k]) for k in _ends(history))]
+    for (label, r), colour in zip(lines, ("0.6", "C0", "C1"), strict=False):
+        axis.plot(*(MILLI * (r - centre)[:, (first, second)].T), color=colour, label=label)
+    axis.set(xlabel=f"{'xyz'[first]} from the start [mm]", ylabel=f"{'xyz'[second]} from the start [mm]")
+    axis.set_aspect("equal")
+    axis.legend()
+    return figure
+
+
+PICTURES = {"errors": _errors, "error": _error, "input": _input, "tool": _tool, "path": _path}

@@ -1,0 +1,176 @@
+"""Iterative learning control: a robot runs a reference again and again, and corrects it by the error it made.
+
+Dressler (2012), chapter 7; Arimoto, Kawamura, Miyazaki (1984); Norrloef, Gunnarsson (2002).
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gantrytau import GantryTauError, ModelError, Result
+from gantrytau_optimica.learning.estimators.estimator import Estimator
+from gantrytau_optimica.learning.estimators.estimators import Actuators, Measured
+from gantrytau_optimica.learning.laws.learning import Learning, Stability
+from gantrytau_optimica.learning.laws.lifted import Response, axes_of, period_of
+from gantrytau_optimica.learning.runs.corrections import Corrections
+from gantrytau_optimica.learning.runs.history import ROWS, History
+from gantrytau_optimica.learning.runs.measured_response import measure_response
+from gantrytau_optimica.learning.runs.plant import Plant
+from gantrytau_optimica.learning.runs.reference import Reference
+
+RUNS = 100  # seeds apart, so that no two runs of a trial draw the same
+SAME = 1e-9  # of a period, or m, by which references may differ
+
+
+class LearningError(GantryTauError):
+    """Learning would diverge, or a run failed. history: the runs before it, None where there are none."""
+
+    def __init__(self, message: str, *, history: History | None = None, argument: str | None = None):
+        super().__init__(message, argument=argument)
+        self.history = history
+
+
+def learn(
+    rig: Plant,
+    reference: Reference,
+    learning: Learning | None = None,
+    estimator: Estimator | None = None,
+    *,
+    iterations: int = 10,
+    seed: int = 0,
+    axes: Sequence[int] | None = None,
+    response: Response | None = None,
+    force: bool = False,
+    resume: History | None = None,
+    file: str | os.PathLike[str] | None = None,
+) -> History:
+    """Run a reference, learn from the error, and run it again: `iterations` times after the first run.
+
+    rig: a `Rig` or any `Plant`; estimator: what is learnt from, by default the actuators, each for itself; those of the tool
+    correct its reference in `axes`, by default those in which it moves. response: from corrections to the estimate; by
+    default it is measured first with a binary sequence (24 s of the robot's time at 4 ms), which also gives laws without a
+    model theirs. It says whether learning converges: what diverges is refused unless force. resume: a history to go on
+    from; file: where the history is written after each run (.npz). Run k draws with the seed 100 seed + k.
+    Raises ModelError for arguments that do not fit, LearningError for learning that would diverge, and for a run that
+    fails, with all that was finished in `.history`.
+    """
+    learning = Learning() if learning is None else learning
+    estimator = Actuators() if estimator is None else estimator
+    _check(rig, reference, iterations, seed, resume)
+    path = None if file is None else Path(file)
+    moving = np.flatnonzero(np.ptp(reference.r, axis=0) > 0) if axes is None else np.asarray(axes)
+    corrections = Corrections(rig.kinematics, estimator.joints, None if estimator.joints else moving.tolist())
+    learning.window.weights(len(reference), reference.period)
+    if response is None:
+        response = measure_response(rig, reference.r[0], estimator, axes=corrections.picked, seed=RUNS * seed)
+    learning = learning.with_response(response)
+    stability = judged(learning, response, len(reference), corrections.count, rig.period)
+    if not (force or stability.stable):
+        raise LearningError(f"learn: {stability}; force=True runs it all the same", argument="learning")
+    found = _started(rig, reference, learning, estimator, corrections) if resume is None else resume
+    found = replace(found, stability=stability)
+    if found.names != corrections.names:
+        raise ModelError(
+            f"learn: found a history of {', '.join(found.names)} and an estimator of {', '.join(corrections.names)}, "
+            "expected the same corrections; start without resume",
+            argument="resume",
+        )
+    for k in range(len(found), len(found) + iterations + (resume is None)):
+        found = _next_run(rig, found, learning, estimator, corrections, RUNS * seed + k)
+        if path is not None:
+            found.save(path)
+    return found
+
+
+def judged(learning: Learning, response: Response, samples: int, count: int, period: float) -> Stability:
+    """Whether learning converges. Raises ModelError for a response of another period or number of axes."""
+    if abs(period_of(response) - period) > 1e-9 * period:
+        raise ModelError(
+            f"learn: found a response sampled every {period_of(response):g} s, expected every {period:g} s as the rig; "
+            "identify it again with this period",
+            argument="response",
+        )
+    if axes_of(response) != count:
+        raise ModelError(
+            f"learn: found a response of {axes_of(response)} corrections, expected {count}",
+            argument="response",
+        )
+    return learning.stability(response, samples)
+
+
+def _check(rig: Plant, reference: Reference, iterations: int, seed: int, resume: History | None) -> None:
+    for name, value in (("iterations", iterations), ("seed", seed)):
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
+            raise ModelError(
+                f"learn: found {name}={value!r}, expected a whole number, 0 and more", argument=name
+            )
+    if abs(reference.period - rig.period) > 1e-6 * rig.period:
+        raise ModelError(
+            f"learn: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "
+            "again",
+            argument="reference",
+        )
+    if resume is None:
+        return
+    old = resume.reference
+    if len(old) != len(reference) or np.abs(old.r - reference.r).max() > SAME:
+        raise ModelError(
+            "learn: found a reference that is not the one of the history, expected the same, as corrections belong to it; "
+            "start without resume",
+            argument="reference",
+        )
+
+
+def _started(
+    rig: Plant, reference: Reference, learning: Learning, estimator: Estimator, corrections: Corrections
+) -> History:
+    """A history without runs."""
+    n, m, N = len(rig.kinematics.joints), corrections.count, len(reference)
+    widths = dict(zip(ROWS, (m, n, n, 3, m), strict=True))
+    return History(
+        reference,
+        rig.kinematics.joints,
+        corrections.names,
+        () if estimator.joints else corrections.picked,
+        corrections.wanted(reference.r),
+        learning.window.full(N, reference.period),
+        dict(learning=repr(learning), estimator=repr(estimator), rig=repr(rig)),
+        **{name: np.zeros((0, N, width)) for name, width in widths.items()},
+        next_input=np.zeros((N, m)),
+    )
+
+
+def _next_run(
+    rig: Plant, so_far: History, learning: Learning, estimator: Estimator, corrections: Corrections, seed: int
+) -> History:
+    """With the run that the corrections of the one before ask for. Raises LearningError where it fails."""
+    k, u = len(so_far), so_far.next_input
+    try:
+        q_ref, v_ref = corrections.references(so_far.reference.r, u, rig.period)
+        run = rig.run(q_ref, v_ref, seed=seed)
+        estimate = estimator.estimate(run, rig.kinematics)[:, list(corrections.picked)]
+        following = learning.next(u, so_far.wanted - estimate, rig.period)
+    except GantryTauError as error:
+        raise LearningError(
+            f"learn: run {k} failed, the {k} before it stand in .history: {error}",
+            history=so_far if k else None,
+            argument=error.argument,
+        ) from error
+    found = so_far.with_run(
+        inputs=u,
+        q_ref=q_ref,
+        q=np.asarray(run["measured.q"]),
+        tool=_tool(run, rig),
+        estimates=estimate,
+    )
+    return replace(found, next_input=following)
+
+
+def _tool(run: Result, rig: Plant) -> np.ndarray:
+    """Where the tool was, (N, 3): as measured, else by the kinematics of the measured joints."""
+    if any(name.startswith("measured.r") for name in run.names):
+        return Measured().estimate(run, rig.kinematics)
+    return rig.kinematics.fk(np.asarray(run["measured.q"]))[0]
