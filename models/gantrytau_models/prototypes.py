@@ -163,7 +163,9 @@ class FlexiblePrototype(Prototype):
         metadata=_vector("N/m", "stiffness of each arm along its link", positive=True)
     )
     arm_damping: Vector = field(metadata=_vector("N.s/m", "damping of each arm along its link", least=0.0))
-    lever: float = field(metadata=quantity("1", "deflection of the wrist for a unit of that of the plate"))
+    lever: Vector = field(
+        metadata=_vector("1", "deflection of the wrist for a unit of that of the plate, along each axis")
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,7 +121,9 @@ class FlexibleGantryTau(Model):
     """
 
     plate_mass = Parameter(unit="kg", min=0.0, description="mass of plate, tool and wrist")
-    lever = Parameter(unit="1", description="deflection at the wrist for a unit of deflection of the plate")
+    lever = Parameter(
+        shape=3, unit="1", description="deflection at the wrist for a unit of that of the plate, along each axis"
+    )
     deflection = Real(
         3, unit="m", description="of the plate from where stiff arms would hold it, in the world"
     )
@@ -151,7 +153,7 @@ class FlexibleGantryTau(Model):
         positions = unstretched(prototype, start)
         defaults = dict(
             plate_mass=prototype.plate_mass,
-            lever=prototype.lever,
+            lever=list(prototype.lever),
             frame=dict(m=prototype.frame_mass, c=prototype.frame_stiffness, d=prototype.frame_damping),
             arms=[
                 dict(
