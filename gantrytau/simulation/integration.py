@@ -14,7 +14,7 @@ from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
-from gantrytau.simulation.memory.history import History
+from gantrytau.simulation.memory.past_values import PastValues
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
@@ -60,7 +60,7 @@ class Run:
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
         sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
-        self.history = History(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
+        self.history = PastValues(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
         self.sampler = sampler if sampler.suits else None
 
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -60,7 +60,17 @@ from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
 from gantrytau_optimica.identification.spectra.resonances import resonances
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
+from gantrytau_optimica.learning.estimators.estimators import Actuators, Complementary, Kinematic, Measured
+from gantrytau_optimica.learning.filters.tukey import Tukey
+from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
+from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
+from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.rig import Rig
+from gantrytau_optimica.learning.runs.estimated_response import estimated_response
+from gantrytau_optimica.learning.runs.history import History
+from gantrytau_optimica.learning.runs.history_pictures import plot_learning
+from gantrytau_optimica.learning.runs.learn import LearningError, learn
+from gantrytau_optimica.learning.runs.reference import Reference, square_reference
 from gantrytau_optimica.learning.scatter import Scatter
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
@@ -95,6 +105,7 @@ __all__ = [
     "TABLE_6_3",
     "About",
     "Accelerometer",
+    "Actuators",
     "Bars",
     "Calibration",
     "CalibrationError",
@@ -103,6 +114,7 @@ __all__ = [
     "Camera",
     "Cameras",
     "Cell",
+    "Complementary",
     "Corner",
     "CrossValidation",
     "Deviation",
@@ -112,11 +124,17 @@ __all__ = [
     "Finding",
     "Free",
     "Friction",
+    "Gradient",
+    "History",
     "Identification",
     "IdentificationError",
     "IdentifiedSystem",
+    "Kinematic",
     "LaserTracker",
+    "Learning",
+    "LearningError",
     "LengthGauge",
+    "Measured",
     "MeasuredPlan",
     "MeasuredResponse",
     "Measurements",
@@ -124,6 +142,7 @@ __all__ = [
     "MissingGuess",
     "ModelComparison",
     "MotionLog",
+    "NormOptimal",
     "Optimization",
     "Optimum",
     "ParameterRow",
@@ -131,6 +150,7 @@ __all__ = [
     "PhysicalForm",
     "PlannedCell",
     "Prepared",
+    "Reference",
     "Rig",
     "SampledDevice",
     "Samples",
@@ -142,8 +162,10 @@ __all__ = [
     "StepResponse",
     "TMac",
     "TradeOff",
+    "Tukey",
     "Way",
     "Wires",
+    "ZeroPhase",
     "at",
     "calibrate",
     "calibrated_geometry",
@@ -156,6 +178,7 @@ __all__ = [
     "enough_poses",
     "error_map",
     "estimate",
+    "estimated_response",
     "final",
     "fit_arm",
     "frame_words",
@@ -170,6 +193,7 @@ __all__ = [
     "integral_of_squares",
     "is_planned",
     "judge",
+    "learn",
     "linearity",
     "link",
     "load_optimum",
@@ -185,6 +209,7 @@ __all__ = [
     "physical_form",
     "plan_calibration",
     "plan_cell",
+    "plot_learning",
     "predict",
     "predict_late",
     "prepare",
@@ -199,6 +224,7 @@ __all__ = [
     "sensitivities",
     "sensitivity_table",
     "single_camera",
+    "square_reference",
     "stereo_cameras",
     "sum_of_squares",
     "told_by_tool",

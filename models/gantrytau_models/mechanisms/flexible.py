@@ -122,7 +122,9 @@ class FlexibleGantryTau(Model):
 
     plate_mass = Parameter(unit="kg", min=0.0, description="mass of plate, tool and wrist")
     lever = Parameter(
-        shape=3, unit="1", description="deflection at the wrist for a unit of that of the plate, along each axis"
+        shape=3,
+        unit="1",
+        description="deflection at the wrist for a unit of that of the plate, along each axis",
     )
     deflection = Real(
         3, unit="m", description="of the plate from where stiff arms would hold it, in the world"

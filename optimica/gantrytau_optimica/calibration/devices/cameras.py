@@ -14,7 +14,13 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.devices.devices import Array, Device, Measured, checked_rotation, numbers
+from gantrytau_optimica.calibration.devices.devices import (
+    Array,
+    Device,
+    MeasuredPoses,
+    checked_rotation,
+    numbers,
+)
 from gantrytau_optimica.calibration.devices.sight import Bars, clear
 
 ROUNDS = 20  # steps from the true pose; three or four are enough where the pattern is seen well
@@ -214,7 +220,7 @@ class Cameras(Device):
             seen &= clear(camera.r, target, self.obstacles, bars)
         return seen
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         points = self._points(r, R)
         true = np.concatenate([camera.project(points) for camera in self.cameras], axis=1)
         readings = (true + self.noise * random.standard_normal(true.shape)).reshape(len(r), true.shape[1] * 2)
@@ -223,7 +229,9 @@ class Cameras(Device):
             for c in range(len(self.cameras)) for k in range(len(self.pattern)) for axis in "xy"
         )  # fmt: skip
         r, R = self._solved(r, R, readings)
-        return Measured((r - self.r) @ self.R, self.R.T @ R, readings, names, np.ones(len(r), dtype=bool))
+        return MeasuredPoses(
+            (r - self.r) @ self.R, self.R.T @ R, readings, names, np.ones(len(r), dtype=bool)
+        )
 
     def _solved(self, r: Array, R: Array, readings: Array) -> tuple[Array, Array]:
         """Poses whose images by the believed cameras fit best, from those given, by Gauss-Newton on all at once."""

@@ -22,7 +22,7 @@ ORTHONORMAL = 1e-6  # what rounding to six decimals leaves of a rotation matrix
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredPoses:
     """What a device read at N poses; rows that it did not see are NaN.
 
     r: positions (N, 3) in m, or None if the device finds none; R: orientations (N, 3, 3), or None; readings: (N, k) as
@@ -36,7 +36,7 @@ class Measured:
     seen: Array
 
     def __repr__(self) -> str:
-        return f"<Measured: {np.count_nonzero(self.seen)} of {len(self.seen)} poses seen>"
+        return f"<MeasuredPoses: {np.count_nonzero(self.seen)} of {len(self.seen)} poses seen>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class Device:
         *,
         frame: str = "world",
         bars: Bars | None = None,
-    ) -> Measured:
+    ) -> MeasuredPoses:
         """What the device reads of a tool at r (N, 3) in m with orientations R (N, 3, 3), default no rotation.
 
         seed: of the noise; the same seed gives the same noise. frame: in which positions and orientations are given,
@@ -104,7 +104,9 @@ class Device:
             position = None if position is None else position @ self.R.T + self.r
             rotation = None if rotation is None else self.R @ rotation
         lost = [None if a is None else np.where(_like(seen, a), a, np.nan) for a in (position, rotation)]
-        return Measured(lost[0], lost[1], np.where(seen[:, None], found.readings, np.nan), found.names, seen)
+        return MeasuredPoses(
+            lost[0], lost[1], np.where(seen[:, None], found.readings, np.nan), found.names, seen
+        )
 
     def _sees(self, r: Array, R: Array, bars: Bars | None) -> Array:
         points = r + R @ self.target
@@ -114,7 +116,7 @@ class Device:
         """Whether the target at points (N, 3) lies in the ranges of the device, (N,)."""
         raise NotImplementedError
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         """Readings with errors, in the axes of the device, seen or not."""
         raise NotImplementedError
 
@@ -221,7 +223,7 @@ class LaserTracker(Device):
             & (self._turned_away(self.r, points, R) <= self.acceptance)
         )
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         distance, azimuth, elevation = _polar((r + R @ self.target - self.r) @ self.R)
         along, across = self._deviations(distance)
         noise = random.standard_normal((len(r), 3))
@@ -233,7 +235,7 @@ class LaserTracker(Device):
             elevation + across / safe * noise[:, 2],
         ])  # fmt: skip
         names = ("range [m]", "azimuth [rad]", "elevation [rad]")
-        return Measured(_cartesian(readings), None, readings, names, np.ones(len(r), dtype=bool))
+        return MeasuredPoses(_cartesian(readings), None, readings, names, np.ones(len(r), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,11 +269,11 @@ class TMac(LaserTracker):
         whole[:, 3:, 3:] = square * np.eye(3)
         return whole
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         found = super()._read(r, R, random)
         rotation = turned(self.R.T @ R, self.rotation_noise * random.standard_normal((len(r), 3)))
         position = found.r - rotation @ self.target
-        return Measured(position, rotation, found.readings, found.names, found.seen)
+        return MeasuredPoses(position, rotation, found.readings, found.names, found.seen)
 
 
 def numbers(value: Any) -> Array:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.devices.devices import Array, Device, Measured, numbers
+from gantrytau_optimica.calibration.devices.devices import Array, Device, MeasuredPoses, numbers
 from gantrytau_optimica.calibration.devices.sight import Bars, clear
 
 ROUNDS = 12  # Newton steps of a trilateration, which converges quadratically
@@ -54,10 +54,10 @@ class LengthGauge(Device):
         length = self._lengths(points, R)
         return (self.stroke[0] <= length) & (length <= self.stroke[1]) & (aside <= self.reach)
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         length = self._lengths(r + R @ self.target, R)
         readings = (1.0 + self.scale) * length + self.noise * random.standard_normal(len(r))
-        return Measured(None, None, readings[:, None], ("length [m]",), np.ones(len(r), dtype=bool))
+        return MeasuredPoses(None, None, readings[:, None], ("length [m]",), np.ones(len(r), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ class Wires(Device):
             seen &= clear(self.r + self.R @ anchor, points, self.obstacles, bars)
         return seen
 
-    def _read(self, r: Array, R: Array, random: np.random.Generator) -> Measured:
+    def _read(self, r: Array, R: Array, random: np.random.Generator) -> MeasuredPoses:
         points = (r + R @ self.target - self.r) @ self.R
         distances = self._distances(points)
         readings = distances * (1.0 + np.asarray(self.scale)) + self.noise * random.standard_normal(
@@ -110,7 +110,7 @@ class Wires(Device):
         )
         names = tuple(f"distance {k + 1} [m]" for k in range(len(self.anchors)))
         position = self._position(points, readings) if len(self.anchors) > 2 else None
-        return Measured(position, None, readings, names, np.ones(len(r), dtype=bool))
+        return MeasuredPoses(position, None, readings, names, np.ones(len(r), dtype=bool))
 
     def _distances(self, points: Array) -> Array:
         return np.linalg.norm(points[:, None] - self.anchors, axis=2)

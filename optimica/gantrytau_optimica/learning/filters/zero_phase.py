@@ -15,7 +15,7 @@ from gantrytau import ModelError
 
 
 @dataclass(frozen=True)
-class Section:
+class BiquadSection:
     """(b2 p^2 + b1 p + b0) / (a2 p^2 + a1 p + a0) with p = s / (2 pi hz); samples of it are true at hz."""
 
     hz: float
@@ -34,7 +34,7 @@ class Section:
 class ZeroPhase:
     """A zero-phase filter for each axis, or one for all: sections of the causal half by axis."""
 
-    axes: tuple[tuple[Section, ...], ...]
+    axes: tuple[tuple[BiquadSection, ...], ...]
 
     @classmethod
     def butterworth(cls, order: int, hz: float | Sequence[float]) -> Self:
@@ -56,7 +56,7 @@ class ZeroPhase:
         """The axes of several, in order."""
         return ZeroPhase(tuple(axis for each in (self, *others) for axis in each.axes))
 
-    def of(self, axis: int, count: int) -> tuple[Section, ...]:
+    def of(self, axis: int, count: int) -> tuple[BiquadSection, ...]:
         """The sections of one of count axes. Raises ModelError where there are others."""
         if len(self.axes) not in (1, count):
             raise ModelError(
@@ -86,7 +86,7 @@ class ZeroPhase:
         return np.abs(np.array(rows)) ** 2
 
 
-def notch(hz: float, width: float, depth: float) -> Section:
+def notch(hz: float, width: float, depth: float) -> BiquadSection:
     """(p^2 + 2 width depth p + 1) / (p^2 + 2 width p + 1): gain depth at hz."""
     _frequency("hz", hz)
     if not (np.isfinite(width) and width > 0 and np.isfinite(depth) and depth >= 0):
@@ -94,10 +94,10 @@ def notch(hz: float, width: float, depth: float) -> Section:
             f"ZeroPhase.notched: found width={width!r}, depth={depth!r}, expected a damping ratio above zero and a gain "
             "of zero at least"
         )
-    return Section(float(hz), (1.0, 2 * width * depth, 1.0), (1.0, 2 * width, 1.0))
+    return BiquadSection(float(hz), (1.0, 2 * width * depth, 1.0), (1.0, 2 * width, 1.0))
 
 
-def digital(sections: Sequence[Section], period: float) -> np.ndarray:
+def digital(sections: Sequence[BiquadSection], period: float) -> np.ndarray:
     """Second-order sections (K, 6) for scipy. Raises ModelError for frequencies that the period does not hold."""
     for section in sections:
         if not section.hz * period < 0.5:
@@ -108,12 +108,12 @@ def digital(sections: Sequence[Section], period: float) -> np.ndarray:
     return np.array([section.digital(period) for section in sections])
 
 
-def _low_pass(order: int, hz: float) -> tuple[Section, ...]:
+def _low_pass(order: int, hz: float) -> tuple[BiquadSection, ...]:
     pairs = [
-        Section(hz, (0.0, 0.0, 1.0), (1.0, 2 * np.sin(np.pi * (2 * k + 1) / (2 * order)), 1.0))
+        BiquadSection(hz, (0.0, 0.0, 1.0), (1.0, 2 * np.sin(np.pi * (2 * k + 1) / (2 * order)), 1.0))
         for k in range(order // 2)
     ]
-    return (*pairs, *([Section(hz, (0.0, 0.0, 1.0), (0.0, 1.0, 1.0))] if order % 2 else []))
+    return (*pairs, *([BiquadSection(hz, (0.0, 0.0, 1.0), (0.0, 1.0, 1.0))] if order % 2 else []))
 
 
 def _frequency(name: str, value: float) -> float:

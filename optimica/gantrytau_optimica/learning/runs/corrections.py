@@ -6,7 +6,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.kinematics import Kinematics
-from gantrytau_optimica.learning.runs.plant import forward_speed
+from gantrytau_optimica.learning.runs.robot_runs import forward_speed
 
 AXES = "xyz"
 OVER = 1e-9  # m or rad beyond limits that rounding may bring
@@ -15,21 +15,16 @@ OVER = 1e-9  # m or rad beyond limits that rounding may bring
 class Corrections:
     """Corrections of all joints, or of some axes of the tool: how they become references.
 
-    joints: whether of joints; axes: columns of the tool that are corrected, all if None.
+    joints: whether of joints; moving: axes of the tool that are corrected otherwise.
     """
 
-    def __init__(self, kinematics: Kinematics, joints: bool, axes: Sequence[int] | None = None):
+    def __init__(self, kinematics: Kinematics, joints: bool, moving: Sequence[int]):
         self.kinematics = kinematics
         self.joints = joints
-        width = len(kinematics.joints) if joints else 3
-        self.picked = tuple(range(width)) if joints or axes is None else tuple(axes)
-        if (
-            len(set(self.picked)) != len(self.picked)
-            or not set(self.picked) <= set(range(width))
-            or not self.picked
-        ):
+        self.picked = tuple(range(len(kinematics.joints))) if joints else tuple(moving)
+        if not self.picked:
             raise ModelError(
-                f"learn: found axes={axes!r}, expected some of 0, 1 and 2, for x, y and z", argument="axes"
+                "learn: found a reference that rests, expected one that moves", argument="reference"
             )
 
     @property

@@ -25,10 +25,11 @@ class History:
     """Runs of a learning robot: K + 1 of them, N samples, n joints, m corrections.
 
     reference: of the tool; names: what is corrected, joints or axes of the tool; columns: these of the tool, none for
-    joints; full: the samples (N,) by which errors are judged, (7.25); inputs: corrections (K + 1, N, m); q_ref, q: references and
-    measured positions of the joints (K + 1, N, n); tool: measured (K + 1, N, 3), of the kinematics where nothing else
-    measures it; estimates, wanted: of what is learnt from, (K + 1, N, m) and (N, m); next_input: corrections (N, m) of the
-    run that would follow; settings: words of what learnt; stability: foretold, None of a history that was read.
+    joints; full: the samples (N,) by which errors are judged, (7.25); inputs: corrections (K + 1, N, m); q_ref, q:
+    references and measured positions of the joints (K + 1, N, n); tool: measured (K + 1, N, 3), of the kinematics where
+    nothing else measures it; estimates, wanted: of what is learnt from, (K + 1, N, m) and (N, m); next_input: corrections
+    (N, m) of the run that would follow; settings: words of what learnt; stability: foretold, None of a history that was
+    read.
     """
 
     reference: Reference
@@ -53,9 +54,17 @@ class History:
         return f"<History: {len(self)} runs of {', '.join(self.names)}>"
 
     def __str__(self) -> str:
-        from gantrytau_optimica.learning.runs.history_words import words
-
-        return words(self)
+        tool = list(self.reference.moving)
+        heads = [*self.names, *(f"tool {'xyz'[k]}" for k in tool)]
+        width = max(8, *(len(head) + 2 for head in heads))
+        lines = [repr(self)[1:-1]]
+        if self.stability is not None:
+            lines.append(str(self.stability))
+        lines.append("errors in % of the first run")
+        lines.append("run " + "".join(f"{head:>{width}}" for head in heads))
+        table = np.hstack([self.relative, self.tool_relative[:, tool]])
+        lines += [f"{k:3d} " + "".join(f"{value:{width}.2f}" for value in row) for k, row in enumerate(table)]
+        return "\n".join(lines)
 
     @property
     def input(self) -> np.ndarray:
@@ -93,7 +102,7 @@ class History:
     def tool_relative(self) -> np.ndarray:
         """The same of the measured tool, (K + 1, 3); NaN of axes in which it does not move."""
         found = self._relative(self.tool_error)
-        found[:, np.ptp(self.reference.r, axis=0) == 0] = np.nan
+        found[:, [k for k in range(3) if k not in self.reference.moving]] = np.nan
         return found
 
     def _relative(self, error: Any) -> np.ndarray:
@@ -111,7 +120,7 @@ class History:
         return draw(self, what, file)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write all runs to a file (.npz), from which `load` and `learn(..., resume=)` go on; it appears whole."""
+        """Write all runs to a file (.npz), from which `learn(..., history=)` goes on; it appears whole."""
         path = _npz(path)
         about = dict(
             format=FORMAT,

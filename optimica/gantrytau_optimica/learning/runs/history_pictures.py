@@ -2,23 +2,45 @@
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.results.figures import check_suffix, finished
+from gantrytau_optimica.learning.runs.reference import Reference
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gantrytau_optimica.learning.runs.history import History
-
 MILLI = 1e3
 
 
-def draw(history: "History", what: str, file: str | os.PathLike[str] | None) -> "Figure":
+class Runs(Protocol):
+    """What pictures need of a history."""
+
+    reference: Reference
+    names: tuple[str, ...]
+    columns: tuple[int, ...]
+    full: np.ndarray
+    inputs: np.ndarray
+    tool: np.ndarray
+
+    @property
+    def relative(self) -> np.ndarray: ...
+
+    @property
+    def tool_relative(self) -> np.ndarray: ...
+
+    def error(self, k: int = -1) -> np.ndarray: ...
+
+    def tool_error(self, k: int = -1) -> np.ndarray: ...
+
+    def __len__(self) -> int: ...
+
+
+def draw(history: Runs, what: str, file: str | os.PathLike[str] | None) -> "Figure":
     """One of PICTURES. Raises ModelError for another."""
     if what not in PICTURES:
         raise ModelError(
@@ -30,9 +52,7 @@ def draw(history: "History", what: str, file: str | os.PathLike[str] | None) -> 
     return finished(PICTURES[what](history), file)
 
 
-def plot_learning(
-    histories: Mapping[str, "History"], *, file: str | os.PathLike[str] | None = None
-) -> "Figure":
+def plot_learning(histories: Mapping[str, Runs], *, file: str | os.PathLike[str] | None = None) -> "Figure":
     """Errors of the measured tool over runs, by axis, of several ways to learn: Dressler (2012), Figures 7.16 to 7.18."""
     import matplotlib.pyplot as plt
 
@@ -40,7 +60,7 @@ def plot_learning(
         raise ModelError("plot_learning: found no histories, expected one at least, by name")
     if file is not None:
         check_suffix(file)
-    moved = [k for k in range(3) if any(np.isfinite(h.tool_relative[0, k]) for h in histories.values())]
+    moved = sorted({k for h in histories.values() for k in h.reference.moving})
     figure, axes = plt.subplots(
         1, len(moved), figsize=(4.2 * len(moved), 3.4), layout="constrained", squeeze=False
     )
@@ -53,14 +73,14 @@ def plot_learning(
     return finished(figure, file)
 
 
-def _errors(history: "History") -> "Figure":
+def _errors(history: Runs) -> "Figure":
     import matplotlib.pyplot as plt
 
     figure, axis = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
     for name, values in zip(history.names, history.relative.T, strict=True):
         axis.plot(values, "o-", label=name)
-    for k in range(3):
-        if (not history.columns or k not in history.columns) and np.isfinite(history.tool_relative[0, k]):
+    for k in history.reference.moving:
+        if k not in history.columns:
             axis.plot(history.tool_relative[:, k], "s--", mfc="none", label=f"tool {'xyz'[k]}")
     axis.set(xlabel="run", ylabel="error [% of the first run]", ylim=(0, None))
     axis.xaxis.get_major_locator().set_params(integer=True)
@@ -68,7 +88,7 @@ def _errors(history: "History") -> "Figure":
     return figure
 
 
-def _over_time(history: "History", rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
+def _over_time(history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
     """An axis for each of rows, with lines over time in mm; what is applied in full is shaded."""
     import matplotlib.pyplot as plt
 
@@ -87,11 +107,11 @@ def _over_time(history: "History", rows: list[tuple[str, list[tuple[str, np.ndar
     return figure
 
 
-def _ends(history: "History") -> list[int]:
+def _ends(history: Runs) -> list[int]:
     return sorted({0, len(history) - 1})
 
 
-def _error(history: "History") -> "Figure":
+def _error(history: Runs) -> "Figure":
     return _over_time(
         history,
         [
@@ -101,7 +121,7 @@ def _error(history: "History") -> "Figure":
     )
 
 
-def _input(history: "History") -> "Figure":
+def _input(history: Runs) -> "Figure":
     shown = sorted({min(1, len(history) - 1), len(history) - 1})
     return _over_time(
         history,
@@ -112,18 +132,17 @@ def _input(history: "History") -> "Figure":
     )
 
 
-def _tool(history: "History") -> "Figure":
-    moved = [k for k in range(3) if np.ptp(history.reference.r[:, k]) > 0]
+def _tool(history: Runs) -> "Figure":
     return _over_time(
         history,
         [
             (f"tool {'xyz'[i]}", [(f"run {k}", history.tool_error(k)[:, i]) for k in _ends(history)])
-            for i in moved
+            for i in history.reference.moving
         ],
     )
 
 
-def _path(history: "History") -> "Figure":
+def _path(history: Runs) -> "Figure":
     import matplotlib.pyplot as plt
 
     first, second = np.sort(np.argsort(-np.ptp(history.reference.r, axis=0), kind="stable")[:2])

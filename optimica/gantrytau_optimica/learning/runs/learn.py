@@ -4,7 +4,6 @@ Dressler (2012), chapter 7; Arimoto, Kawamura, Miyazaki (1984); Norrloef, Gunnar
 """
 
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +15,10 @@ from gantrytau_optimica.learning.estimators.estimators import Actuators, Measure
 from gantrytau_optimica.learning.laws.learning import Learning, Stability
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, period_of
 from gantrytau_optimica.learning.runs.corrections import Corrections
+from gantrytau_optimica.learning.runs.estimated_response import estimated_response
 from gantrytau_optimica.learning.runs.history import ROWS, History
-from gantrytau_optimica.learning.runs.measured_response import measure_response
-from gantrytau_optimica.learning.runs.plant import Plant
 from gantrytau_optimica.learning.runs.reference import Reference
+from gantrytau_optimica.learning.runs.robot_runs import Plant
 
 RUNS = 100  # seeds apart, so that no two runs of a trial draw the same
 SAME = 1e-9  # of a period, or m, by which references may differ
@@ -41,48 +40,48 @@ def learn(
     *,
     iterations: int = 10,
     seed: int = 0,
-    axes: Sequence[int] | None = None,
     response: Response | None = None,
     force: bool = False,
-    resume: History | None = None,
-    file: str | os.PathLike[str] | None = None,
+    history: History | str | os.PathLike[str] | None = None,
 ) -> History:
-    """Run a reference, learn from the error, and run it again: `iterations` times after the first run.
+    """Run a reference, learn from the error, and run it again: runs 0 to `iterations`.
 
-    rig: a `Rig` or any `Plant`; estimator: what is learnt from, by default the actuators, each for itself; those of the tool
-    correct its reference in `axes`, by default those in which it moves. response: from corrections to the estimate; by
-    default it is measured first with a binary sequence (24 s of the robot's time at 4 ms), which also gives laws without a
-    model theirs. It says whether learning converges: what diverges is refused unless force. resume: a history to go on
-    from; file: where the history is written after each run (.npz). Run k draws with the seed 100 seed + k.
+    rig: a `Rig` or any `Plant`; estimator: what is learnt from, by default the actuators, each for itself; others correct
+    the reference of the tool along the axes in which it moves. response: from corrections to the estimate; by default it is
+    measured first with a binary sequence (24 s of the robot's time at 4 ms), which also gives laws without a model theirs.
+    It says whether learning converges: what diverges is refused unless force. history: runs to go on from, or a file (.npz)
+    that is written after each run, and gone on from where it exists. Run k draws with the seed 100 seed + k.
     Raises ModelError for arguments that do not fit, LearningError for learning that would diverge, and for a run that
     fails, with all that was finished in `.history`.
     """
     learning = Learning() if learning is None else learning
     estimator = Actuators() if estimator is None else estimator
-    _check(rig, reference, iterations, seed, resume)
-    path = None if file is None else Path(file)
-    moving = np.flatnonzero(np.ptp(reference.r, axis=0) > 0) if axes is None else np.asarray(axes)
-    corrections = Corrections(rig.kinematics, estimator.joints, None if estimator.joints else moving.tolist())
+    corrections = Corrections(rig.kinematics, estimator.joints, reference.moving)
+    so_far, path = _kept(history)
+    _check(rig, reference, iterations, seed)
     learning.window.weights(len(reference), reference.period)
+    found = so_far or _started(rig, reference, learning, estimator, corrections)
+    _check_history(found, reference, corrections)
     if response is None:
-        response = measure_response(rig, reference.r[0], estimator, axes=corrections.picked, seed=RUNS * seed)
+        response = estimated_response(rig, reference, estimator, seed=RUNS * seed)
     learning = learning.with_response(response)
     stability = judged(learning, response, len(reference), corrections.count, rig.period)
     if not (force or stability.stable):
         raise LearningError(f"learn: {stability}; force=True runs it all the same", argument="learning")
-    found = _started(rig, reference, learning, estimator, corrections) if resume is None else resume
     found = replace(found, stability=stability)
-    if found.names != corrections.names:
-        raise ModelError(
-            f"learn: found a history of {', '.join(found.names)} and an estimator of {', '.join(corrections.names)}, "
-            "expected the same corrections; start without resume",
-            argument="resume",
-        )
-    for k in range(len(found), len(found) + iterations + (resume is None)):
+    for k in range(len(found), iterations + 1):
         found = _next_run(rig, found, learning, estimator, corrections, RUNS * seed + k)
         if path is not None:
             found.save(path)
     return found
+
+
+def _kept(history: History | str | os.PathLike[str] | None) -> tuple[History | None, Path | None]:
+    """The runs to go on from, and the file in which they are kept."""
+    if history is None or isinstance(history, History):
+        return history, None
+    path = Path(history)
+    return (History.load(path) if path.exists() else None), path
 
 
 def judged(learning: Learning, response: Response, samples: int, count: int, period: float) -> Stability:
@@ -101,7 +100,7 @@ def judged(learning: Learning, response: Response, samples: int, count: int, per
     return learning.stability(response, samples)
 
 
-def _check(rig: Plant, reference: Reference, iterations: int, seed: int, resume: History | None) -> None:
+def _check(rig: Plant, reference: Reference, iterations: int, seed: int) -> None:
     for name, value in (("iterations", iterations), ("seed", seed)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
             raise ModelError(
@@ -113,14 +112,21 @@ def _check(rig: Plant, reference: Reference, iterations: int, seed: int, resume:
             "again",
             argument="reference",
         )
-    if resume is None:
-        return
-    old = resume.reference
+
+
+def _check_history(history: History, reference: Reference, corrections: Corrections) -> None:
+    old = history.reference
     if len(old) != len(reference) or np.abs(old.r - reference.r).max() > SAME:
         raise ModelError(
             "learn: found a reference that is not the one of the history, expected the same, as corrections belong to it; "
-            "start without resume",
+            "start without history",
             argument="reference",
+        )
+    if history.names != corrections.names:
+        raise ModelError(
+            f"learn: found a history of {', '.join(history.names)} and an estimator of {', '.join(corrections.names)}, "
+            "expected the same corrections; start without history",
+            argument="history",
         )
 
 

@@ -56,6 +56,11 @@ class Reference:
         """Distance of samples in s."""
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
+    @property
+    def moving(self) -> tuple[int, ...]:
+        """Axes in which it moves, of 0, 1 and 2."""
+        return tuple(int(k) for k in np.flatnonzero(np.ptp(self.r, axis=0) > STILL))
+
     def __len__(self) -> int:
         return len(self.t)
 

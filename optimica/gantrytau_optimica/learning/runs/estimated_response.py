@@ -11,7 +11,8 @@ from gantrytau_optimica.identification.systems.identify_system import Identified
 from gantrytau_optimica.learning.estimators.estimator import Estimator
 from gantrytau_optimica.learning.laws.lifted import pulses, toeplitz_blocks
 from gantrytau_optimica.learning.runs.corrections import Corrections
-from gantrytau_optimica.learning.runs.plant import Plant
+from gantrytau_optimica.learning.runs.reference import Reference
+from gantrytau_optimica.learning.runs.robot_runs import Plant
 
 SAMPLES = 6000  # of the experiment
 HELD = 5  # samples, for which the sequence keeps its value
@@ -70,24 +71,22 @@ class EstimatedResponse:
         return self.estimator.combine(signals, self.period)[:, list(self.picked)]
 
 
-def measure_response(
+def estimated_response(
     plant: Plant,
-    place: np.ndarray,
+    reference: Reference,
     estimator: Estimator,
     *,
-    axes: Sequence[int] | None = None,
     amplitude: float = 1e-3,
     order: int | None = None,
     seed: int = 0,
 ) -> EstimatedResponse:
-    """Excite corrections of a plant at rest with pseudo-random binary sequences, and identify what an estimator sees.
+    """Excite a plant at rest with pseudo-random binary corrections, and identify what an estimator sees of them.
 
-    place: of the tool (3,) in m; axes: those of the tool that are corrected, all if None, or joints; amplitude: m. Half of
-    the samples identifies a system of this order, or of the one of several that foretells the other half best. Raises
+    reference: where it begins, and the axes of the tool in which it moves, which are corrected; amplitude: m. Half of the
+    samples identifies a system of this order, or of the one of several that foretells the other half best. Raises
     ModelError where the estimate does not follow the corrections.
     """
-    place = np.asarray(place, dtype=float)
-    corrections = Corrections(plant.kinematics, estimator.joints, axes)
+    corrections = Corrections(plant.kinematics, estimator.joints, reference.moving)
     held = HELD * plant.period
     shift = (2**REGISTER - 1) // corrections.count
     u = np.column_stack(
@@ -99,7 +98,7 @@ def measure_response(
         ]
     )
     u = np.vstack([np.zeros((REST, u.shape[1])), u])
-    r = np.tile(place, (len(u), 1))
+    r = np.tile(reference.r[0], (len(u), 1))
     run = plant.run(*corrections.references(r, u, plant.period), seed=seed)
     signals = estimator.signals(run, plant.kinematics)
     widths = {letter: x.shape[1] for letter, x in signals.items()}
@@ -130,7 +129,7 @@ def _foretelling(
     if best is None or best[0] < FAIR:
         found = f"{best[0]:.0f} % of what is measured foretold" if best else "no system that comes to rest"
         raise ModelError(
-            f"measure_response: found {found}, expected {FAIR:.0f} % at least; take a larger amplitude, or name a "
+            f"estimated_response: found {found}, expected {FAIR:.0f} % at least; take a larger amplitude, or name a "
             f"response{words}",
             argument="response",
         )
@@ -150,7 +149,7 @@ def dead_time(u: np.ndarray, y: np.ndarray) -> int:
     begun = np.flatnonzero(sure)
     if not begun.size:
         raise ModelError(
-            f"measure_response: found nothing in what is measured that follows corrections within {LAGS} samples; take a "
+            f"estimated_response: found nothing in what is measured that follows corrections within {LAGS} samples; take a "
             "larger amplitude, or look at the sensors"
         )
     return int(begun[0])

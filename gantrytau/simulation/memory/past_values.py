@@ -22,7 +22,7 @@ JUMP = 1e-9  # of the largest value, that a delayed value changes at one time
 LEAST = 1e-9  # of the shortest delay: intervals are laid no closer
 
 
-class History:
+class PastValues:
     """The history of all delays of a run. Rows of the trail hold six coefficients for each, in the time behind the place."""
 
     def __init__(self, coordinates: Coordinates, trail: Trail, tolerance: float):
