@@ -61,6 +61,7 @@ from gantrytau_optimica.identification.spectra.measured_response import Measured
 from gantrytau_optimica.identification.spectra.resonances import resonances
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
 from gantrytau_optimica.learning.estimators.estimators import Actuators, Complementary, Kinematic, Measured
+from gantrytau_optimica.learning.estimators.kalman import Kalman
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
@@ -129,6 +130,7 @@ __all__ = [
     "Identification",
     "IdentificationError",
     "IdentifiedSystem",
+    "Kalman",
     "Kinematic",
     "LaserTracker",
     "Learning",

@@ -13,10 +13,14 @@ import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.kinematics import Kinematics
+from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 
 SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measured.r"}
 MOVED = 1e-9  # m or rad, from which a reference has left its first position
 FEW = 25  # samples of rest, below which sensors cannot be set to zero
+SLOW = 3.0  # Hz, below which arms hardly bend
+MOVING = 0.03  # m/s2, rms of slow accelerations by which an accelerometer can be judged
+LIKE = 3.0  # times more or less than kinematics, by which slow accelerations may be read
 
 
 class Estimator:
@@ -37,14 +41,13 @@ class Estimator:
         """Positions (N, n) of the actuators, or (N, 3) of the tool, in m, by what was measured in a run from rest.
 
         Sensors are set to zero at rest, where arms do not bend. Raises ModelError for a run without the sensors that are
-        read, and for one that does not rest long enough.
+        read, for one that does not rest long enough, and for an accelerometer that reads along another axis.
         """
         means, signals = self._deviations(run, kinematics)
         letter = "q" if self.joints else "z"
         still = at_rest(run)
         base = means[letter] if letter in means else self._signal(letter, run, kinematics)[still].mean(axis=0)
-        period = float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
-        return base + self.combine(signals, period)
+        return base + self.combine(signals, sampling_period(run))
 
     def signals(self, run: Result, kinematics: Kinematics) -> dict[str, np.ndarray]:
         """Deviations from rest (N, n) of what is read, by letter; raises as `estimate` does."""
@@ -63,7 +66,10 @@ class Estimator:
                 argument="reference",
             )
         means = {letter: np.mean(x[still], axis=0) for letter, x in signals.items()}
-        return means, {letter: x - means[letter] for letter, x in signals.items()}
+        found = {letter: x - means[letter] for letter, x in signals.items()}
+        if {"z", "a"} <= set(found):
+            _check_accelerometer(type(self).__name__, found["z"], found["a"], sampling_period(run))
+        return means, found
 
     def _signal(self, letter: str, run: Result, kinematics: Kinematics) -> np.ndarray:
         name = SENSORS[letter]
@@ -83,3 +89,24 @@ def at_rest(run: Result) -> np.ndarray:
     q_ref = np.asarray(run["q_ref"])
     moved = np.flatnonzero(np.abs(q_ref - q_ref[0]).max(axis=1) > MOVED)
     return np.arange(moved[0] if moved.size else len(q_ref))
+
+
+def sampling_period(run: Result) -> float:
+    """Distance of the samples of a run in s."""
+    return float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
+
+
+def _check_accelerometer(place: str, z: np.ndarray, a: np.ndarray, period: float) -> None:
+    """ModelError for accelerations a (N, 3) in m/s2 that are not, slowly, those of kinematics z (N, 3) in m."""
+    slow = ZeroPhase.butterworth(2, SLOW)
+    expected, read = (slow.apply(x, period) for x in (np.diff(z, 2, axis=0) / period**2, a[1:-1]))
+    for i, axis in enumerate("xyz"):
+        square = np.mean(expected[:, i] ** 2)
+        gain = np.mean(expected[:, i] * read[:, i]) / square if square > MOVING**2 else 1.0
+        if not 1 / LIKE < gain < LIKE:
+            raise ModelError(
+                f"{place}: found measured.a that reads {gain:.2g} times what kinematics accelerates in {axis} below "
+                f"{SLOW:g} Hz, expected about once; give accelerations resolved in the world, in m/s2, with the sign of "
+                "the motion",
+                argument="run",
+            )

@@ -72,17 +72,17 @@ class Measured(Estimator):
 
 
 def complementary(z: np.ndarray, a: np.ndarray, low: ZeroPhase, period: float) -> np.ndarray:
-    """G z + (1 - G) / s^2 a as one filter over frequencies, zero at rest; z (N, ...), a (N, ...) without bias.
+    """G z + (1 - G) / s^2 a as one filter over frequencies; z (N, ...) in m, a (N, ...) in m/s2 without bias, from rest.
 
-    The record is continued evenly at both ends, so that nothing wraps around.
+    The record is continued evenly before its beginning, where it rests, and reflected in its last point, as speeds are the
+    same behind it as before: it is a sum of cosines (2 k + 1) pi t / (2 T) about that point, T its length, none constant.
     """
-    count = len(z)
-    hz = np.fft.rfftfreq(2 * count - 2, period)
+    from scipy.fft import dct, idct
+
+    count = len(z) - 1
+    hz = (2 * np.arange(count) + 1) / (4 * count * period)
     gain = low.magnitude(hz, period)[0]
-    w = 2 * np.pi * hz
-    # exact for samples: second differences are divided by those of an oscillation
-    square = np.where(w > 0, (2 - 2 * np.cos(w * period)) / period**2, 1.0)
-    rest = np.where(w > 0, (gain - 1) / square, 0.0)
     over = (slice(None), *[None] * (z.ndim - 1))
-    spectra = [np.fft.rfft(np.concatenate([x, x[-2:0:-1]]), axis=0) for x in (z, a)]
-    return np.fft.irfft(gain[over] * spectra[0] + rest[over] * spectra[1], 2 * count - 2, axis=0)[:count]
+    kinematic, integrated = gain[over], ((gain - 1) / (2 * np.pi * hz) ** 2)[over]
+    spectrum = kinematic * dct(z[:-1] - z[-1], type=3, axis=0) + integrated * dct(a[:-1], type=3, axis=0)
+    return np.concatenate([idct(spectrum, type=3, axis=0) + z[-1], z[-1:]])
