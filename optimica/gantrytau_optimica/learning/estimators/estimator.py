@@ -16,7 +16,7 @@ from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 
 SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measured.r"}
-MOVED = 1e-9  # m or rad, from which a reference has left its first position
+MOVED = 1e-3  # of the motion, from which a reference has left its first position; corrections begin before it does
 FEW = 25  # samples of rest, below which sensors cannot be set to zero
 SLOW = 3.0  # Hz, below which arms hardly bend
 MOVING = 0.03  # m/s2, rms of slow accelerations by which an accelerometer can be judged
@@ -62,7 +62,8 @@ class Estimator:
         if len(still) < FEW and set(self.reads) & {"a", "r"}:
             raise ModelError(
                 f"{type(self).__name__}: found {len(still)} samples of rest before the motion, expected {FEW} at least, by "
-                "which sensors are set to zero; begin the reference with rest",
+                "which sensors are set to zero; begin the reference with rest, or the "
+                "window of learning later",
                 argument="reference",
             )
         means = {letter: np.mean(x[still], axis=0) for letter, x in signals.items()}
@@ -87,7 +88,8 @@ class Estimator:
 def at_rest(run: Result) -> np.ndarray:
     """Rows before references leave their first values, (K,)."""
     q_ref = np.asarray(run["q_ref"])
-    moved = np.flatnonzero(np.abs(q_ref - q_ref[0]).max(axis=1) > MOVED)
+    away = np.abs(q_ref - q_ref[0]).max(axis=1)
+    moved = np.flatnonzero(away > MOVED * away.max())
     return np.arange(moved[0] if moved.size else len(q_ref))
 
 

@@ -26,6 +26,9 @@ from gantrytau_optimica.learning.laws.lifted import (
     spectral_radius,
 )
 
+RUNS = 10  # after which growth is judged
+GROWN = 10.0  # times, from which learning is said to diverge: a path that is learnt is far from the worst
+
 
 @dataclass(frozen=True, eq=False)
 class Stability:
@@ -46,7 +49,7 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Corrections come to an end, perhaps after growing at first."""
+        """Corrections come to an end, perhaps after growing for many runs."""
         return self.monotone or self.rho < 1
 
     @property
@@ -54,14 +57,25 @@ class Stability:
         """Corrections come nearer to their end with each run."""
         return self.sigma < 1
 
+    @cached_property
+    def growth(self) -> float:
+        """Times as far from their end as at first corrections can be after ten runs, the norm of M^10."""
+        return max(norm(np.linalg.matrix_power(part, RUNS)) for part in self.parts)
+
+    @property
+    def diverges(self) -> bool:
+        """Errors grow from run to run: for ever, or over more runs than anyone waits for."""
+        return not self.monotone and (self.growth > GROWN or not self.stable)
+
     def __str__(self) -> str:
         alone = ", ".join(f"{s:.3f}" for s in self.diagonal)
+        remedy = "lower the cut-off of q, or notch it at the resonances"
         if self.monotone:
             words = f"monotone: each run leaves at most {self.sigma:.0%} of the way to where learning ends"
-        elif self.stable:
-            words = "stable, but corrections may grow before they converge; lower the cut-off of q"
+        elif self.diverges:
+            words = f"diverges: after {RUNS} runs up to {self.growth:.3g} times as far from where learning ends; {remedy}"
         else:
-            words = "unstable: corrections grow from run to run; lower the cut-off of q, or notch it at the resonances"
+            words = f"converges, but not in each run: after {RUNS} at most {self.growth:.3g} of the way is left; {remedy}"
         return f"sigma {self.sigma:.4f} (axes alone {alone}): {words}"
 
 

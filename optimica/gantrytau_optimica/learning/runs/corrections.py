@@ -22,7 +22,7 @@ class Corrections:
         self.kinematics = kinematics
         self.joints = joints
         self.picked = tuple(range(len(kinematics.joints))) if joints else tuple(moving)
-        if not self.picked:
+        if not moving:
             raise ModelError(
                 "learn: found a reference that rests, expected one that moves", argument="reference"
             )

@@ -18,57 +18,67 @@ SAMPLES = 6000  # of the experiment
 HELD = 5  # samples, for which the sequence keeps its value
 REGISTER = 10  # bits: a period of 1023 values
 REST = 100  # samples before, by which sensors are set to zero
-LAGS = 40  # samples, within which an answer begins
+LAGS = 60  # samples, within which an answer begins
+OWN = 20  # samples of its past that explain an output
+SMALL = 1e-3  # of the largest part of an answer, below which it has not begun
 SURE = 6.0  # deviations, from which it has begun
-ORDERS = (6, 8, 10, 12, 14)  # that are tried
+ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 14)  # that are tried
 FAIR = 50.0  # % of what is measured, that a response must foretell
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What an estimator makes of all that it reads. widths: columns by letter; picked: those of the estimate that count."""
+
+    estimator: Estimator
+    widths: dict[str, int]
+    picked: tuple[int, ...]
+    period: float
+
+    def of(self, answers: np.ndarray) -> np.ndarray:
+        """Estimates (N, m, ...) of answers (N, p, ...), letter by letter."""
+        edges = np.cumsum(list(self.widths.values()))[:-1]
+        signals = dict(zip(self.widths, np.split(answers, edges, axis=1), strict=True))
+        return self.estimator.combine(signals, self.period)[:, list(self.picked)]
 
 
 @dataclass(frozen=True, eq=False)
 class EstimatedResponse:
     """From corrections (N, m) to what is learnt from, F_u + F_y T_uy of Dressler (2012), (7.15).
 
-    system: identified, from corrections to all that the estimator reads, `delay` samples early; widths: columns of each
-    letter that it reads; picked: columns of the estimate that are learnt; fit: of the half that did not identify it, in %.
+    system: from corrections to all that the estimator reads, `delay` samples early; fit: of the estimate in the half of the
+    samples that did not identify it, (m,) in %.
     """
 
     system: IdentifiedSystem
     delay: int
-    estimator: Estimator
-    widths: dict[str, int]
-    picked: tuple[int, ...]
+    seen: Seen
     fit: np.ndarray
 
     @property
     def period(self) -> float:
         """The sampling period in s."""
-        return float(self.system.period or 0.0)
+        return self.seen.period
 
     @property
     def axes(self) -> int:
         """How many corrections there are."""
-        return len(self.picked)
+        return len(self.seen.picked)
 
     def lifted(self, samples: int) -> np.ndarray:
         """T (m N, m N), axis by axis."""
         h = np.zeros((samples, len(self.system.outputs), self.axes))
         h[self.delay :] = pulses(self.system, samples - self.delay)
         columns = toeplitz_blocks(h).reshape(h.shape[1], samples, -1).transpose(1, 0, 2)
-        return self._estimated(columns).transpose(1, 0, 2).reshape(self.axes * samples, -1)
+        return self.seen.of(columns).transpose(1, 0, 2).reshape(self.axes * samples, -1)
 
     def response(self, hz: np.ndarray, samples: int = 1250) -> np.ndarray:
-        """Frequency response (K, m, m) at hz (K,): of a correction in the middle of a run, as estimators look ahead."""
+        """Frequency response (m, m, K) at hz (K,): of a correction in the middle of a run, as estimators look ahead."""
         h = np.zeros((2 * samples, len(self.system.outputs), self.axes))
         h[samples + self.delay :] = pulses(self.system, samples - self.delay)
-        found = self._estimated(h)
+        found = self.seen.of(h)
         t = self.period * np.arange(-samples, samples)
-        return np.tensordot(np.exp(-2j * np.pi * np.outer(hz, t)), found, axes=1)
-
-    def _estimated(self, answers: np.ndarray) -> np.ndarray:
-        """What the estimator makes of answers (N, p, K) of all that it reads, (N, m, K)."""
-        edges = np.cumsum(list(self.widths.values()))[:-1]
-        signals = dict(zip(self.widths, np.split(answers, edges, axis=1), strict=True))
-        return self.estimator.combine(signals, self.period)[:, list(self.picked)]
+        return np.moveaxis(np.tensordot(np.exp(-2j * np.pi * np.outer(hz, t)), found, axes=1), 0, -1)
 
 
 def estimated_response(
@@ -106,30 +116,33 @@ def estimated_response(
     u, y = u[REST:], y[REST:]
     delay = dead_time(u, y)
     u, y = u[: len(u) - delay], y[delay:]
-    system, fit = _foretelling(u, y, (order,) if order else ORDERS, plant.period)
-    return EstimatedResponse(system, delay, estimator, widths, corrections.picked, fit)
+    seen = Seen(estimator, widths, corrections.picked, plant.period)
+    system, fit = _foretelling(seen, u, y, (order,) if order else ORDERS)
+    return EstimatedResponse(system, delay, seen, fit)
 
 
 def _foretelling(
-    u: np.ndarray, y: np.ndarray, orders: Sequence[int], period: float
+    seen: Seen, u: np.ndarray, y: np.ndarray, orders: Sequence[int]
 ) -> tuple[IdentifiedSystem, np.ndarray]:
-    """The system by the first half that foretells the second best, and how well, (p,) in %."""
+    """The system by the first half of samples that foretells the estimate in the second best, and how well, (m,) in %."""
     half = len(u) // 2
-    best: tuple[float, IdentifiedSystem, np.ndarray] | None = None
-    words = ""
+    estimate = seen.of(y[half:] - y[half:].mean(axis=0))
+    size = np.linalg.norm(estimate - estimate.mean(axis=0), axis=0)
+    found, words = list[tuple[float, IdentifiedSystem, np.ndarray]](), ""
     for order in orders:
         try:
-            system = identify_system(u[:half], y[:half], order=order, period=period)
+            system = identify_system(u[:half], y[:half], order=order, period=seen.period)
         except IdentificationError as error:
             words = f"; {error}"
             continue
-        fit = system.fit(u[half:], y[half:])
-        if best is None or fit.min() > best[0]:
-            best = float(fit.min()), system, fit
+        left = seen.of(y[half:] - system.follow(u[half:], y[half:]))
+        fit = 100 * (1 - np.linalg.norm(left, axis=0) / size)
+        found.append((float(fit.min()), system, fit))
+    best = max(found, key=lambda each: each[0], default=None)
     if best is None or best[0] < FAIR:
-        found = f"{best[0]:.0f} % of what is measured foretold" if best else "no system that comes to rest"
+        there = f"{best[0]:.0f} % of the estimate foretold" if best else "no system that comes to rest"
         raise ModelError(
-            f"estimated_response: found {found}, expected {FAIR:.0f} % at least; take a larger amplitude, or name a "
+            f"estimated_response: found {there}, expected {FAIR:.0f} % at least; take a larger amplitude, or name a "
             f"response{words}",
             argument="response",
         )
@@ -137,19 +150,34 @@ def _foretelling(
 
 
 def dead_time(u: np.ndarray, y: np.ndarray) -> int:
-    """Samples after which outputs y (N, p) begin to answer to inputs u (N, m), by least squares of short pulse responses."""
-    lagged = np.hstack([np.roll(u, k, axis=0) for k in range(LAGS)])[LAGS:]
-    wanted = y[LAGS:] - y[LAGS:].mean(axis=0)
-    lagged = lagged - lagged.mean(axis=0)
-    found, *_ = np.linalg.lstsq(lagged, wanted, rcond=None)
-    left = wanted - lagged @ found
-    inverse = np.diag(np.linalg.inv(lagged.T @ lagged))
-    deviation = np.sqrt(inverse[:, None] * (left**2).mean(axis=0))
-    sure = (np.abs(found) > SURE * deviation).reshape(LAGS, u.shape[1], -1).any(axis=(1, 2))
-    begun = np.flatnonzero(sure)
-    if not begun.size:
-        raise ModelError(
-            f"estimated_response: found nothing in what is measured that follows corrections within {LAGS} samples; take a "
-            "larger amplitude, or look at the sensors"
+    """Samples after which outputs y (N, p) begin to answer to inputs u (N, m).
+
+    By least squares of y(t) = sum a_i y(t - i) + sum b_j u(t - j) for each output: what is answered early cannot hide behind
+    motion that rings for long, as its own past explains that.
+    """
+    forced = _lags(u, range(LAGS))
+    least = LAGS
+    for output in y.T:
+        free = _lags(output[:, None], range(1, OWN + 1))
+        regressors = np.hstack([forced, free, np.ones((len(free), 1))])
+        sizes = np.maximum(np.linalg.norm(regressors, axis=0), np.finfo(float).tiny)
+        _, R = np.linalg.qr(np.column_stack([regressors / sizes, output[LAGS:]]))
+        found, *_ = np.linalg.lstsq(R[:-1, :-1], R[:-1, -1])
+        inverse = np.linalg.pinv(R[:-1, :-1])
+        deviation = np.linalg.norm(inverse, axis=1) * abs(R[-1, -1]) / np.sqrt(len(regressors) - len(found))
+        answers = np.abs(found[: forced.shape[1]]).reshape(LAGS, -1)
+        sure = answers > np.maximum(
+            SURE * deviation[: forced.shape[1]].reshape(LAGS, -1), SMALL * answers.max()
         )
-    return int(begun[0])
+        least = min(least, int(np.argmax(sure.any(axis=1))) if sure.any() else LAGS)
+    if least == LAGS:
+        raise ModelError(
+            "estimated_response: found nothing in what is measured that follows corrections; take a larger amplitude, or "
+            "look at the sensors"
+        )
+    return least
+
+
+def _lags(x: np.ndarray, lags: range) -> np.ndarray:
+    """Rows from LAGS on of signals (N, m), each so many samples later."""
+    return np.hstack([x[LAGS - k : len(x) - k] for k in lags])

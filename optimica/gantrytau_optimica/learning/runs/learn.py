@@ -66,7 +66,7 @@ def learn(
         response = estimated_response(rig, reference, estimator, seed=RUNS * seed)
     learning = learning.with_response(response)
     stability = judged(learning, response, len(reference), corrections.count, rig.period)
-    if not (force or stability.stable):
+    if stability.diverges and not force:
         raise LearningError(f"learn: {stability}; force=True runs it all the same", argument="learning")
     found = replace(found, stability=stability)
     for k in range(len(found), iterations + 1):
@@ -159,11 +159,13 @@ def _next_run(
         run = rig.run(q_ref, v_ref, seed=seed)
         estimate = estimator.estimate(run, rig.kinematics)[:, list(corrections.picked)]
         following = learning.next(u, so_far.wanted - estimate, rig.period)
-    except GantryTauError as error:
+    except (GantryTauError, KeyboardInterrupt) as error:
+        pressed = isinstance(error, KeyboardInterrupt)
         raise LearningError(
-            f"learn: run {k} failed, the {k} before it stand in .history: {error}",
+            f"learn: run {k} {'was interrupted' if pressed else 'failed'}, the {k} before it stand in .history"
+            + ("" if pressed else f": {error}"),
             history=so_far if k else None,
-            argument=error.argument,
+            argument=None if pressed else error.argument,
         ) from error
     found = so_far.with_run(
         inputs=u,
