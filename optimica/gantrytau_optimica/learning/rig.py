@@ -17,7 +17,7 @@ from gantrytau_optimica.learning.servo_loop import servo_loop
 TOLERANCE = 1e-3  # of a run: leaves 40 nm at a gauge and 1 mm/s2, far below the noise of devices
 KEPT = 8  # places to start from, each with equations made ready
 SHOWN = ("tool.r", "tool.v", "gauge.r", "accelerometer.a", "frame.s")  # what of it a robot has
-READ = {"r": ("gauge.r", "tool.r"), "a": ("accelerometer.a",)}  # the first of these that a robot has
+SEEN = ("gauge.r", "tool.r")  # the first of these that a robot has is what gauges read
 
 
 class Rig:
@@ -74,9 +74,10 @@ class Rig:
         of `push`, a force (N, 3) in N on the tool, resolved in the world, as of a hammer. The result
         has N rows, at these times: joints, forces and friction by their names in the robot, `tool.r`, `gauge.r` and
         `accelerometer.a` where it has them, `q_ref` and `v_ref`; readings with noise are `measured.q`, `measured.r` (of
-        the gauge, else of the tool) and `measured.a`. Equal seeds draw the same friction and noise: take another for each
-        run. Raises ModelError for references of another shape or not finite, InitializationError where the robot cannot
-        rest at the first, SolveError where the simulation stops.
+        the gauge, else of the tool) and `measured.a`, the mean over a period around each sample: forces that change with
+        the clock shake a robot at multiples of it, which single values would take for slow motion. Equal seeds draw the
+        same friction and noise: take another for each run. Raises ModelError for references of another shape or not
+        finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation stops.
         """
         q_ref = self._reference("position", position)
         v_ref = np.zeros_like(q_ref) if velocity is None else self._reference("velocity", velocity)
@@ -101,17 +102,20 @@ class Rig:
         inputs = {name: Samples(t[: len(u)], u, kind="constant") for name, u in series.items()}
         found = simulate(
             loop,
-            stop=t[-1],
+            stop=t[-1] + self.period / 2,
             inputs=inputs,
-            outputs=[*(f"robot.{name}" for name in self._shown), "q_ref", "v_ref"],
+            outputs=[*(f"robot.{name}" for name in self._shown), "q_ref", "v_ref", *self._sensed],
             tolerance=TOLERANCE,
-            points=len(t),
+            points=2 * len(t),
         )
         # where references jump, the row behind
         rows = np.searchsorted(found.time, t + 1e-6 * self.period, side="right") - 1
-        values = {name.removeprefix("robot."): found[name][rows] for name in found.names}
-        units = {name.removeprefix("robot."): found.unit(name) for name in found.names}
-        return self._with_readings(t, values, units, random)
+        names = [name for name in found.names if not name.startswith("gained")]
+        values = {name.removeprefix("robot."): found[name][rows] for name in names}
+        units = {name.removeprefix("robot."): found.unit(name) for name in names}
+        ends = np.searchsorted(found.time, t + (0.5 + 1e-6) * self.period, side="right") - 1
+        sensed = [np.diff(found[name][ends], axis=0, prepend=0.0) / self.period for name in self._sensed]
+        return self._with_readings(t, values, units, sensed, random)
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -152,6 +156,10 @@ class Rig:
         if bad.size:
             raise ModelError(f"Rig.run: row {bad[0]} of {word} is not finite, expected numbers")
         return found
+
+    @cached_property
+    def _sensed(self) -> tuple[str, ...]:
+        return tuple(name for name in ("gained",) if name in self.loop.vectors)
 
     @cached_property
     def _shown(self) -> tuple[str, ...]:
@@ -212,13 +220,15 @@ class Rig:
         t: np.ndarray,
         values: dict[str, np.ndarray],
         units: dict[str, str],
+        sensed: list[np.ndarray],
         random: np.random.Generator,
     ) -> Result:
         true = {"q": np.column_stack([values[joint] for joint in self.joints])}
-        for letter, places in READ.items():
-            place = next((name for name in places if name in self._shown), None)
-            if place is not None:
-                true[letter] = np.column_stack([values[f"{place}[{k}]"] for k in range(3)])
+        place = next((name for name in SEEN if name in self._shown), None)
+        if place is not None:
+            true["r"] = np.column_stack([values[f"{place}[{k}]"] for k in range(3)])
+        if sensed:
+            true["a"] = sensed[0]
         deviations = {"q": self.noise.encoder, "r": self.noise.gauge, "a": self.noise.accelerometer}
         for letter, exact in true.items():
             read = exact + deviations[letter] * random.standard_normal(exact.shape)

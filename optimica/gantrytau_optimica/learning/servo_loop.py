@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from gantrytau import Array, Input, Model, ModelError, connect
+from gantrytau import Array, Input, Model, ModelError, Real, connect, der
 from gantrytau.mechanics.multibody import WorldForce
 
 PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
@@ -13,28 +13,12 @@ PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
 def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]) -> Model:
     """The model `robot` with `controllers`, driven by the references q_ref (n,) and v_ref (n,) of its joints.
 
-    Where the robot has a `tool` with a frame, a force `push.f` acts on it.
+    Where the robot has a `tool` with a frame, a force `push.f` acts on it; where it has an `accelerometer`, `gained` is
+    the integral of what it senses.
     Raises ModelError for controllers that are not one for each joint, with the ports q_ref, v_ref, q, v, f_ff and f.
     """
+    _check(controllers, joints)
     n = len(joints)
-    if not isinstance(controllers, Sequence):
-        raise ModelError(f"Rig: found controllers={controllers!r}, expected a list, one for each joint")
-    if len(controllers) != n:
-        raise ModelError(
-            f"Rig: found {len(controllers)} controllers, expected one for each joint: {', '.join(joints)}"
-        )
-    for k, one in enumerate(controllers):
-        missing = [port for port in PORTS if not isinstance(one, Model) or port not in type(one).members()]
-        if missing:
-            raise ModelError(
-                f"Rig: controllers[{k}]: found {one!r} without {', '.join(missing)}, expected a component such as "
-                f"CartServo with {', '.join(PORTS)}"
-            )
-    turning = [joint for joint in joints if not joint.endswith(".s")]
-    if turning:
-        raise ModelError(
-            f"Rig: found the joints {', '.join(turning)} that turn, expected joints that move, x.s"
-        )
     one_each, struck = list(controllers), tool_frame(model)
 
     class ServoLoop(Model):
@@ -64,7 +48,48 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
             yield from super().equations()
             yield connect(self.push.frame_b, _member(self.robot, struck or ""))
 
-    return PushedLoop() if struck else ServoLoop()
+    loop: Any = PushedLoop if struck else ServoLoop
+
+    class SensedLoop(loop):
+        """The same with an accelerometer that is read."""
+
+        gained = Real(
+            3, unit="m/s", start=0.0, fixed=True, description="integral of what is sensed, from rest"
+        )
+
+        def equations(self):
+            yield from super().equations()
+            yield der(self.gained) == self.robot.accelerometer.a
+
+    return SensedLoop() if senses(model) else loop()
+
+
+def senses(model: Model) -> bool:
+    """Whether a robot has an accelerometer."""
+    sensor = type(model).members().get("accelerometer")
+    return isinstance(sensor, Model) and "a" in type(sensor).members()
+
+
+def _check(controllers: Sequence[Model], joints: Sequence[str]) -> None:
+    n = len(joints)
+    if not isinstance(controllers, Sequence):
+        raise ModelError(f"Rig: found controllers={controllers!r}, expected a list, one for each joint")
+    if len(controllers) != n:
+        raise ModelError(
+            f"Rig: found {len(controllers)} controllers, expected one for each joint: {', '.join(joints)}"
+        )
+    for k, one in enumerate(controllers):
+        missing = [port for port in PORTS if not isinstance(one, Model) or port not in type(one).members()]
+        if missing:
+            raise ModelError(
+                f"Rig: controllers[{k}]: found {one!r} without {', '.join(missing)}, expected a component such as "
+                f"CartServo with {', '.join(PORTS)}"
+            )
+    turning = [joint for joint in joints if not joint.endswith(".s")]
+    if turning:
+        raise ModelError(
+            f"Rig: found the joints {', '.join(turning)} that turn, expected joints that move, x.s"
+        )
 
 
 def tool_frame(model: Model) -> str | None:

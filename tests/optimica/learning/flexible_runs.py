@@ -3,6 +3,8 @@
 At `PLACE` with `WRIST` kg the modes of held carts are the 7.4, 10.5 and 11.5 Hz of Table 6.4, within 0.3 Hz.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from gantrytau import Result, prbs
@@ -16,9 +18,19 @@ PERIOD = 0.004
 PLACE, WRIST = np.array([0.9, 3.2, -0.4]), 24.2
 
 
-def flexible_rig(friction: type[Friction] | None = PreslidingFriction, noise: Scatter | None = None) -> Rig:
-    """The robot near `PLACE`, its servos tuned there."""
-    robot = FlexibleGantryTau(RECORD, friction=friction, plate_mass=WRIST)
+def flexible_rig(
+    friction: type[Friction] | None = PreslidingFriction,
+    noise: Scatter | None = None,
+    *,
+    stiffness: float = 1.0,
+) -> Rig:
+    """The robot near `PLACE`, its servos tuned there; stiffness: of arms and feet, relative."""
+    record = replace(
+        RECORD,
+        arm_stiffness=tuple(stiffness * c for c in RECORD.arm_stiffness),
+        frame_stiffness=stiffness * RECORD.frame_stiffness,
+    )
+    robot = FlexibleGantryTau(record, friction=friction, plate_mass=WRIST)
     return Rig(robot, cart_servos(RECORD, r=PLACE), period=PERIOD, noise=noise)
 
 

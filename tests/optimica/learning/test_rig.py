@@ -35,6 +35,11 @@ def rubbed() -> Rig:
 
 
 @pytest.fixture(scope="module")
+def quiet() -> Rig:
+    return new_rig(PreslidingFriction, QUIET)
+
+
+@pytest.fixture(scope="module")
 def start(rubbed) -> np.ndarray:
     return np.array([rubbed.robot.start[f"arms[{k}].rail.s"] for k in range(3)])
 
@@ -50,14 +55,15 @@ def steps(rig, start, seed, rows=300) -> list[StepResponse]:
     return found
 
 
-def test_it_rests_where_friction_holds_it(start):
-    rig = new_rig(PreslidingFriction, QUIET)
-    still = rig.run(np.tile(start + 0.05, (100, 1)), seed=3)
-    for name in ("tool.r", "gauge.r", "frame.s", *rig.joints):
+def test_it_rests_where_friction_holds_it(quiet, start):
+    still = quiet.run(np.tile(start + 0.05, (100, 1)), seed=3)
+    for name in ("tool.r", "gauge.r", "frame.s", *quiet.joints):
         assert np.ptp(still[name], axis=0) == pytest.approx(
             0, abs=1e-9
         )  # m: a thousandth of an encoder's noise
-    assert still["measured.q"] == pytest.approx(np.column_stack([still[name] for name in rig.joints]), abs=0)
+    assert still["measured.q"] == pytest.approx(
+        np.column_stack([still[name] for name in quiet.joints]), abs=0
+    )
     friction = np.array([still.final(f"carts[{k}].friction") for k in range(3)])
     assert np.all(np.abs(friction) < 0.6 * 1.1 * np.array(RECORD.coulomb))
     assert np.all(np.abs(friction) > 1.0)  # N: drawn, not zero
@@ -111,6 +117,19 @@ def test_friction_of_other_runs_is_repeated_to_a_tenth_of_the_error(rubbed, star
     assert np.std(error) > 3 * np.std(
         first["q_ref"][:, 0] - first["carts[0].s"]
     )  # what the speed fed forward is for
+
+
+def test_accelerations_are_those_of_the_motion_although_servos_shake_with_the_clock(quiet, start):
+    """Means over a period lead to second differences of positions; single values have the ripple of 250 Hz at one phase."""
+    t = 0.004 * np.arange(400)
+    rise = np.clip((t - 0.2) / 0.22, 0, 1)
+    reference = start + 0.01 * (rise - np.sin(2 * np.pi * rise) / (2 * np.pi))[:, None]
+    run = quiet.run(reference, np.diff(reference, axis=0, append=reference[-1:]) / 0.004)
+    second = np.diff(run["tool.r"], 2, axis=0) / 0.004**2
+    read, single = run["measured.a"][1:-1], run["accelerometer.a"][1:-1]
+    # the difference of means over one period and over two is 1/24 of what changes between
+    assert np.std(read - second, axis=0).max() < 2e-3 * np.std(second, axis=0).max()
+    assert np.std(single - second, axis=0).max() > 2e-2 * np.std(second, axis=0).max()
 
 
 def test_readings_have_the_noise_of_their_devices(rubbed, start):

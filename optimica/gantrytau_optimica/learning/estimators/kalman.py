@@ -143,11 +143,12 @@ def balanced(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[np.ndarray, n
 
     Moore (1981): Gramians are equal and diagonal, their elements the Hankel singular values.
     """
-    from scipy.linalg import solve_discrete_lyapunov
+    from scipy.linalg import matrix_balance, solve_discrete_lyapunov
 
-    for _ in range(
-        2
-    ):  # Gramians of coordinates of unlike sizes are lost to rounding, and better in what they give
+    _, units = matrix_balance(A, permute=False)
+    A, B, C = np.linalg.solve(units, A @ units), np.linalg.solve(units, B), C @ units
+    # Gramians of states of unlike sizes are lost to rounding; a second pass finds like ones
+    for _ in range(2):
         driven, seen = (_root(solve_discrete_lyapunov(*pair)) for pair in ((A, B @ B.T), (A.T, C.T @ C)))
         U, hankel, V = np.linalg.svd(seen.T @ driven)
         kept = hankel > UNSEEN * hankel.max(initial=0.0)

@@ -20,8 +20,7 @@ def moved(rows: int = 900) -> tuple[np.ndarray, np.ndarray]:
 
 def test_sensors_are_set_to_zero_where_the_robot_rests():
     z, a = moved()
-    offsets = dict(a=a + np.array([0.3, -0.2, 9.81]), r=z + np.array([0.1, 0.0, -5.0]))
-    run = run_of(KINEMATICS, z, **offsets)
+    run = run_of(KINEMATICS, z, a=a + np.array([0.3, -0.2, 9.81]), r=z + np.array([0.1, 0.0, -5.0]))
     for estimator in (Kinematic(), Complementary(), Measured()):
         found = estimator.estimate(run, KINEMATICS)
         # a bias is not seen, and jerk that jumps is not in the samples
