@@ -60,6 +60,7 @@ from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
 from gantrytau_optimica.identification.spectra.resonances import resonances
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
+from gantrytau_optimica.learning.estimators.estimate_pictures import plot_estimates
 from gantrytau_optimica.learning.estimators.estimators import Actuators, Complementary, Kinematic, Measured
 from gantrytau_optimica.learning.estimators.kalman import Kalman
 from gantrytau_optimica.learning.filters.tukey import Tukey
@@ -211,6 +212,7 @@ __all__ = [
     "physical_form",
     "plan_calibration",
     "plan_cell",
+    "plot_estimates",
     "plot_learning",
     "predict",
     "predict_late",

@@ -31,7 +31,7 @@ UNSEEN = 1e-6  # of the largest Hankel singular value, below which a state is no
 SLOWER = 1e-12  # less than 1, that the size of poles of the filter may be
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Kalman(Estimator):
     """A model of the arms from kinematics to the tool, with an accelerometer by a stationary Kalman filter.
 
@@ -56,6 +56,10 @@ class Kalman(Estimator):
                 argument="r",
             )
         _ = self._correction  # refused here, if at all
+
+    def __repr__(self) -> str:
+        noise = np.round(np.sqrt(np.diag(_covariance(self.noise, len(self.system.C)))), 3).tolist()
+        return f"<Kalman: {self.system.title}, r={self.r:g} m2, noise={noise} m/s2>"
 
     def combine(self, signals: Mapping[str, np.ndarray], period: float) -> np.ndarray:
         z, a = (np.asarray(signals[letter], dtype=float) for letter in self.reads)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_optimica import Actuators, Complementary, Kinematic, Measured
+from gantrytau_optimica import Actuators, Complementary, Kinematic, Measured, plot_estimates
 from tests.optimica.learning.estimators.analytic_runs import PERIOD, PLACE, l1_kinematics, run_of, swung_ramp
 
 KINEMATICS = l1_kinematics()
@@ -79,3 +79,36 @@ def test_accelerometers_along_other_axes_are_refused(read, words):
         Complementary().estimate(run_of(KINEMATICS, z, a=read(a)), KINEMATICS)
     # where it hardly accelerates nothing can be told, and little is lost
     Complementary().estimate(run_of(KINEMATICS, 0.01 * z, a=read(0.01 * a)), KINEMATICS)
+
+
+def test_figure_shows_axes_that_moved_and_what_estimates_lack():
+    z, a = moved()
+    z, a = z * [1.0, 1.0, 0.01], a * [1.0, 1.0, 0.01]
+    bent = z + 1e-4 * np.sin(10.0 * np.clip(PERIOD * np.arange(len(z)) - 1.0, 0.0, np.inf))[:, None]
+    run = run_of(KINEMATICS, z, a=a, r=bent)
+    figure = plot_estimates(run, {"stiff": Kinematic(), "gauge": Measured()}, KINEMATICS)
+    above, below = figure.axes[:2], figure.axes[2:]
+    assert [axis.get_title() for axis in above] == ["tool x", "tool y"]
+    for k, axis in enumerate(below):
+        stiff, gauge = (np.asarray(line.get_ydata(), dtype=float) for line in axis.lines)
+        np.testing.assert_allclose(stiff, 1e6 * (z - bent)[:, k], atol=1e-2)  # um
+        assert np.abs(gauge).max() < 1e-9
+        legend = axis.get_legend()
+        assert legend is not None
+        words = [text.get_text() for text in legend.get_texts()]
+        assert words[1] == "gauge, 0 um"
+        assert words[0].startswith("stiff, 7")  # 100 um / sqrt(2), about
+
+
+@pytest.mark.parametrize(
+    ("estimators", "words"),
+    [
+        ({}, "plot_estimates: found no estimators"),
+        ({"carts": Actuators()}, r"found carts that is Actuators\(\), expected an estimator of the tool"),
+        ({"none": None}, "found none that is None, expected an estimator of the tool"),
+    ],
+)
+def test_what_is_no_estimate_of_the_tool_is_not_drawn(estimators, words):
+    z, _ = moved()
+    with pytest.raises(ModelError, match=words):
+        plot_estimates(run_of(KINEMATICS, z, r=z), estimators, KINEMATICS)

@@ -169,6 +169,7 @@ def test_runs_tell_where_the_tool_is_and_the_noise():
     # a deviation is known to 1 / sqrt(2 N) = 2 % of itself
     np.testing.assert_allclose(np.sqrt(np.diag(told.noise)), [0.05, 0.1, 0.2], rtol=0.06)
     assert told.r == plain.r
+    assert "r=1e-14 m2, noise=[0.05" in repr(told)
     assert told.system is plain.system
     with pytest.raises(ModelError, match=r"Kalman: found a run with measured\.q, expected measured\.a"):
         plain.estimate(run_of(kinematics, z), kinematics)
