@@ -18,6 +18,7 @@ from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measured.r"}
 MOVED = 1e-3  # of the motion, from which a reference has left its first position; corrections begin before it does
 FEW = 25  # samples of rest, below which sensors cannot be set to zero
+EVEN = 0.01  # of the period, by which times may be off
 SLOW = 3.0  # Hz, below which arms hardly bend
 MOVING = 0.03  # m/s2, rms of slow accelerations by which an accelerometer can be judged
 LIKE = 3.0  # times more or less than kinematics, by which slow accelerations may be read
@@ -82,7 +83,20 @@ class Estimator:
                 argument="estimator",
             )
         found = np.asarray(run[name])
-        return kinematics.fk(found)[0] if letter == "z" else found
+        found = kinematics.fk(found)[0] if letter == "z" else found
+        bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
+        if bad.size:
+            words = (
+                f"that puts the tool out of reach at {run.time[bad[0]]:g} s"
+                if letter == "z"
+                else "that is not finite"
+            )
+            raise ModelError(
+                f"{type(self).__name__}: found {name} {words} in {len(bad)} of {len(found)} rows, first {bad[0]}, expected "
+                "numbers throughout; run it again, or repair these rows",
+                argument="run",
+            )
+        return found
 
 
 def at_rest(run: Result) -> np.ndarray:
@@ -94,8 +108,16 @@ def at_rest(run: Result) -> np.ndarray:
 
 
 def sampling_period(run: Result) -> float:
-    """Distance of the samples of a run in s."""
-    return float((run.time[-1] - run.time[0]) / (len(run.time) - 1))
+    """Distance of the samples of a run in s. Raises ModelError for uneven ones, as a record has that lost some."""
+    steps = np.diff(run.time)
+    odd = np.flatnonzero(~(np.abs(steps - np.median(steps)) <= EVEN * np.median(steps)))
+    if odd.size:
+        raise ModelError(
+            f"Estimator: found {steps[odd[0]]:.4g} s after row {odd[0]} of a run and {np.median(steps):.4g} s elsewhere, "
+            "expected one period throughout; run it again, or put what is missing in between",
+            argument="run",
+        )
+    return float((run.time[-1] - run.time[0]) / len(steps))
 
 
 def _check_accelerometer(place: str, z: np.ndarray, a: np.ndarray, period: float) -> None:

@@ -39,16 +39,19 @@ class Kinematic(Estimator):
 class Complementary(Estimator):
     """Kinematics at low frequencies, an accelerometer twice integrated at high ones; hz: where they meet, by axis.
 
-    The last of hz serves the axes behind it. Raises ModelError for what is no frequency.
+    One of hz, or the last of several, serves the axes behind it. Raises ModelError for what is no frequency.
     """
 
-    hz: Sequence[float] = (4.50, 2.63)
+    hz: float | Sequence[float] = (4.50, 2.63)
     order: int = 2
     reads = ("z", "a")
 
     def __post_init__(self):
-        if not len(self.hz):
-            raise ModelError("Complementary: found no hz, expected one frequency at least, in Hz")
+        if not 1 <= np.size(self.hz) <= 3:
+            raise ModelError(
+                f"Complementary: found hz={self.hz!r}, expected a frequency in Hz, or one for each of x, y and z",
+                argument="hz",
+            )
         ZeroPhase.butterworth(self.order, self.hz)
 
     def combine(self, signals: Mapping[str, np.ndarray], period: float) -> np.ndarray:
@@ -56,7 +59,7 @@ class Complementary(Estimator):
         low = ZeroPhase.butterworth(self.order, self.hz)
         found = np.empty_like(z)
         for i in range(z.shape[1]):
-            own = ZeroPhase((low.axes[min(i, len(self.hz) - 1)],))
+            own = ZeroPhase((low.axes[min(i, len(low.axes) - 1)],))
             found[:, i] = complementary(z[:, i], a[:, i], own, period)
         return found
 

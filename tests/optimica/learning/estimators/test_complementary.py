@@ -95,6 +95,7 @@ def test_superposition_and_many_responses():
         for j in range(4):
             one = estimator.combine({"z": z[..., i, j], "a": a[..., i, j]}, PERIOD)
             np.testing.assert_allclose(many[..., i, j], one, atol=1e-12)
+    np.testing.assert_array_equal(Complementary(4.5).combine({"z": z, "a": a}, PERIOD)[:, 0], many[:, 0])
     weighted = estimator.combine(
         {"z": 2 * z[..., 0] - 3 * z[..., 1], "a": 2 * a[..., 0] - 3 * a[..., 1]}, PERIOD
     )
@@ -110,7 +111,9 @@ def test_two_rows_are_a_record():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: Complementary(()), "found no hz, expected one frequency at least"),
+        (lambda: Complementary(()), r"found hz=\(\), expected a frequency in Hz, or one for each of x, y and z"),
+        (lambda: Complementary((1.0, 2.0, 3.0, 4.0)), "or one for each of x, y and z"),
+        (lambda: Complementary(-1.0), "expected a frequency above zero"),
         (lambda: Complementary((0.0,)), r"found hz=.*0\.0.*, expected a frequency above zero"),
         (lambda: combined(np.zeros(9), np.zeros(9), hz=200.0), "200 Hz beside samples every 0.004 s"),
     ],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Result
 from gantrytau_optimica import Actuators, Complementary, Kinematic, Measured, plot_estimates
 from tests.optimica.learning.estimators.analytic_runs import PERIOD, PLACE, l1_kinematics, run_of, swung_ramp
 
@@ -79,6 +79,24 @@ def test_accelerometers_along_other_axes_are_refused(read, words):
         Complementary().estimate(run_of(KINEMATICS, z, a=read(a)), KINEMATICS)
     # where it hardly accelerates nothing can be told, and little is lost
     Complementary().estimate(run_of(KINEMATICS, 0.01 * z, a=read(0.01 * a)), KINEMATICS)
+
+
+def test_records_with_holes_are_refused():
+    z, a = moved()
+    broken = a.copy()
+    broken[[17, 500], 1] = np.nan
+    with pytest.raises(ModelError, match=r"found measured\.a that is not finite in 2 of 900 rows, first 17"):
+        Complementary().estimate(run_of(KINEMATICS, z, a=broken), KINEMATICS)
+    run = run_of(KINEMATICS, z, a=a)
+    kept = np.delete(np.arange(900), 333)
+    lost = Result(run.time[kept], {name: run[name][kept] for name in run.names})
+    with pytest.raises(ModelError, match=r"found 0\.008 s after row 332 of a run and 0\.004 s elsewhere"):
+        Complementary().estimate(lost, KINEMATICS)
+    away = {name: run[name] + 50.0 * (name == "measured.q[0]") for name in run.names}
+    with pytest.raises(
+        ModelError, match=r"measured\.q that puts the tool out of reach at 0 s in 900 of 900 rows"
+    ):
+        Kinematic().estimate(Result(run.time, away), KINEMATICS)
 
 
 def test_figure_shows_axes_that_moved_and_what_estimates_lack():
