@@ -60,6 +60,9 @@ from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
 from gantrytau_optimica.identification.spectra.resonances import resonances
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
+from gantrytau_optimica.learning.design.design_q import design_q
+from gantrytau_optimica.learning.design.q_pictures import plot_q
+from gantrytau_optimica.learning.design.uncertain_modes import uncertain
 from gantrytau_optimica.learning.estimators.estimate_pictures import plot_estimates
 from gantrytau_optimica.learning.estimators.estimators import Actuators, Complementary, Kinematic, Measured
 from gantrytau_optimica.learning.estimators.kalman import Kalman
@@ -178,6 +181,7 @@ __all__ = [
     "compare_records",
     "cross_validate",
     "design_excitation",
+    "design_q",
     "enough_poses",
     "error_map",
     "estimate",
@@ -214,6 +218,7 @@ __all__ = [
     "plan_cell",
     "plot_estimates",
     "plot_learning",
+    "plot_q",
     "predict",
     "predict_late",
     "prepare",
@@ -232,6 +237,7 @@ __all__ = [
     "stereo_cameras",
     "sum_of_squares",
     "told_by_tool",
+    "uncertain",
     "write_record",
     "write_report",
 ]

@@ -32,6 +32,7 @@ class Liftable(Protocol):
 
 
 Response = LinearSystem | Sequence[LinearSystem] | Liftable  # of all axes, or of each alone
+CLOSE = 1e-5  # of its square, to which the largest singular value is found
 FEW = 300  # rows, up to which all singular values are found
 
 
@@ -115,7 +116,7 @@ def norm(matrix: np.ndarray) -> float:
         return float(np.linalg.norm(matrix, 2)) if matrix.size else 0.0
     try:
         start = np.random.default_rng(0).standard_normal(min(matrix.shape))
-        return float(svds(matrix, k=1, v0=start, return_singular_vectors=False)[0])
+        return float(svds(matrix, k=1, v0=start, tol=CLOSE, return_singular_vectors=False)[0])
     except ArpackError:
         return float(np.linalg.norm(matrix, 2))
 

@@ -1,0 +1,1 @@
+"""Filters of learning that hold for robots whose resonances are not known well."""
