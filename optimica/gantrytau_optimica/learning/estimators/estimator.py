@@ -19,9 +19,9 @@ SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measur
 MOVED = 1e-3  # of the motion, from which a reference has left its first position; corrections begin before it does
 FEW = 25  # samples of rest, below which sensors cannot be set to zero
 EVEN = 0.01  # of the period, by which times may be off
-SLOW = 3.0  # Hz, below which arms hardly bend
-MOVING = 0.03  # m/s2, rms of slow accelerations by which an accelerometer can be judged
-LIKE = 3.0  # times more or less than kinematics, by which slow accelerations may be read
+SLOW = 2.0  # Hz, below which arms hardly bend
+MOVING = 0.015  # m/s2, rms of slow accelerations by which an accelerometer can be judged
+LIKE = 2.0  # times more or less than kinematics, by which slow accelerations may be read
 
 
 class Estimator:

@@ -66,10 +66,11 @@ def test_runs_that_begin_in_motion_are_refused():
 @pytest.mark.parametrize(
     ("read", "words"),
     [
-        (lambda a: -a, "reads -1 times what kinematics accelerates in x below 3 Hz"),
+        (lambda a: -a, "reads -1 times what kinematics accelerates in x below 2 Hz"),
         (lambda a: a / 9.81, r"reads 0\.1 times what kinematics accelerates in x"),
         (lambda a: 1e3 * a, r"reads 1e\+03 times what kinematics accelerates in x"),
-        (lambda a: a * [1, -1, 1], "in y below 3 Hz, expected about once; give accelerations resolved in the world"),
+        (lambda a: a * [1, -1, 1], "in y below 2 Hz, expected about once; give accelerations resolved in the world"),
+        (lambda a: a * [1, 0.4, 1], r"reads 0\.4 times what kinematics accelerates in y"),
         (lambda a: a[:, [2, 1, 0]] * [0.1, 1, 1], "kinematics accelerates in x"),
     ],
 )  # fmt: skip
