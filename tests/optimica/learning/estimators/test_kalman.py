@@ -4,7 +4,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_discrete_are
 
 from gantrytau import ModelError, StateSpace
 from gantrytau_optimica import Kalman
@@ -75,6 +75,53 @@ def test_stationary_gain_is_where_the_recursion_ends():
         P = A @ (P - gain @ C @ P) @ A.T + R1
     for size in (1e-9, 1.0, 1e9):  # units do not matter
         np.testing.assert_allclose(stationary_gain(A, C, size * R1, size * R2), gain, rtol=1e-9)
+
+
+def printed(system, r, z, a):
+    """(7.21), (7.22) letter by letter, innovations of accelerations alone, with readings that are as late as its states."""
+    A, C = balanced(system.A, system.B, system.C)
+    seen, known = (
+        np.vstack([c @ np.linalg.matrix_power(m, k) for k in range(len(A))])
+        for m, c in ((A, C), (system.A, system.C))
+    )
+    B = np.linalg.lstsq(seen, known @ system.B, rcond=None)[0]
+    n, p, none = len(A), len(C), np.zeros
+    step = C @ (A - np.eye(n))
+    A_bar = np.block(
+        [
+            [A, none((n, 2 * p))],
+            [step / PERIOD, none((p, 2 * p))],
+            [step / PERIOD**2, -np.eye(p) / PERIOD, none((p, p))],
+        ]
+    )
+    B_bar = np.vstack([B, C @ B / PERIOD, C @ B / PERIOD**2])
+    C_y = np.hstack([none((p, n + p)), np.eye(p)])
+    # a state that is moved moves its differences
+    moved_by = np.vstack([np.eye(n), C / PERIOD, C / PERIOD**2])
+    R1, R2 = r * moved_by @ moved_by.T, NOISE**2 * np.eye(p)
+    units = np.concatenate([np.full(n + p, PERIOD), np.full(p, PERIOD**2)])  # so that rounding spares them
+    units[:n] = 1.0
+    P = solve_discrete_are(
+        (units[:, None] * A_bar / units).T, (C_y / units).T, units[:, None] * R1 * units, R2
+    )
+    P = P / np.outer(units, units)
+    gain = P @ C_y.T @ np.linalg.inv(C_y @ P @ C_y.T + R2)
+    x, found = np.zeros(n + 2 * p), []
+    for k in range(1, len(z) + 1):
+        x = A_bar @ x + B_bar @ z[k - 1]
+        x = x + gain @ (a[k - 1] - C_y @ x)
+        found.append(C @ x[:n] - PERIOD * x[n : n + p])  # the position one sample ago
+    return np.array(found)
+
+
+def test_it_is_the_printed_filter_with_readings_as_late_as_its_states():
+    z, off = motion(), springs(1.05)
+    a = moved(springs(), z)[1] + NOISE * np.random.default_rng(6).standard_normal(z.shape)
+    for r in (1e-13, 1e-11, 1e-9):
+        expected = printed(off, r, z, a)
+        found = Kalman(off, r).combine({"z": z, "a": a}, PERIOD)
+        assert np.abs(expected - off.simulate(z)).max() > 1e-5
+        np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
 def test_it_is_the_best_filter_for_noise_as_it_assumes():
