@@ -71,7 +71,7 @@ from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.rig import Rig
-from gantrytau_optimica.learning.runs.estimated_response import estimated_response
+from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
 from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.history_pictures import plot_learning
 from gantrytau_optimica.learning.runs.learn import LearningError, learn
@@ -172,6 +172,7 @@ __all__ = [
     "Way",
     "Wires",
     "ZeroPhase",
+    "arm_model",
     "at",
     "calibrate",
     "calibrated_geometry",

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau import ModelError, prbs
+from gantrytau import ModelError, Result, prbs
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
 from gantrytau_optimica.learning.estimators.estimator import Estimator
+from gantrytau_optimica.learning.estimators.estimators import Kinematic, Measured
 from gantrytau_optimica.learning.laws.lifted import pulses, toeplitz_blocks
 from gantrytau_optimica.learning.runs.corrections import Corrections
 from gantrytau_optimica.learning.runs.reference import Reference
@@ -97,19 +98,7 @@ def estimated_response(
     ModelError where the estimate does not follow the corrections.
     """
     corrections = Corrections(plant.kinematics, estimator.joints, reference.moving)
-    held = HELD * plant.period
-    shift = (2**REGISTER - 1) // corrections.count
-    u = np.column_stack(
-        [
-            prbs(REGISTER, held, amplitude, seed=5 + k * shift)
-            .values(plant.period * np.arange(SAMPLES))
-            .ravel()
-            for k in range(corrections.count)
-        ]
-    )
-    u = np.vstack([np.zeros((REST, u.shape[1])), u])
-    r = np.tile(reference.r[0], (len(u), 1))
-    run = plant.run(*corrections.references(r, u, plant.period), seed=seed)
+    u, run = excited(plant, reference.r[0], corrections, amplitude, seed)
     signals = estimator.signals(run, plant.kinematics)
     widths = {letter: x.shape[1] for letter, x in signals.items()}
     y = np.hstack(list(signals.values()))
@@ -119,6 +108,35 @@ def estimated_response(
     seen = Seen(estimator, widths, corrections.picked, plant.period)
     system, fit = _foretelling(seen, u, y, (order,) if order else ORDERS)
     return EstimatedResponse(system, delay, seen, fit)
+
+
+def excited(
+    plant: Plant, place: np.ndarray, corrections: Corrections, amplitude: float, seed: int
+) -> tuple[np.ndarray, Result]:
+    """Binary sequences (REST + SAMPLES, m), apart by parts of their period, and the run of a plant that they correct."""
+    held, apart = HELD * plant.period, (2**REGISTER - 1) // corrections.count
+    t = plant.period * np.arange(SAMPLES)
+    sequences = [
+        prbs(REGISTER, held, amplitude, seed=0).values(t + apart * k * held).ravel()
+        for k in range(corrections.count)
+    ]
+    u = np.vstack([np.zeros((REST, corrections.count)), np.column_stack(sequences)])
+    r = np.tile(place, (len(u), 1))
+    return u, plant.run(*corrections.references(r, u, plant.period), seed=seed)
+
+
+def arm_model(
+    plant: Plant, reference: Reference, *, order: int = 10, amplitude: float = 1e-3, seed: int = 0
+) -> IdentifiedSystem:
+    """How a tool moves about where stiff arms would hold it, from kinematics z_c to what gauges read, both (N, 3) in m.
+
+    The plant is excited at rest where the reference begins, along all axes: the model that `Kalman` goes by, (6.13). Raises
+    ModelError for a plant without gauges.
+    """
+    corrections = Corrections(plant.kinematics, False, (0, 1, 2))
+    _, run = excited(plant, reference.r[0], corrections, amplitude, seed)
+    z, r = (each.signals(run, plant.kinematics) for each in (Kinematic(), Measured()))
+    return identify_system(z["z"][REST:], r["r"][REST:], order=order, period=plant.period)
 
 
 def _foretelling(
