@@ -12,6 +12,7 @@ from gantrytau.commands.demo.demo_command import demo
 from gantrytau.commands.doctor_command import doctor
 from gantrytau.commands.equations_command import equations
 from gantrytau.commands.identify.identify_command import identify
+from gantrytau.commands.learn.learn_command import learn
 from gantrytau.commands.library_command import library
 from gantrytau.commands.optimize_command import optimize
 from gantrytau.commands.printing.reporting import Commands
@@ -20,7 +21,7 @@ from gantrytau.commands.study_command import study
 
 app = typer.Typer(
     cls=Commands,
-    help="Acausal models of parallel robots: simulate, optimise, calibrate, identify, export.",
+    help="Acausal models of parallel robots: simulate, optimise, calibrate, identify, learn, export.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_show_locals=False,
@@ -39,7 +40,7 @@ def options(
         bool, typer.Option("--version", help="Print the version.", callback=_tell, is_eager=True)
     ] = False,
 ) -> None:
-    """Acausal models of parallel robots: simulate, optimise, calibrate, identify, export."""
+    """Acausal models of parallel robots: simulate, optimise, calibrate, identify, learn, export."""
 
 
 app.command()(doctor)
@@ -56,6 +57,9 @@ app.command(
 )(calibrate)
 app.command(epilog="Example: gantrytau identify log.csv --robot 'GantryTau(L1)' --fixed link_masses=0")(
     identify
+)
+app.command(epilog="Example: gantrytau learn --example > rig.toml && gantrytau learn rig.toml --output learnt")(
+    learn
 )
 app.command(
     epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"

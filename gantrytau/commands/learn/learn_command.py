@@ -1,0 +1,108 @@
+"""`gantrytau learn`: a robot that learns a motion from run to run, in several ways, as a file describes them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gantrytau.commands.arguments.options import Json
+from gantrytau.commands.printing.reporting import CommandError, as_json, note, refusing, reporting
+from gantrytau.commands.printing.spelling import Spelling
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.learning.cases.learnt_cases import LearntCases
+
+PICTURES = ("errors", "input", "path")
+SPELLING = Spelling(
+    ("learn", "design_q", "estimated_response", "square_reference", "Tukey"),
+    {"iterations": "--iterations", "seed": "--seed", "history": "--output", "learning": "learning"},
+    exactly={"force=True runs it all the same": "--force runs it all the same"},
+)
+
+
+def learn(
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="The rig, as rig.toml; --example prints one.", show_default=False),
+    ] = None,
+    case: Annotated[
+        list[str] | None,
+        typer.Option("--case", metavar="NAME", help="Only this case; repeatable.", show_default=False),
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="The number of the last run.", show_default="as the file says")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Of what differs from run to run.", show_default="as the file says")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            help="Keep histories, corrections (CSV) and pictures there; the same command goes on with the rest.",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Learn what would diverge, too.")] = False,
+    example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
+    json: Json = False,
+) -> None:
+    """Learn a motion from run to run, and compare ways to learn it.
+
+    What corrections do is measured first; what would diverge is refused before the first run.
+    """
+    with reporting(json, None, SPELLING):
+        from gantrytau_optimica.learning.cases.learnt_cases import learn_cases
+        from gantrytau_optimica.learning.cases.rig_file import EXAMPLE, read_rig
+
+        if example:
+            typer.echo(EXAMPLE, nl=False)
+            return
+        if file is None:
+            raise CommandError(
+                "found no FILE, expected a rig and ways to learn: gantrytau learn --example > rig.toml"
+            )
+        with refusing():
+            rig = read_rig(file).changed(iterations=iterations, seed=seed, names=tuple(case or ()))
+        if output is not None:
+            output.mkdir(parents=True, exist_ok=True)
+        tell = None if json else lambda words: note(f"{words} ...")
+        found = learn_cases(rig, folder=output, force=force, progress=tell)
+        files = [] if output is None else kept(found, output)
+        if json:
+            typer.echo(as_json({**summary(found), "files": [str(path) for path in files]}))
+            return
+        for name, history in found.histories.items():
+            typer.echo(f"Case {name}. {history}\n")
+        typer.echo(str(found))
+        for path in files:
+            typer.echo(f"Written: {path}")
+
+
+def kept(found: "LearntCases", folder: Path) -> list[Path]:
+    """Corrections and pictures of all cases beside their histories, and the files."""
+    from gantrytau_optimica import plot_learning
+
+    files = []
+    for name, history in found.histories.items():
+        files += [folder / f"case-{name}.npz", history.save_corrections(folder / f"case-{name}-corrections.csv")]
+        for what in PICTURES:
+            history.plot(what, file=folder / f"case-{name}-{what}.png")
+            files.append(folder / f"case-{name}-{what}.png")
+    plot_learning(found.histories, file=folder / "cases.png")
+    return [*files, folder / "cases.png"]
+
+
+def summary(found: "LearntCases") -> dict[str, Any]:
+    """What was learnt as a record for programs: errors in % of the first run, run by run."""
+    cases = [
+        {
+            "name": name,
+            "learns": list(history.names),
+            "sigma": None if history.stability is None else history.stability.sigma,
+            "relative": history.relative.tolist(),
+            "tool": history.tool_relative[:, list(history.reference.moving)].tolist(),
+            "settled": found.settled(name)[list(history.reference.moving)].tolist(),
+        }
+        for name, history in found.histories.items()
+    ]
+    return {"cases": cases}

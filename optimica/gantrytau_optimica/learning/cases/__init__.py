@@ -1,0 +1,1 @@
+"""Ways to learn a motion, beside each other, as a file describes them."""

@@ -1,0 +1,97 @@
+"""Several ways to learn one motion, run one after the other: Dressler (2012), Table 7.2."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from gantrytau_optimica.learning.cases.rig_file import CaseOfFile, RigFile
+from gantrytau_optimica.learning.design.design_q import design_q
+from gantrytau_optimica.learning.estimators.estimator import Estimator
+from gantrytau_optimica.learning.estimators.estimators import Actuators, Complementary, Kinematic, Measured
+from gantrytau_optimica.learning.estimators.kalman import Kalman
+from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
+from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
+from gantrytau_optimica.learning.laws.learning import Learning
+from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
+from gantrytau_optimica.learning.runs.history import History
+from gantrytau_optimica.learning.runs.learn import RUNS, learn
+from gantrytau_optimica.learning.runs.robot_runs import Plant
+
+SETTLED = 5  # runs, after which errors are averaged in Table 7.2
+
+
+@dataclass(frozen=True)
+class LearntCases:
+    """Histories by the names of cases. As a text: sigma, and errors of the tool in % of the first run."""
+
+    histories: dict[str, History] = field(default_factory=dict)
+
+    def settled(self, name: str) -> np.ndarray:
+        """Errors of the tool, (3,) in % of the first run, in the mean from run 5 on, or of the last."""
+        relative = self.histories[name].tool_relative
+        return relative[min(SETTLED, len(relative) - 1) :].mean(axis=0)
+
+    def __str__(self) -> str:
+        width = max([4, *(len(name) for name in self.histories)])
+        axes = sorted({k for history in self.histories.values() for k in history.reference.moving})
+        lines = [f"{'case':<{width}}   sigma" + "".join(f"{f'tool {chr(120 + k)} [%]':>13}" for k in axes)]
+        for name, history in self.histories.items():
+            sigma = "      -" if history.stability is None else f"{history.stability.sigma:7.3f}"
+            lines.append(f"{name:<{width}} {sigma}" + "".join(f"{x:13.1f}" for x in self.settled(name)[axes]))
+        lines.append(f"Errors of the tool in % of the first run, in the mean from run {SETTLED} on.")
+        return "\n".join(lines)
+
+
+def learn_cases(
+    rig: RigFile,
+    *,
+    folder: Path | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> LearntCases:
+    """Learn the motion of a file in all its ways.
+
+    folder: where the history of each is kept, `case-NAME.npz`, and gone on from; force: learn what diverges, too; progress:
+    is told what begins. Raises what `learn` and `design_q` raise.
+    """
+    plant = rig.plant()
+    found: dict[str, History] = {}
+    for case in rig.cases:
+        if progress is not None:
+            progress(f"case {case.name}: what corrections do")
+        estimator = _estimator(case, plant, rig)
+        response = estimated_response(plant, rig.reference, estimator, seed=RUNS * rig.seed)
+        law = {"gradient": Gradient(), "norm-optimal": NormOptimal()}.get(case.law)
+        learning = Learning(case.gain, case.shift, window=rig.window, law=law)
+        if case.open_to is not None:
+            q = design_q(response, limit=case.open_to, learning=learning)
+        else:
+            q = ZeroPhase.butterworth(2, float(case.cut_off or 0.0))
+        if progress is not None:
+            progress(f"case {case.name}: {rig.iterations + 1} runs")
+        found[case.name] = learn(
+            plant,
+            rig.reference,
+            Learning(case.gain, case.shift, q=q, window=rig.window, law=law),
+            estimator,
+            iterations=rig.iterations,
+            seed=rig.seed,
+            response=response,
+            force=force,
+            history=None if folder is None else folder / f"case-{case.name}.npz",
+        )
+    return LearntCases(found)
+
+
+def _estimator(case: CaseOfFile, plant: Plant, rig: RigFile) -> Estimator:
+    kinds = {
+        "actuators": Actuators,
+        "kinematic": Kinematic,
+        "complementary": Complementary,
+        "measured": Measured,
+    }
+    if case.estimator == "kalman":
+        return Kalman(arm_model(plant, rig.reference, seed=RUNS * rig.seed))
+    return kinds[case.estimator]()
