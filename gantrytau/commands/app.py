@@ -58,9 +58,9 @@ app.command(
 app.command(epilog="Example: gantrytau identify log.csv --robot 'GantryTau(L1)' --fixed link_masses=0")(
     identify
 )
-app.command(epilog="Example: gantrytau learn --example > rig.toml && gantrytau learn rig.toml --output learnt")(
-    learn
-)
+app.command(
+    epilog="Example: gantrytau learn --example > rig.toml && gantrytau learn rig.toml --output learnt"
+)(learn)
 app.command(
     epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"
 )(optimize)

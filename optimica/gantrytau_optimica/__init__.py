@@ -60,6 +60,8 @@ from gantrytau_optimica.identification.servos.step_response import StepResponse
 from gantrytau_optimica.identification.spectra.measured_response import MeasuredResponse, measured_response
 from gantrytau_optimica.identification.spectra.resonances import resonances
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
+from gantrytau_optimica.learning.cases.learnt_cases import LearntCases, learn_cases
+from gantrytau_optimica.learning.cases.rig_file import RIG_EXAMPLE, read_rig
 from gantrytau_optimica.learning.design.design_q import design_q
 from gantrytau_optimica.learning.design.q_pictures import plot_q
 from gantrytau_optimica.learning.design.uncertain_modes import uncertain
@@ -107,6 +109,7 @@ from gantrytau_optimica.studies.trade_off import TradeOff
 
 __all__ = [
     "FURTHER_MODELS",
+    "RIG_EXAMPLE",
     "TABLE_6_3",
     "About",
     "Accelerometer",
@@ -139,6 +142,7 @@ __all__ = [
     "LaserTracker",
     "Learning",
     "LearningError",
+    "LearntCases",
     "LengthGauge",
     "Measured",
     "MeasuredPlan",
@@ -202,6 +206,7 @@ __all__ = [
     "is_planned",
     "judge",
     "learn",
+    "learn_cases",
     "linearity",
     "link",
     "load_optimum",
@@ -226,6 +231,7 @@ __all__ = [
     "printed_models",
     "read_arms",
     "read_cell",
+    "read_rig",
     "report_numbers",
     "resonances",
     "run_record",

@@ -10,12 +10,13 @@ from gantrytau.commands.printing.reporting import CommandError, as_json, note, r
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
-    from gantrytau_optimica.learning.cases.learnt_cases import LearntCases
+    from gantrytau_optimica import LearntCases
 
 PICTURES = ("errors", "input", "path")
 SPELLING = Spelling(
     ("learn", "design_q", "estimated_response", "square_reference", "Tukey"),
-    {"iterations": "--iterations", "seed": "--seed", "history": "--output", "learning": "learning"},
+    {"iterations": "--iterations", "seed": "--seed", "history": "--output", "learning": "learning"}
+    | {"limit": "open_to", "window": "learning.window", "reference": "reference"},
     exactly={"force=True runs it all the same": "--force runs it all the same"},
 )
 
@@ -23,7 +24,9 @@ SPELLING = Spelling(
 def learn(
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE", help="The rig, as rig.toml; --example prints one.", show_default=False),
+        typer.Argument(
+            metavar="FILE", help="The rig, as rig.toml; --example prints one.", show_default=False
+        ),
     ] = None,
     case: Annotated[
         list[str] | None,
@@ -51,11 +54,10 @@ def learn(
     What corrections do is measured first; what would diverge is refused before the first run.
     """
     with reporting(json, None, SPELLING):
-        from gantrytau_optimica.learning.cases.learnt_cases import learn_cases
-        from gantrytau_optimica.learning.cases.rig_file import EXAMPLE, read_rig
+        from gantrytau_optimica import RIG_EXAMPLE, learn_cases, read_rig
 
         if example:
-            typer.echo(EXAMPLE, nl=False)
+            typer.echo(RIG_EXAMPLE, nl=False)
             return
         if file is None:
             raise CommandError(
@@ -84,7 +86,10 @@ def kept(found: "LearntCases", folder: Path) -> list[Path]:
 
     files = []
     for name, history in found.histories.items():
-        files += [folder / f"case-{name}.npz", history.save_corrections(folder / f"case-{name}-corrections.csv")]
+        files += [
+            folder / f"case-{name}.npz",
+            history.save_corrections(folder / f"case-{name}-corrections.csv"),
+        ]
         for what in PICTURES:
             history.plot(what, file=folder / f"case-{name}-{what}.png")
             files.append(folder / f"case-{name}-{what}.png")

@@ -1,11 +1,12 @@
 """Several ways to learn one motion, run one after the other: Dressler (2012), Table 7.2."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau_optimica.learning.cases.rig_file import CaseOfFile, RigFile
 from gantrytau_optimica.learning.design.design_q import design_q
 from gantrytau_optimica.learning.estimators.estimator import Estimator
@@ -40,7 +41,9 @@ class LearntCases:
         for name, history in self.histories.items():
             sigma = "      -" if history.stability is None else f"{history.stability.sigma:7.3f}"
             lines.append(f"{name:<{width}} {sigma}" + "".join(f"{x:13.1f}" for x in self.settled(name)[axes]))
-        lines.append(f"Errors of the tool in % of the first run, in the mean from run {SETTLED} on.")
+        few = any(len(history) <= SETTLED for history in self.histories.values())
+        when = "of the last run" if few else f"in the mean from run {SETTLED} on"
+        lines.append(f"Errors of the tool in % of the first run, {when}")
         return "\n".join(lines)
 
 
@@ -59,30 +62,47 @@ def learn_cases(
     plant = rig.plant()
     found: dict[str, History] = {}
     for case in rig.cases:
-        if progress is not None:
-            progress(f"case {case.name}: what corrections do")
-        estimator = _estimator(case, plant, rig)
-        response = estimated_response(plant, rig.reference, estimator, seed=RUNS * rig.seed)
-        law = {"gradient": Gradient(), "norm-optimal": NormOptimal()}.get(case.law)
-        learning = Learning(case.gain, case.shift, window=rig.window, law=law)
-        if case.open_to is not None:
-            q = design_q(response, limit=case.open_to, learning=learning)
-        else:
-            q = ZeroPhase.butterworth(2, float(case.cut_off or 0.0))
-        if progress is not None:
-            progress(f"case {case.name}: {rig.iterations + 1} runs")
-        found[case.name] = learn(
-            plant,
-            rig.reference,
-            Learning(case.gain, case.shift, q=q, window=rig.window, law=law),
-            estimator,
-            iterations=rig.iterations,
-            seed=rig.seed,
-            response=response,
-            force=force,
-            history=None if folder is None else folder / f"case-{case.name}.npz",
-        )
+        tell = progress or _quietly
+        try:
+            found[case.name] = _learnt(case, plant, rig, folder, force, tell)
+        except ModelError as error:
+            raise ModelError(f"{rig.file}: case {case.name}: {error}", argument=error.argument) from error
     return LearntCases(found)
+
+
+def _learnt(
+    case: CaseOfFile,
+    plant: Plant,
+    rig: RigFile,
+    folder: Path | None,
+    force: bool,
+    tell: Callable[[str], None],
+) -> History:
+    tell(f"case {case.name}: what corrections do")
+    estimator = _estimator(case, plant, rig)
+    response = estimated_response(plant, rig.reference, estimator, seed=RUNS * rig.seed)
+    law = {"gradient": Gradient(), "norm-optimal": NormOptimal()}.get(case.law)
+    learning = Learning(case.gain, case.shift, window=rig.window, law=law)
+    if case.open_to is not None:
+        learning = replace(learning, q=design_q(response, limit=case.open_to, learning=learning))
+    else:
+        learning = replace(learning, q=ZeroPhase.butterworth(2, float(case.cut_off or 0.0)))
+    tell(f"case {case.name}: {rig.iterations + 1} runs")
+    return learn(
+        plant,
+        rig.reference,
+        learning,
+        estimator,
+        iterations=rig.iterations,
+        seed=rig.seed,
+        response=response,
+        force=force,
+        history=None if folder is None else folder / f"case-{case.name}.npz",
+    )
+
+
+def _quietly(words: str) -> None:
+    """Tell nobody."""
 
 
 def _estimator(case: CaseOfFile, plant: Plant, rig: RigFile) -> Estimator:

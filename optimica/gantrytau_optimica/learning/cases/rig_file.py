@@ -1,5 +1,6 @@
 """`rig.toml`: a robot, what differs from run to run, a motion, and ways to learn it."""
 
+import importlib
 import runpy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, did_you_mean, read_toml
-from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
-from gantrytau_models.prototypes import FlexiblePrototype
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.rig import Rig
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
@@ -56,8 +55,9 @@ CASE = {
     "gain": NUMBER,
     "shift": WHOLE,
 }
+LIBRARY = "gantrytau_models"  # of records and models that a file names
 TABLES = ("rig", "scatter", "reference", "learning", "case")
-EXAMPLE = """\
+RIG_EXAMPLE = """\
 # A robot that learns a motion, in several ways. Make this file your own, then: gantrytau learn rig.toml
 # Numbers are in SI; a text may bring another unit, as "4 ms" or "10 mm". Frequencies are in Hz.
 
@@ -141,7 +141,9 @@ class RigFile:
         known = [case.name for case in self.cases]
         for name in names:
             if name not in known:
-                raise ModelError(f'{self.file}: found no case "{name}"{did_you_mean(name, known)}', argument="case")
+                raise ModelError(
+                    f'{self.file}: found no case "{name}"{did_you_mean(name, known)}', argument="case"
+                )
         return replace(
             self,
             iterations=self.iterations if iterations is None else iterations,
@@ -155,19 +157,21 @@ class RigFile:
         if "plant" in self.table:
             return _own_plant(at(place, "plant"), self.table["plant"], self.file.parent)
         record = record_of(place, self.table["record"])
+        models = importlib.import_module(LIBRARY)
         try:
-            r = self.reference.r[0]
-            robot = FlexibleGantryTau(record, friction=PreslidingFriction, r=r)
-            servos = cart_servos(record, r=r, period=self.reference.period)
-            return Rig(
-                robot, servos, period=self.reference.period, noise=self.scatter, stiff=GantryTau(record)
-            )
+            r, period = self.reference.r[0], self.reference.period
+            robot = models.FlexibleGantryTau(record, friction=models.PreslidingFriction, r=r)
+            servos = models.cart_servos(record, r=r, period=period)
+            return Rig(robot, servos, period=period, noise=self.scatter, stiff=models.GantryTau(record))
         except GantryTauError as error:
             raise ModelError(f"{place}: {error}") from error
 
 
 def read_rig(path: str | Path) -> RigFile:
-    """The file of a rig, such as `EXAMPLE`; numbers are SI, texts bring a unit. Raises ModelError with the place in it."""
+    """The file of a rig, such as `RIG_EXAMPLE`; numbers are SI, texts bring a unit.
+
+    Raises ModelError with the place in it.
+    """
     file = Path(path)
     table = read_toml(file)
     whole = f"{file}: "
@@ -201,14 +205,16 @@ def read_rig(path: str | Path) -> RigFile:
     )
 
 
-def record_of(place: str, name: str) -> FlexiblePrototype:
+def record_of(place: str, name: str) -> Any:
     """A record of a robot that gives way, by name."""
-    known = [n for n in dir(prototypes) if isinstance(getattr(prototypes, n), FlexiblePrototype)]
-    if name not in known:
+    prototypes = importlib.import_module(f"{LIBRARY}.prototypes")
+    found = getattr(prototypes, name, None) if name in dir(prototypes) else None
+    if not isinstance(found, prototypes.FlexiblePrototype):
         raise ModelError(
-            f'{at(place, "record")}: found "{name}", expected a record with stiffness{did_you_mean(name, known)}'
+            f'{at(place, "record")}: found "{name}", expected a record that says how a robot gives way, such as '
+            "L1_flexible; or plant"
         )
-    return getattr(prototypes, name)
+    return found
 
 
 def _reference(place: str, table: Any, rig: Mapping[str, Any], folder: Path) -> Reference:

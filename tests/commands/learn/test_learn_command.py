@@ -1,0 +1,146 @@
+"""`gantrytau learn`: from a file to histories, corrections and pictures; what is wrong with it, by its place."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gantrytau_optimica import RIG_EXAMPLE, History, read_rig
+
+PLANT = """\
+from tests.optimica.learning.runs.linear_plant import LinearPlant
+
+rig = LinearPlant(noise=1e-6)
+
+
+def swinging():
+    return LinearPlant(noise=1e-6, swing=(7.0, 0.02))
+
+
+nothing = 3
+"""
+RIG = """\
+[rig]
+plant = "plant.py:rig"
+[reference]
+duration = "1.6 s"
+begin = "0.2 s"
+rounds = 1
+move = "200 ms"
+edge = "0.3 s"
+[learning]
+lead = "100 ms"
+window = ["0.2 s", "1.6 s"]
+iterations = 2
+[[case]]
+name = "one"
+estimator = "actuators"
+cut_off = 10.0
+[[case]]
+name = "two"
+estimator = "measured"
+open_to = 20.0
+"""
+
+
+@pytest.fixture
+def rig(tmp_path):
+    (tmp_path / "plant.py").write_text(PLANT)
+    file = tmp_path / "rig.toml"
+    file.write_text(RIG)
+    return file
+
+
+def test_ways_to_learn_are_compared_and_kept(run, rig, tmp_path):
+    folder = tmp_path / "learnt"
+    answer = run("learn", rig, "--output", folder)
+    assert answer.exit_code == 0, answer.output
+    assert "Case one. History: 3 runs of carts[0].s" in answer.output
+    assert "case   sigma   tool x [%]   tool y [%]" in answer.output
+    assert "case two: what corrections do ..." in answer.stderr
+    names = {
+        f"case-{case}{end}" for case in ("one", "two") for end in (".npz", "-corrections.csv", "-path.png")
+    }
+    assert names | {"cases.png"} <= {path.name for path in folder.iterdir()}
+    first = History.load(folder / "case-one.npz")
+    assert len(first) == 3
+    longer = run("learn", rig, "--output", folder, "--case", "one", "--iterations", "3", "--json")
+    told = json.loads(longer.stdout)
+    assert [case["name"] for case in told["cases"]] == ["one"]
+    assert np.array_equal(np.array(told["cases"][0]["relative"])[:3], first.relative)
+    assert len(told["cases"][0]["relative"]) == 4
+    assert told["cases"][0]["sigma"] < 1
+
+
+def test_what_diverges_is_refused_by_its_option(run, rig):
+    rig.write_text(
+        RIG.replace("plant.py:rig", "plant.py:swinging").replace("open_to = 20.0", "cut_off = 10.0")
+    )
+    answer = run("learn", rig, "--case", "two")
+    assert answer.exit_code != 0
+    assert "diverges: after 10 runs" in answer.output
+    assert "--force runs it all the same" in answer.output
+    assert run("learn", rig, "--case", "two", "--force", "--iterations", "1").exit_code == 0
+
+
+def test_the_example_is_a_file(run, tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(run("learn", "--example").stdout)
+    assert file.read_text() == RIG_EXAMPLE
+    found = read_rig(file)
+    assert [case.name for case in found.cases] == ["1", "2A", "2B", "3"]
+    assert found.plant().period == found.reference.period == 0.004
+    assert (found.window.start, found.window.stop, found.window.lead) == (1.2, 4.5, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[rig]", "[rigg]", "[rigg]: there is no such table; did you mean 'rig'?"),
+        ("rounds", "roundz", "reference.roundz: there is no such key; did you mean 'rounds'?"),
+        ('plant = "plant.py:rig"', "", "rig: found neither of record and plant, expected one"),
+        ("plant.py:rig", "plant.py:none", 'rig.plant: found "plant.py:none", which cannot be made'),
+        ("plant.py:rig", "plant.py:nothing", "without run, period, kinematics, expected a plant"),
+        (
+            'plant = "plant.py:rig"',
+            'record = "L1"',
+            'rig.record: found "L1", expected a record that says how',
+        ),
+        ('"measured"', '"mesured"', "case[1].estimator: found \"mesured\"; did you mean 'measured'?"),
+        ("open_to = 20.0", "", "case[1]: found neither of cut_off and open_to, expected one"),
+        ("open_to = 20.0", "open_to = 20.0\nlaw = 'gradient'", "which goes by a model; give it a cut_off"),
+        ('name = "two"', 'name = "one"', 'case[1].name: found "one" twice'),
+        ("rounds = 1", 'rounds = 1\nfile = "motion.csv"', "reference: found a file beside duration, begin"),
+        (
+            "open_to = 20.0",
+            "open_to = 200.0",
+            "case two: design_q: found open_to 200.0, expected Hz below half",
+        ),
+        ('"1.6 s"]', '"9.6 s"]', "found a window from 0.2 to 9.6 s, expected one within the run of 1.6 s"),
+        ('duration = "1.6 s"', 'duration = "1.2 s"', "found duration=1.2, expected 1.4 s at least"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told_by_its_place(run, rig, old, new, words):
+    assert old in RIG
+    rig.write_text(RIG.replace(old, new))
+    answer = run("learn", rig)
+    assert answer.exit_code != 0
+    assert words in " ".join(answer.output.split())
+
+
+def test_names_and_files_that_do_not_exist(run, rig, tmp_path):
+    assert 'found no case "three"; there is one, two' in run("learn", rig, "--case", "three").output
+    assert "there is no such file" in run("learn", tmp_path / "none.toml").output
+    assert "gantrytau learn --example > rig.toml" in run("learn").output
+
+
+def test_a_motion_of_ones_own_is_read_from_a_file(rig, tmp_path):
+    t = 0.004 * np.arange(300)
+    r = np.column_stack([t, 0.9 + 0.01 * np.clip(t - 0.4, 0, 0.5), 2.7 + 0 * t, -0.7 + 0 * t])
+    np.savetxt(tmp_path / "motion.csv", r, delimiter=",", header="t,x,y,z")
+    start, _, rest = RIG.partition("[reference]")
+    rig.write_text(f'{start}[reference]\nfile = "motion.csv"\n[learning]{rest.partition("[learning]")[2]}')
+    assert read_rig(rig).reference.r[-1, 0] == pytest.approx(0.905)
+    np.savetxt(tmp_path / "motion.csv", r[:, :3], delimiter=",", header="t,x,y")
+    with pytest.raises(Exception, match="found 3 columns in .*, expected t, x, y, z in s and m"):
+        read_rig(rig)
