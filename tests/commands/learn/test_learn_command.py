@@ -142,5 +142,5 @@ def test_a_motion_of_ones_own_is_read_from_a_file(rig, tmp_path):
     rig.write_text(f'{start}[reference]\nfile = "motion.csv"\n[learning]{rest.partition("[learning]")[2]}')
     assert read_rig(rig).reference.r[-1, 0] == pytest.approx(0.905)
     np.savetxt(tmp_path / "motion.csv", r[:, :3], delimiter=",", header="t,x,y")
-    with pytest.raises(Exception, match="found 3 columns in .*, expected t, x, y, z in s and m"):
+    with pytest.raises(Exception, match=r"found 3 columns in .*, expected t, x, y, z in s and m"):
         read_rig(rig)
