@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from gantrytau import Result
+from gantrytau import Result, StateSpace
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Reference
@@ -13,6 +13,16 @@ SERVOS = [(0.03527, 0.9647), (0.03425, 0.9656), (0.02748, 0.9728)]  # b and a of
 DELAY = 5  # samples
 KINEMATICS = Kinematics(GantryTau(prototypes.L1))
 PLACE = (0.9, 2.7, -0.7)
+
+
+def servo(b: float, a: float, period: float = PERIOD) -> StateSpace:
+    """(6.11): q^-d b / (1 - a q^-1)."""
+    A = np.eye(DELAY, k=-1)
+    A[0, 0] = a
+    return StateSpace(A, b * np.eye(DELAY)[:, :1], np.eye(DELAY)[-1:], 0, period=period)
+
+
+RESPONSE = [servo(*each) for each in SERVOS]
 
 
 class LinearPlant:

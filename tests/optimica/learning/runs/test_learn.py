@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, StateSpace
+from gantrytau import ModelError
 from gantrytau_optimica import (
     Actuators,
     Complementary,
@@ -21,18 +21,18 @@ from gantrytau_optimica import (
     learn,
 )
 from gantrytau_optimica.learning.laws.lifted import lifted
-from tests.optimica.learning.runs.linear_plant import DELAY, KINEMATICS, PERIOD, SERVOS, LinearPlant, line
+from tests.optimica.learning.runs.linear_plant import (
+    DELAY,
+    KINEMATICS,
+    PERIOD,
+    RESPONSE,
+    SERVOS,
+    LinearPlant,
+    line,
+    servo,
+)
 
 WINDOW = Tukey(0.2, lead=0.2)
-
-
-def servo(b, a, period=PERIOD):
-    A = np.eye(DELAY, k=-1)
-    A[0, 0] = a
-    return StateSpace(A, b * np.eye(DELAY)[:, :1], np.eye(DELAY)[-1:], 0, period=period)
-
-
-RESPONSE = [servo(*each) for each in SERVOS]
 
 
 def test_runs_are_what_the_lifted_system_foretells():
