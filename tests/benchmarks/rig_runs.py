@@ -6,8 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_optimica import Scatter
+from gantrytau_optimica import Scatter, design_q, uncertain
 from tests.benchmarks.table import Row, at_most
+from tests.optimica.learning.design.test_q_search import sampled
 from tests.optimica.learning.flexible_runs import PERIOD, PLACE, RECORD, flexible_rig
 
 ROWS, RUNS = 1200, 11
@@ -31,3 +32,9 @@ def rows() -> Iterator[Row]:
     duration = spent() - begin
     assert all(np.abs(run["carts[0].s"] - position[:, 0]).max() < 2e-3 for run in runs)
     yield at_most("eleven runs of 4.8 s of a flexible robot under its servos", duration, 6.0, "s")
+    family = uncertain(sampled([(7.4, 0.04), (11.5, 0.05)]))
+    begin = spent()
+    q = design_q(family)
+    duration = spent() - begin
+    assert q.magnitude([1.0], PERIOD).min() > 0.95
+    yield at_most("Q of learning for two axes and six models", duration, 5.0, "s")

@@ -4,29 +4,28 @@ Of a family of responses T and filters q of all axes, learning converges in each
 
     sigma(f) = |diag(q(f)) (I - L(f) T(f))| <= margin < 1,   L = gain e^(2 pi i f period shift)
 
-with all axes coupled: Dressler (2012), (7.16) and Figures 7.14 and 7.17. q is a low-pass filter with notches; the area
-below it up to a limit is maximised by its slopes.
+with all axes coupled: Dressler (2012), (7.16) and Figures 7.14 and 7.17.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau_optimica.learning.design.q_search import QProblem, closed, sizes_of, widest
 from gantrytau_optimica.learning.design.uncertain_modes import Uncertain, resonant, uncertain
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Shifted
 from gantrytau_optimica.learning.laws.learning import Learning
-from gantrytau_optimica.learning.laws.lifted import axes_of, norm, period_of
+from gantrytau_optimica.learning.laws.lifted import Liftable, norm
 from gantrytau_optimica.learning.runs.estimated_response import EstimatedResponse
 
 POINTS = 500  # frequencies from zero to half the sampling frequency, without those at resonances
+HALVED, BENT = 10, 0.05  # times that steps are halved; relative change, above which they are
 AROUND = np.linspace(-4, 4, 17)  # damping ratios off a resonance, where there are frequencies too
-LOW_PASS = (0.5, 100.0)  # Hz
-WIDTHS, DEPTHS = (0.02, 1.5), (0.02, 1.0)
-ROUNDS = (10.0, 100.0, 1e3, 1e4)  # of the penalty for sigma above the margin
-BACK = 0.995  # of the cut-off, by which filters are closed until they hold
-CLOSED = 2000  # such steps at most
+CLOSED, NEAR = 0.15, 0.08  # |Q| around a named resonance at most, and how far that is, relative
 
 
 def design_q(
@@ -36,51 +35,119 @@ def design_q(
     margin: float = 0.95,
     notches: int = 2,
     learning: Learning | None = None,
+    at: Any = None,
     samples: int = 825,
 ) -> ZeroPhase:
     """The zero-phase filters, one for each axis, that are most open up to `limit` Hz and keep sigma within the margin.
 
-    responses: from corrections to what is learnt from, sampled systems or what `estimated_response` found; of one alone the
-    family is `uncertain(response)`. learning: gain and shift, by default those of `Learning()`; samples: of the window in
-    which the worst of the family is checked over a whole run.
+    responses: from corrections to what is learnt from, sampled systems or what `estimated_response` found, or anything with
+    `response(hz)` (m, m, K) and `period`; a system alone stands for `uncertain(response)`. learning: gain and shift, by
+    default those of `Learning()`; at: Hz of resonances around which |q| <= 0.15 within 8 % in any case, for each
+    axis one, several or None; samples: of the window in which the worst of the family is checked over a whole run.
     Raises ModelError for responses of different periods or axes, for a law that goes by a model, and where no filter holds.
     """
     family, law = members_of(responses, learning)
-    period = period_of(family[0])
+    period = float(family[0].period or 0.0)
     _check(period, limit, margin, notches)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])  # (members, F, m, m)
-    found = _best(left, hz, period, limit, margin, notches)
+    named = _named(at, left.shape[-1], 0.5 / period)
+    p = widest(QProblem(hz, left, _most(named, hz), period, limit, margin, notches))
+    between = np.sort(np.concatenate([hz, (hz[1:] + hz[:-1]) / 2]))
+    finer = np.array([rest(member, law, between) for member in family])
+    for tighter in (1.0, 0.97, 0.9, 0.8):
+        problem = QProblem(between, finer, _most(named, between), period, limit, tighter * margin, notches)
+        p = closed(problem, p)
+        if problem.over(p).max() > 1:
+            raise _refused(problem, p)
+        q = _filters(p, len(named))
+        sigma = _over_a_run(Learning(law=law, q=q), family, sizes_of(problem.gains(p), finer), samples)
+        if sigma < 1:
+            return q
+    raise ModelError(
+        f"design_q: found sigma {sigma:.4f} over a whole run, expected less than 1; take a smaller margin",
+        argument="margin",
+    )
+
+
+def _over_a_run(learning: Learning, family: Sequence[Uncertain], sizes: np.ndarray, samples: int) -> float:
+    """Sigma over a whole run of the member that is worst over frequencies, of those that have one."""
+    for k in np.argsort(-sizes.max(axis=1)):
+        if isinstance(family[k], LinearSystem | Liftable):
+            return norm(learning.matrix(family[k], samples))
+    return float(sizes.max())
+
+
+def _filters(p: np.ndarray, axes: int) -> ZeroPhase:
     q = ZeroPhase(())
-    for axis in found:
+    for axis in np.exp(p).reshape(axes, -1):
         own = ZeroPhase.butterworth(2, float(axis[0]))
         for centre, width, depth in axis[1:].reshape(-1, 3):
             own = own.notched(float(centre), float(width), float(depth))
         q = q.joined(own)
-    worst = family[int(np.argmax(sizes_of(q.magnitude(hz, period), left).max(axis=1)))]
-    sigma = norm(Learning(law=law, q=q).matrix(worst, samples))
-    if not sigma < 1:
-        raise ModelError(
-            f"design_q: found sigma {sigma:.4f} over a whole run, expected less than 1; take a smaller margin",
-            argument="margin",
-        )
     return q
+
+
+def _refused(problem: QProblem, p: np.ndarray) -> ModelError:
+    sizes = sizes_of(problem.gains(p), problem.left)
+    _, row = np.unravel_index(np.argmax(sizes), sizes.shape)
+    return ModelError(
+        f"design_q: found sigma {sizes.max():.3g} at {problem.hz[row]:.3g} Hz however far filters close, expected "
+        f"{problem.margin:g}; what is learnt from turns its sign there: take a larger shift, a smaller gain, another sensor",
+        argument="responses",
+    )
+
+
+def _most(named: Sequence[Sequence[float]], hz: np.ndarray) -> np.ndarray:
+    """What gains may be around named resonances, (m, F)."""
+    found = np.full((len(named), len(hz)), np.inf)
+    for row, resonances in zip(found, named, strict=True):
+        for f in resonances:
+            row[np.abs(hz - f) <= NEAR * f] = CLOSED
+    return found
+
+
+def _named(at: Any, axes: int, half: float) -> list[tuple[float, ...]]:
+    """Hz of resonances for each axis."""
+    each = [None] * axes if at is None else [at] if np.ndim(at) == 0 else list(at)
+    found = [tuple(float(f) for f in np.ravel([] if own is None else own)) for own in each]
+    if len(found) != axes or not all(0 < f < half for own in found for f in own):
+        raise ModelError(
+            f"design_q: found at={at!r}, expected Hz below {half:g} for each of {axes} axes, one, several or None",
+            argument="at",
+        )
+    return found
 
 
 def members_of(
     responses: Uncertain | Sequence[Uncertain], learning: Learning | None
 ) -> tuple[tuple[Uncertain, ...], Shifted]:
     """The family, and the law by gain and shift. Raises ModelError where these do not fit."""
-    members = (responses,) if isinstance(responses, Uncertain) else tuple(responses)
-    if not members or not all(isinstance(member, Uncertain) for member in members):
+    members = (responses,) if hasattr(responses, "response") else tuple(responses)
+    if not members or not all(
+        hasattr(member, "response") and hasattr(member, "period") for member in members
+    ):
         raise ModelError(
             "design_q: found responses of another kind, expected sampled linear systems, or what estimated_response found",
             argument="responses",
         )
-    periods, axes = {period_of(member) for member in members}, {axes_of(member) for member in members}
+    periods = {member.period for member in members}
+    if None in periods:
+        raise ModelError(
+            "design_q: found a continuous response, expected a period, one of all; take system.discrete(period)",
+            argument="responses",
+        )
+    axes = {np.shape(member.response(np.zeros(1)))[:2] for member in members}
     if len(periods) > 1 or len(axes) > 1:
         raise ModelError(
-            f"design_q: found responses with periods of {sorted(periods)} s and {sorted(axes)} axes, expected one of both",
+            f"design_q: found responses with periods of {sorted(periods)} s and {sorted(m for m, _ in axes)} axes, "
+            "expected one of both",
+            argument="responses",
+        )
+    p, m = axes.pop()
+    if p != m:
+        raise ModelError(
+            f"design_q: found responses from {m} corrections to {p} positions, expected as many of both",
             argument="responses",
         )
     law = (learning or Learning()).corrections_of
@@ -90,116 +157,55 @@ def members_of(
             "low-pass filter alone",
             argument="learning",
         )
-    return (uncertain(members[0]) if len(members) == 1 else members), law
+    alone = len(members) == 1 and isinstance(members[0], Uncertain)
+    return (uncertain(members[0]) if alone else members), law
 
 
 def frequencies(family: Sequence[Uncertain]) -> np.ndarray:
     """Where sigma is looked at, (F,) in Hz: evenly, and closely around resonances of all of a family."""
-    period = period_of(family[0])
+    period = float(family[0].period or 0.0)
     found = [np.linspace(0.0, 0.5 / period, POINTS)]
     for member in family:
         system = member.system if isinstance(member, EstimatedResponse) else member
-        poles = np.linalg.eigvals(system.A)
-        s = np.log(poles[resonant(poles, period)].astype(complex)) / period
-        s = s[s.imag > 0]
-        found.append(np.ravel(np.abs(s) / 2 / np.pi * (1 + np.outer(AROUND, -s.real / np.abs(s)))))
+        if isinstance(system, LinearSystem):
+            poles = np.linalg.eigvals(system.A)
+            s = np.log(poles[resonant(poles, period)].astype(complex)) / period
+            s = s[s.imag > 0]
+            found.append(np.ravel(np.abs(s) / 2 / np.pi * (1 + np.outer(AROUND, -s.real / np.abs(s)))))
+        else:
+            found.append(_bends(member, found[0]))
     hz = np.unique(np.concatenate(found))
     return hz[(hz >= 0) & (hz <= 0.5 / period)]
 
 
-def sizes_of(gains: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """The value of sigma (..., F) of filters with gains (m, F), by I - L T (..., F, m, m)."""
-    return np.linalg.norm(gains.T[:, :, None] * left, ord=2, axis=(-2, -1))
+def _bends(member: Uncertain, hz: np.ndarray) -> np.ndarray:
+    """Frequencies between those (F,) where the size of a response is no straight line, whose poles are not known."""
+    first = hz
+    for _ in range(HALVED):
+        sizes = np.linalg.norm(np.moveaxis(member.response(hz), -1, 0), axis=(1, 2))
+        steps, scale = np.diff(hz), np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
+        bent = (
+            np.abs(np.diff(np.diff(sizes) / steps)) * np.maximum(steps[1:], steps[:-1]) > BENT * scale[1:-1]
+        )
+        wide = np.append(bent, False) | np.append(False, bent)
+        if not wide.any():
+            break
+        hz = np.sort(np.concatenate([hz, (hz[1:] + hz[:-1])[wide] / 2]))
+    return np.setdiff1d(hz, first)
 
 
 def rest(member: Uncertain, law: Shifted, hz: np.ndarray) -> np.ndarray:
     """I - L T over frequencies, (F, m, m)."""
     T = np.moveaxis(member.response(hz), -1, 0)
-    if not np.all(np.isfinite(T)):
+    bad = np.flatnonzero(~np.isfinite(T).all(axis=(1, 2)))
+    if bad.size:
         raise ModelError(
-            "design_q: found a response that is not finite, expected numbers", argument="responses"
+            f"design_q: found a response that is not finite at {hz[bad[0]]:.4g} Hz, expected numbers; it has a pole on the "
+            "unit circle, or was not measured there",
+            argument="responses",
         )
-    L = law.gain * np.exp(2j * np.pi * hz * period_of(member) * law.shift)
+    L = law.gain * np.exp(2j * np.pi * hz * float(member.period or 0.0) * law.shift)
     return np.eye(T.shape[-1]) - L[:, None, None] * T
-
-
-def _best(
-    left: np.ndarray, hz: np.ndarray, period: float, limit: float, margin: float, notches: int
-) -> np.ndarray:
-    """Cut-off, and centre, width and depth of notches, by axis, (m, 1 + 3 notches); left: I - L T of a family."""
-    from scipy.optimize import minimize
-
-    axes = left.shape[-1]
-    x = np.tan(np.pi * np.minimum(hz, 0.5 / period * (1 - 1e-9)) * period)
-    weights = np.gradient(hz) * (hz <= limit)
-    weights = weights / weights.sum() / axes
-
-    def gains(p: np.ndarray) -> np.ndarray:
-        return np.array([_gain(axis, x, period) for axis in np.exp(p).reshape(axes, -1)])
-
-    def cost(p: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
-        q = gains(p)
-        slope = np.empty((axes, len(p) // axes, len(hz)))  # of q by its own parameters
-        for i, axis in enumerate(p.reshape(axes, -1)):
-            for k in range(len(axis)):
-                step = axis + 1e-6 * np.eye(len(axis))[k]
-                slope[i, k] = (_gain(np.exp(step), x, period) - q[i]) / 1e-6
-        rows = q.T[None, :, :, None] * left
-        near = np.sqrt(np.sum(np.abs(rows) ** 2, axis=(2, 3))) > 0.995 * margin  # others cannot be above it
-        U, sizes, V = np.linalg.svd(rows[near])
-        over = np.maximum(sizes[:, 0] - 0.995 * margin, 0.0)
-        # d sigma / d q_i = Re(conj(u_i) (A v)_i)
-        turned = np.einsum("nij,nj->ni", left[near], V[:, 0].conj())
-        rates = np.zeros((*near.shape, axes))
-        rates[near] = over[:, None] * np.real(U[:, :, 0].conj() * turned)
-        penalty = stiffness * np.sum(over**2) / near.size
-        by_q = 2 * stiffness / near.size * rates.sum(axis=0).T - weights
-        return float(penalty - np.sum(weights * q)), np.einsum("if,ikf->ik", by_q, slope).ravel()
-
-    peaks = np.linalg.norm(left, axis=-1).max(axis=0)  # (F, m): rows, the worst of the family
-    start = np.array([_start(peaks[:, i], hz, limit, notches) for i in range(axes)])
-    low = np.log([LOW_PASS[0], *[0.3, WIDTHS[0], DEPTHS[0]] * notches])
-    high = np.log([min(LOW_PASS[1], 0.45 / period), *[0.45 / period, WIDTHS[1], DEPTHS[1]] * notches])
-    p = np.clip(np.log(start), low, high).ravel()
-    bounds = list(zip(np.tile(low, axes), np.tile(high, axes), strict=True))
-    for stiffness in ROUNDS:
-        p = minimize(
-            cost, p, args=(stiffness,), jac=True, method="L-BFGS-B", bounds=bounds, options=dict(maxiter=80)
-        ).x
-    for _ in range(CLOSED):
-        sizes = sizes_of(gains(p), left)
-        if sizes.max() <= margin:
-            return np.exp(p).reshape(axes, -1)
-        _, row = np.unravel_index(np.argmax(sizes), sizes.shape)
-        member = np.argmax(sizes[:, row])
-        axis = int(np.argmax(np.linalg.norm(gains(p).T[row][:, None] * left[member, row], axis=1)))
-        p.reshape(axes, -1)[axis, 0] += np.log(BACK)
-    raise ModelError(
-        f"design_q: found sigma {sizes.max():.3g} at {hz[row]:.3g} Hz however far filters close, expected {margin:g}; what "
-        "is learnt from turns its sign there: take a larger shift, a smaller gain, or another sensor",
-        argument="responses",
-    )
-
-
-def _gain(axis: np.ndarray, x: np.ndarray, period: float) -> np.ndarray:
-    """|q| over x = tan(pi f period): |causal half|^2 of a Butterworth filter of order 2 and notches."""
-    found = 1 / (1 + (x / np.tan(np.pi * axis[0] * period)) ** 4)
-    for centre, width, depth in axis[1:].reshape(-1, 3):
-        square = (x / np.tan(np.pi * centre * period)) ** 2
-        off, beside = (1 - square) ** 2, (2 * width) ** 2 * square
-        found = found * (off + depth**2 * beside) / (off + beside)
-    return found
-
-
-def _start(peaks: np.ndarray, hz: np.ndarray, limit: float, notches: int) -> np.ndarray:
-    """Notches where I - L T is largest, and the cut-off at the limit."""
-    found = [limit]
-    left = np.where((hz > 0.5) & (hz < 2 * limit), peaks, 0.0)
-    for _ in range(notches):
-        top = int(np.argmax(left))
-        found += [max(hz[top], 0.5), 0.2, 1 / max(left[top], 1.1) ** 0.5]
-        left = np.where(np.abs(hz - hz[top]) < 0.2 * hz[top], 0.0, left)
-    return np.array(found)
 
 
 def _check(period: float, limit: float, margin: float, notches: int) -> None:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau.results.figures import check_suffix, finished
-from gantrytau_optimica.learning.design.design_q import frequencies, members_of, rest, sizes_of
+from gantrytau_optimica.learning.design.design_q import frequencies, members_of, rest
+from gantrytau_optimica.learning.design.q_search import sizes_of
 from gantrytau_optimica.learning.design.uncertain_modes import Uncertain
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.learning import Learning
-from gantrytau_optimica.learning.laws.lifted import axes_of, period_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ def plot_q(
     family, law = members_of(responses, learning)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])
-    gains = np.broadcast_to(q.magnitude(hz, period_of(family[0])), (axes_of(family[0]), len(hz)))
+    gains = np.broadcast_to(q.magnitude(hz, float(family[0].period or 0.0)), (left.shape[-1], len(hz)))
     figure, axes = plt.subplots(
         len(gains) + 1, 1, figsize=(7.0, 2.0 * len(gains) + 2.4), layout="constrained", sharex=True
     )

@@ -125,7 +125,10 @@ def test_families_move_resonances_and_keep_the_static_gain():
         (lambda: design_q(one(), notches=-1), "notches=-1, expected a whole number from 0"),
         (lambda: design_q([]), "responses of another kind"),
         (lambda: design_q([one(), coupled(0.1)]), r"\[1, 2\] axes, expected one of both"),
-        (lambda: design_q(StateSpace(-1, 1, 1)), "expected one of all; take system.discrete"),
+        (
+            lambda: design_q(StateSpace(-1, 1, 1)),
+            "a continuous response, expected a period, one of all; take system.discrete",
+        ),
         (
             lambda: design_q(one(), learning=Learning(law=Gradient(one()))),
             "the law Gradient, expected a gain",
