@@ -38,7 +38,8 @@ FEW = 300  # rows, up to which all singular values are found
 
 def systems_of(response: LinearSystem | Sequence[LinearSystem]) -> tuple[LinearSystem, ...]:
     """One system of all axes, or one for each, sampled with one period. Raises ModelError for others."""
-    found = (response,) if isinstance(response, LinearSystem) else tuple(response)
+    alone = isinstance(response, LinearSystem) or not isinstance(response, Sequence)
+    found = (response,) if alone else tuple(response)
     if not found or not all(isinstance(each, LinearSystem) for each in found):
         raise ModelError(
             f"Learning: found the response {response!r}, expected a sampled linear system of all axes, or one for each",
