@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau_optimica.learning.design.q_search import QProblem, closed, sizes_of, widest
-from gantrytau_optimica.learning.design.uncertain_modes import Uncertain, resonant, uncertain
+from gantrytau_optimica.learning.design.uncertain_modes import OverFrequencies, Uncertain, resonant, uncertain
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Shifted
 from gantrytau_optimica.learning.laws.learning import Learning
@@ -29,7 +29,7 @@ CLOSED, NEAR = 0.15, 0.08  # |Q| around a named resonance at most, and how far t
 
 
 def design_q(
-    responses: Uncertain | Sequence[Uncertain],
+    responses: OverFrequencies | Sequence[OverFrequencies],
     *,
     limit: float = 30.0,
     margin: float = 0.95,
@@ -70,7 +70,9 @@ def design_q(
     )
 
 
-def _over_a_run(learning: Learning, family: Sequence[Uncertain], sizes: np.ndarray, samples: int) -> float:
+def _over_a_run(
+    learning: Learning, family: Sequence[OverFrequencies], sizes: np.ndarray, samples: int
+) -> float:
     """Sigma over a whole run of the member that is worst over frequencies, of those that have one."""
     for k in np.argsort(-sizes.max(axis=1)):
         if isinstance(family[k], LinearSystem | Liftable):
@@ -120,10 +122,10 @@ def _named(at: Any, axes: int, half: float) -> list[tuple[float, ...]]:
 
 
 def members_of(
-    responses: Uncertain | Sequence[Uncertain], learning: Learning | None
-) -> tuple[tuple[Uncertain, ...], Shifted]:
+    responses: OverFrequencies | Sequence[OverFrequencies], learning: Learning | None
+) -> tuple[tuple[OverFrequencies, ...], Shifted]:
     """The family, and the law by gain and shift. Raises ModelError where these do not fit."""
-    members = (responses,) if hasattr(responses, "response") else tuple(responses)
+    members = tuple(responses) if isinstance(responses, Sequence) else (responses,)
     if not members or not all(
         hasattr(member, "response") and hasattr(member, "period") for member in members
     ):
@@ -140,8 +142,8 @@ def members_of(
     axes = {np.shape(member.response(np.zeros(1)))[:2] for member in members}
     if len(periods) > 1 or len(axes) > 1:
         raise ModelError(
-            f"design_q: found responses with periods of {sorted(periods)} s and {sorted(m for m, _ in axes)} axes, "
-            "expected one of both",
+            f"design_q: found responses with periods of {sorted(map(float, filter(None, periods)))} s and "
+            f"{sorted(m for m, _ in axes)} axes, expected one of both",
             argument="responses",
         )
     p, m = axes.pop()
@@ -157,11 +159,11 @@ def members_of(
             "low-pass filter alone",
             argument="learning",
         )
-    alone = len(members) == 1 and isinstance(members[0], Uncertain)
-    return (uncertain(members[0]) if alone else members), law
+    only = members[0]
+    return (uncertain(only) if len(members) == 1 and isinstance(only, Uncertain) else members), law
 
 
-def frequencies(family: Sequence[Uncertain]) -> np.ndarray:
+def frequencies(family: Sequence[OverFrequencies]) -> np.ndarray:
     """Where sigma is looked at, (F,) in Hz: evenly, and closely around resonances of all of a family."""
     period = float(family[0].period or 0.0)
     found = [np.linspace(0.0, 0.5 / period, POINTS)]
@@ -178,7 +180,7 @@ def frequencies(family: Sequence[Uncertain]) -> np.ndarray:
     return hz[(hz >= 0) & (hz <= 0.5 / period)]
 
 
-def _bends(member: Uncertain, hz: np.ndarray) -> np.ndarray:
+def _bends(member: OverFrequencies, hz: np.ndarray) -> np.ndarray:
     """Frequencies between those (F,) where the size of a response is no straight line, whose poles are not known."""
     first = hz
     for _ in range(HALVED):
@@ -194,7 +196,7 @@ def _bends(member: Uncertain, hz: np.ndarray) -> np.ndarray:
     return np.setdiff1d(hz, first)
 
 
-def rest(member: Uncertain, law: Shifted, hz: np.ndarray) -> np.ndarray:
+def rest(member: OverFrequencies, law: Shifted, hz: np.ndarray) -> np.ndarray:
     """I - L T over frequencies, (F, m, m)."""
     T = np.moveaxis(member.response(hz), -1, 0)
     bad = np.flatnonzero(~np.isfinite(T).all(axis=(1, 2)))

@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.learning.design.design_q import frequencies, members_of, rest
 from gantrytau_optimica.learning.design.q_search import sizes_of
-from gantrytau_optimica.learning.design.uncertain_modes import Uncertain
+from gantrytau_optimica.learning.design.uncertain_modes import OverFrequencies
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.learning import Learning
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def plot_q(
     q: ZeroPhase,
-    responses: Uncertain | Sequence[Uncertain],
+    responses: OverFrequencies | Sequence[OverFrequencies],
     *,
     learning: Learning | None = None,
     limit: float = 50.0,

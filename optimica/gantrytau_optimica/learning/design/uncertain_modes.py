@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +14,19 @@ RESONANT = 0.3  # damping ratio, below which a pair of poles is a resonance
 APART = 1e-6  # cosine between left and right vectors of a mode, below which it is not apart from others
 
 Uncertain = LinearSystem | EstimatedResponse
+
+
+class OverFrequencies(Protocol):
+    """Anything from corrections to what is learnt from that is known over frequencies."""
+
+    @property
+    def period(self) -> float | None:
+        """The sampling period in s."""
+        ...
+
+    def response(self, frequencies: np.ndarray, /) -> np.ndarray:
+        """(m, m, K) complex at frequencies (K,) in Hz."""
+        ...
 
 
 def uncertain(

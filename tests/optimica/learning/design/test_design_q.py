@@ -103,7 +103,7 @@ def test_families_move_resonances_and_keep_the_static_gain():
     family = uncertain(system, frequencies=(0.9, 1.1), damping=(0.5, 2.0))
     assert len(family) == 4
     for member, (f, d) in zip(family, [(0.9, 0.5), (0.9, 2), (1.1, 0.5), (1.1, 2)], strict=True):
-        assert member.response([0.0]) == pytest.approx(system.response([0.0]), abs=1e-9)
+        assert member.response(np.zeros(1)) == pytest.approx(system.response(np.zeros(1)), abs=1e-9)
         s = np.log(np.linalg.eigvals(member.A).astype(complex) + 1e-300) / PERIOD
         swings = s[(s.imag > 1) & (-s.real < 0.3 * np.abs(s))]
         assert np.sort(np.abs(swings) / 2 / np.pi) == pytest.approx([7.4 * f, 11.0 * f], rel=1e-6)
