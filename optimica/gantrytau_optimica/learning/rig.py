@@ -47,6 +47,7 @@ class Rig:
             raise ModelError(f"Rig: found noise={noise!r}, expected a Scatter, or None for none")
         self.period = float(period)
         self._stiff = stiff
+        self._kinematics: Kinematics | None = None
         self.noise = STILL if noise is None else noise
         self.robot = translate(model)
         self.joints = driven_joints(self.robot)
@@ -117,9 +118,14 @@ class Rig:
         sensed = [np.diff(found[name][ends], axis=0, prepend=0.0) / self.period for name in self._sensed]
         return self._with_readings(t, values, units, sensed, random)
 
-    @cached_property
+    @property
     def kinematics(self) -> Kinematics:
         """Those of the robot that does not give way. Raises ModelError for a robot that gives way without such a one."""
+        if self._kinematics is None:
+            self._kinematics = self._found_kinematics()
+        return self._kinematics
+
+    def _found_kinematics(self) -> Kinematics:
         try:
             return Kinematics(self.robot if self._stiff is None else self._stiff)
         except StructureError:

@@ -1,5 +1,7 @@
 """Laws of learning control against their lifted form, and the numbers of Dressler (2012), section 7.2."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
@@ -135,7 +137,7 @@ def test_filters_shift_nothing_and_have_their_gain():
         (lambda: ZeroPhase.butterworth(2, [1.0, 2.0]).apply(np.zeros((9, 3)), PERIOD), "filters for 2 axes and 3 signals"),
         (lambda: ZeroPhase.butterworth(2, 10.0).notched(7.0, 0.0, 0.5), "found width=0.0"),
         (lambda: Shifted(0.9, -1), "found gain=0.9, shift=-1"),
-        (lambda: Learning(shift=2.5), "shift=2.5"),
+        (lambda: Learning(shift=cast(Any, 2.5)), "shift=2.5"),
         (lambda: Learning().next(np.zeros((9, 2)), np.zeros((8, 2)), PERIOD), r"\(9, 2\) and errors of shape \(8, 2\)"),
         (lambda: Learning().next(np.zeros((9, 1)), np.full((9, 1), np.nan), PERIOD), "not finite, first at 0 s"),
         (lambda: Learning().stability([servo(*PRINTED[0]), coupled()], 300), "one of each axis"),

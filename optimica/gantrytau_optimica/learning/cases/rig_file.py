@@ -262,7 +262,7 @@ def _cases(whole: str, entries: Any, common: Mapping[str, Any]) -> tuple[CaseOfF
             raise ModelError(
                 f"{place}: found open_to with the law {own['law']}, which goes by a model; give it a cut_off"
             )
-        found.append(CaseOfFile(**(common | own)))
+        found.append(CaseOfFile(**{**common, **own}))
     return tuple(found)
 
 
@@ -271,7 +271,7 @@ def _own_plant(place: str, name: str, folder: Path) -> Plant:
     python, _, attribute = name.partition(":")
     path = folder / python
     try:
-        found = runpy.run_path(str(path))[attribute]
+        found: Any = runpy.run_path(str(path))[attribute]
         found = found() if callable(found) and not hasattr(found, "run") else found
     except (OSError, KeyError, ImportError, SyntaxError, TypeError) as error:
         raise ModelError(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol, overload
 
 import numpy as np
 
@@ -29,6 +29,14 @@ class OverFrequencies(Protocol):
         ...
 
 
+@overload
+def uncertain(
+    response: LinearSystem, frequencies: Sequence[float] = ..., damping: Sequence[float] = ...
+) -> tuple[StateSpace, ...]: ...
+@overload
+def uncertain(
+    response: EstimatedResponse, frequencies: Sequence[float] = ..., damping: Sequence[float] = ...
+) -> tuple[EstimatedResponse, ...]: ...
 def uncertain(
     response: Uncertain,
     frequencies: Sequence[float] = (0.92, 1.0, 1.08),
@@ -58,7 +66,8 @@ def _moved(response: Uncertain, frequency: float, damping: float) -> Uncertain:
     from scipy.linalg import eig
 
     # only resonances need vectors of their own: delays, whose poles are all zero, have none
-    poles, left, right = eig(response.A, left=True)
+    decomposed: Any = eig(response.A, left=True)
+    poles, left, right = decomposed
     chosen = resonant(poles, response.period)
     poles, V, W = poles[chosen], right[:, chosen], left[:, chosen].conj().T
     apart = np.sum(W.T * V, axis=0)

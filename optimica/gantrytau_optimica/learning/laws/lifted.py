@@ -4,7 +4,7 @@ T is made of lower triangular Toeplitz blocks of pulse responses: Dressler (2012
 """
 
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -38,8 +38,7 @@ FEW = 300  # rows, up to which all singular values are found
 
 def systems_of(response: LinearSystem | Sequence[LinearSystem]) -> tuple[LinearSystem, ...]:
     """One system of all axes, or one for each, sampled with one period. Raises ModelError for others."""
-    alone = isinstance(response, LinearSystem) or not isinstance(response, Sequence)
-    found = (response,) if alone else tuple(response)
+    found: tuple[Any, ...] = tuple(response) if isinstance(response, Sequence) else (response,)
     if not found or not all(isinstance(each, LinearSystem) for each in found):
         raise ModelError(
             f"Learning: found the response {response!r}, expected a sampled linear system of all axes, or one for each",
@@ -117,7 +116,8 @@ def norm(matrix: np.ndarray) -> float:
         return float(np.linalg.norm(matrix, 2)) if matrix.size else 0.0
     try:
         start = np.random.default_rng(0).standard_normal(min(matrix.shape))
-        return float(svds(matrix, k=1, v0=start, tol=CLOSE, return_singular_vectors=False)[0])
+        find: Any = svds
+        return float(find(matrix, k=1, v0=start, tol=CLOSE, return_singular_vectors=False)[0])
     except ArpackError:
         return float(np.linalg.norm(matrix, 2))
 

@@ -20,12 +20,23 @@ MILLI = 1e3
 class Runs(Protocol):
     """What pictures need of a history."""
 
-    reference: Reference
-    names: tuple[str, ...]
-    columns: tuple[int, ...]
-    full: np.ndarray
-    inputs: np.ndarray
-    tool: np.ndarray
+    @property
+    def reference(self) -> Reference: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def columns(self) -> tuple[int, ...]: ...
+
+    @property
+    def full(self) -> np.ndarray: ...
+
+    @property
+    def inputs(self) -> np.ndarray: ...
+
+    @property
+    def tool(self) -> np.ndarray: ...
 
     @property
     def relative(self) -> np.ndarray: ...
@@ -55,6 +66,7 @@ def draw(history: Runs, what: str, file: str | os.PathLike[str] | None) -> "Figu
 def plot_learning(histories: Mapping[str, Runs], *, file: str | os.PathLike[str] | None = None) -> "Figure":
     """Errors of the measured tool over runs, by axis, of several ways to learn: Dressler (2012), Figures 7.16 to 7.18."""
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import MaxNLocator
 
     if not histories:
         raise ModelError("plot_learning: found no histories, expected one at least, by name")
@@ -68,13 +80,14 @@ def plot_learning(histories: Mapping[str, Runs], *, file: str | os.PathLike[str]
         for name, history in histories.items():
             axis.plot(history.tool_relative[:, k], "o-", label=name)
         axis.set(title=f"tool {'xyz'[k]}", xlabel="run", ylabel="error [% of the first run]", ylim=(0, None))
-        axis.xaxis.get_major_locator().set_params(integer=True)
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[0, -1].legend()
     return finished(figure, file)
 
 
 def _errors(history: Runs) -> "Figure":
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import MaxNLocator
 
     figure, axis = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
     for name, values in zip(history.names, history.relative.T, strict=True):
@@ -83,7 +96,7 @@ def _errors(history: Runs) -> "Figure":
         if k not in history.columns:
             axis.plot(history.tool_relative[:, k], "s--", mfc="none", label=f"tool {'xyz'[k]}")
     axis.set(xlabel="run", ylabel="error [% of the first run]", ylim=(0, None))
-    axis.xaxis.get_major_locator().set_params(integer=True)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.legend()
     return figure
 

@@ -16,7 +16,7 @@ from gantrytau_optimica.learning.laws.learning import Learning, Stability
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, period_of
 from gantrytau_optimica.learning.runs.corrections import Corrections
 from gantrytau_optimica.learning.runs.estimated_response import estimated_response
-from gantrytau_optimica.learning.runs.history import ROWS, History
+from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
 
@@ -135,7 +135,6 @@ def _started(
 ) -> History:
     """A history without runs."""
     n, m, N = len(rig.kinematics.joints), corrections.count, len(reference)
-    widths = dict(zip(ROWS, (m, n, n, 3, m), strict=True))
     return History(
         reference,
         rig.kinematics.joints,
@@ -144,7 +143,11 @@ def _started(
         corrections.wanted(reference.r),
         learning.window.full(N, reference.period),
         dict(learning=repr(learning), estimator=repr(estimator), rig=repr(rig)),
-        **{name: np.zeros((0, N, width)) for name, width in widths.items()},
+        inputs=np.zeros((0, N, m)),
+        q_ref=np.zeros((0, N, n)),
+        q=np.zeros((0, N, n)),
+        tool=np.zeros((0, N, 3)),
+        estimates=np.zeros((0, N, m)),
         next_input=np.zeros((N, m)),
     )
 

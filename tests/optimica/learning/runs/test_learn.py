@@ -1,5 +1,7 @@
 """Learning on a plant that is known exactly: what lifted systems foretell is what runs do."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -103,7 +105,7 @@ def test_what_would_diverge_is_refused_and_runs_by_force():
 
 def test_histories_on_file_go_on_where_they_ended(tmp_path):
     file = tmp_path / "history.npz"
-    asked = dict(response=RESPONSE, seed=2)
+    asked: dict[str, Any] = dict(response=RESPONSE, seed=2)
     whole = learn(LinearPlant(1e-5), line(), Learning(window=WINDOW), iterations=4, **asked)
     learn(LinearPlant(1e-5), line(), Learning(window=WINDOW), iterations=1, history=file, **asked)
     found = learn(LinearPlant(1e-5), line(), Learning(window=WINDOW), iterations=4, history=file, **asked)
@@ -169,14 +171,16 @@ def test_a_run_that_fails_is_told_with_those_before_it():
     ],
 )
 def test_what_does_not_fit_is_told_by_name(wrong, words):
-    asked = dict(reference=line(), learning=Learning(window=WINDOW), response=RESPONSE, iterations=1) | wrong
+    asked: dict[str, Any] = (
+        dict(reference=line(), learning=Learning(window=WINDOW), response=RESPONSE, iterations=1) | wrong
+    )
     reference = asked.pop("reference")
     with pytest.raises(ModelError, match=words):
         learn(LinearPlant(), reference, asked.pop("learning"), asked.pop("estimator", None), **asked)
 
 
 def test_another_reference_or_estimator_cannot_go_on_with_a_history():
-    asked = dict(response=RESPONSE, iterations=1)
+    asked: dict[str, Any] = dict(response=RESPONSE, iterations=1)
     first = learn(LinearPlant(), line(), Learning(window=WINDOW), **asked)
     with pytest.raises(ModelError, match="not the one of the history, expected the same"):
         learn(LinearPlant(), line(length=0.011), Learning(window=WINDOW), history=first, **asked)
