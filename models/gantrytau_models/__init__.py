@@ -7,7 +7,7 @@ from gantrytau_models.control.feedforward import Feedforward
 from gantrytau_models.control.inverse_dynamics import InverseDynamics
 from gantrytau_models.control.plant import MeasuredGantryTau, MotorDrivenGantryTau
 from gantrytau_models.control.references import CircularReference
-from gantrytau_models.control.servos import CartServo, PreslidingFriction, cart_servos
+from gantrytau_models.control.servos import CartServo, JointServo, PreslidingFriction, cart_servos
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
 from gantrytau_models.mechanisms.bushed_links import BushedSixLinkGantryTau
 from gantrytau_models.mechanisms.delta import DeltaRobot
@@ -39,6 +39,7 @@ __all__ = [
     "GantryTau",
     "InverseDynamics",
     "InverseKinematics",
+    "JointServo",
     "MeasuredGantryTau",
     "MotorDrivenGantryTau",
     "Pendulum",

@@ -73,11 +73,14 @@ from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.rig import Rig
+from gantrytau_optimica.learning.runs.corrections_file import read_corrections
 from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
 from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.history_pictures import plot_learning
 from gantrytau_optimica.learning.runs.learn import LearningError, learn
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
+from gantrytau_optimica.learning.runs.repeat import Repetitions, repeat
+from gantrytau_optimica.learning.runs.simulator_plant import SimulatorPlant
 from gantrytau_optimica.learning.scatter import Scatter
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
@@ -161,6 +164,7 @@ __all__ = [
     "PlannedCell",
     "Prepared",
     "Reference",
+    "Repetitions",
     "Rig",
     "SampledDevice",
     "Samples",
@@ -169,6 +173,7 @@ __all__ = [
     "Sensitivities",
     "SensitivityTable",
     "ServoModel",
+    "SimulatorPlant",
     "StepResponse",
     "TMac",
     "TradeOff",
@@ -231,7 +236,9 @@ __all__ = [
     "printed_models",
     "read_arms",
     "read_cell",
+    "read_corrections",
     "read_rig",
+    "repeat",
     "report_numbers",
     "resonances",
     "run_record",

@@ -64,6 +64,24 @@ class CartServo(Model):
         yield self.f == self.f_ff + self.k_v * (self.e + self.integral / self.T_i)
 
 
+class JointServo(CartServo):
+    """The servo of a joint that turns: the same law with angles and torques."""
+
+    k_v = Parameter(30.0, unit="N.m.s/rad", min=0.0, description="gain of the speed")
+    q_ref = Input(unit="rad", description="reference of the angle")
+    v_ref = Input(unit="rad/s", start=0.0, description="reference of the speed")
+    q = Input(unit="rad", description="measured angle of the joint")
+    v = Input(unit="rad/s", start=0.0, description="measured speed of the joint")
+    f_ff = Input(unit="N.m", start=0.0, description="torque that is fed forward, at rest the whole torque")
+    f = Output(unit="N.m", description="torque of the motor")
+    e = Real(unit="rad/s", description="wanted less measured speed")
+    integral = Real(unit="rad", start=0.0, nominal=1e-3, description="integral of e")
+    q_seen = Real(
+        lambda self: _places(self.delay), unit="rad", description="references on their way, the newest first"
+    )
+    v_seen = Real(lambda self: _places(self.delay), unit="rad/s", start=0.0, description="the same of speeds")
+
+
 class PreslidingFriction(Friction):
     """Coulomb friction of a guideway that gives for some micrometres before it slides (Dahl 1968), and viscous friction.
 

@@ -11,8 +11,9 @@ from gantrytau.dae import Dae
 from gantrytau.errors import StructureError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.kinematics import driven_joints
+from gantrytau_optimica.learning.readings import with_readings
 from gantrytau_optimica.learning.scatter import STILL, Scatter
-from gantrytau_optimica.learning.servo_loop import servo_loop
+from gantrytau_optimica.learning.servo_loop import drive, servo_loop, unit_of
 
 TOLERANCE = 1e-3  # of a run: leaves 40 nm at a gauge and 1 mm/s2, far below the noise of devices
 KEPT = 8  # places to start from, each with equations made ready
@@ -23,10 +24,10 @@ SEEN = ("gauge.r", "tool.r")  # the first of these that a robot has is what gaug
 class Rig:
     """A robot model with a controller for each driven joint, that runs references given every `period` seconds.
 
-    controllers: components such as `gantrytau_models.CartServo`, one for each force x.f beside x.s, with q_ref, v_ref, q,
-    v, f_ff and f. noise: what differs from run to run (`Scatter`), nothing if None; friction that differs is one with the
-    inputs `level` and `z_0`, such as `PreslidingFriction`. stiff: the robot that does not give way, whose `kinematics`
-    the controllers go by; by default the model itself.
+    controllers: components such as `gantrytau_models.CartServo`, one for each force x.f beside x.s, or `JointServo` for
+    each torque x.tau beside x.phi, with q_ref, v_ref, q, v, f_ff and f. noise: what differs from run to run (`Scatter`),
+    nothing if None; friction that differs is one with the inputs `level` and `z_0`, such as `PreslidingFriction`. stiff:
+    the robot that does not give way, whose `kinematics` the controllers go by; by default the model itself.
     Translation takes about a second, once; each run some tenths of one.
     Raises ModelError for a period that is not above zero or not that of the controllers, controllers that do not fit, and
     friction that cannot differ although it should.
@@ -135,6 +136,22 @@ class Rig:
                 argument="stiff",
             ) from None
 
+    def at_rest(self, q: ArrayLike) -> tuple[Dae, dict[str, float]]:
+        """The robot under its servos as it rests with its joints at q (n,), and the inputs that hold it there.
+
+        To be exported as an FMU: `export_fmu(loop, "rig.fmu")`, with q_ref and v_ref as inputs; friction is at its nominal
+        level, and nothing pushes. Raises ModelError for another shape, InitializationError where it cannot rest.
+        """
+        found = np.asarray(q, dtype=float)
+        if found.shape != (len(self.joints),) or not np.all(np.isfinite(found)):
+            raise ModelError(f"Rig.at_rest: found q={q!r}, expected {len(self.joints)} finite numbers")
+        loop, forces = self._at_rest(found)
+        still = {name: 0.0 for name in loop.inputs if name.startswith("push.")}
+        for law in self._laws:
+            if law is not None:
+                still |= {f"robot.{law}.level": 1.0, f"robot.{law}.z_0": 0.0}
+        return loop, still | {f"controllers[{k}].f_ff": float(force) for k, force in enumerate(forces)}
+
     def _force(self, push: ArrayLike, rows: int) -> np.ndarray:
         found = np.asarray(push, dtype=float)
         if found.shape != (rows, 3) or not np.all(np.isfinite(found)):
@@ -170,13 +187,12 @@ class Rig:
     @cached_property
     def _shown(self) -> tuple[str, ...]:
         known = {*self.robot.variables, *self.robot.vectors}
-        owners = [joint.removesuffix(".s") for joint in self.joints]
-        wanted = [f"{owner}.{last}" for owner in owners for last in ("s", "v", "f", "friction")]
+        wanted = [n for joint in self.joints for n in (*drive(joint), f"{joint.rpartition('.')[0]}.friction")]
         return tuple(name for name in (*wanted, *SHOWN) if name in known)
 
     def _law(self, joint: str) -> str | None:
         """The friction beside a joint whose level and deflection are drawn, None where there is none."""
-        owner = joint.removesuffix(".s")
+        owner = joint.rpartition(".")[0]
         laws = [n.removesuffix(".level") for n in self.robot.inputs if n.startswith(f"{owner}.")]
         for law in laws:
             if f"{law}.z_0" in self.robot.inputs:
@@ -201,7 +217,7 @@ class Rig:
             starts = {f"robot.{name}": point[name] for name in self.robot.states}
             for k, value in enumerate(key):
                 starts |= dict.fromkeys(self.loop.expand(f"controllers[{k}].q_seen"), value)
-            forces = np.array([point[f"{joint.removesuffix('.s')}.f"] for joint in self.joints])
+            forces = np.array([point[drive(joint)[2]] for joint in self.joints])
             while len(self._started) >= KEPT:
                 self._started.pop(next(iter(self._started)))  # the oldest
             self._started[key] = self.loop.with_starts(starts), forces
@@ -235,9 +251,5 @@ class Rig:
             true["r"] = np.column_stack([values[f"{place}[{k}]"] for k in range(3)])
         if sensed:
             true["a"] = sensed[0]
-        deviations = {"q": self.noise.encoder, "r": self.noise.gauge, "a": self.noise.accelerometer}
-        for letter, exact in true.items():
-            read = exact + deviations[letter] * random.standard_normal(exact.shape)
-            values |= {f"measured.{letter}[{k}]": column for k, column in enumerate(read.T)}
-            units[f"measured.{letter}"] = "m/s2" if letter == "a" else "m"
-        return Result(t, values, units=units, title=f"{self.robot.name} under its servos")
+        run = Result(t, values, units=units, title=f"{self.robot.name} under its servos")
+        return with_readings(run, true, unit_of(self.joints), self.noise, random)

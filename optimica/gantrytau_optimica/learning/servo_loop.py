@@ -18,26 +18,26 @@ def servo_loop(model: Model, controllers: Sequence[Model], joints: Sequence[str]
     Raises ModelError for controllers that are not one for each joint, with the ports q_ref, v_ref, q, v, f_ff and f.
     """
     _check(controllers, joints)
-    n = len(joints)
+    n, unit = len(joints), unit_of(joints)
     one_each, struck = list(controllers), tool_frame(model)
 
     class ServoLoop(Model):
         """A robot under its servos."""
 
-        q_ref = Input(n, unit="m", description="references of the positions")
-        v_ref = Input(n, unit="m/s", start=0.0, description="references of the speeds")
+        q_ref = Input(n, unit=unit, description="references of the positions")
+        v_ref = Input(n, unit=f"{unit}/s", start=0.0, description="references of the speeds")
         robot = model
         controllers = Array(Model, one_each)
 
         def equations(self):
             ones: Any = self.controllers
             for k, (joint, one) in enumerate(zip(joints, ones, strict=True)):
-                moved = _member(self.robot, joint.removesuffix(".s"))
+                q, v, f = (_member(self.robot, name) for name in drive(joint))
                 yield one.q_ref == self.q_ref[k]
                 yield one.v_ref == self.v_ref[k]
-                yield one.q == moved.s
-                yield one.v == moved.v
-                yield moved.f == one.f
+                yield one.q == q
+                yield one.v == v
+                yield f == one.f
 
     class PushedLoop(ServoLoop):
         """The same with a force on the tool."""
@@ -85,11 +85,21 @@ def _check(controllers: Sequence[Model], joints: Sequence[str]) -> None:
                 f"Rig: controllers[{k}]: found {one!r} without {', '.join(missing)}, expected a component such as "
                 f"CartServo with {', '.join(PORTS)}"
             )
-    turning = [joint for joint in joints if not joint.endswith(".s")]
-    if turning:
+    if len({unit_of([joint]) for joint in joints}) > 1:
         raise ModelError(
-            f"Rig: found the joints {', '.join(turning)} that turn, expected joints that move, x.s"
+            f"Rig: found the joints {', '.join(joints)}, expected joints that all slide, x.s, or all turn, x.phi"
         )
+
+
+def unit_of(joints: Sequence[str]) -> str:
+    """Of the positions of joints."""
+    return "rad" if joints[0].endswith(".phi") else "m"
+
+
+def drive(joint: str) -> tuple[str, str, str]:
+    """Names of position, speed and force of a joint x.s that slides, or x.phi that turns."""
+    owner, _, last = joint.rpartition(".")
+    return (joint, f"{owner}.v", f"{owner}.f") if last == "s" else (joint, f"{owner}.w", f"{owner}.tau")
 
 
 def tool_frame(model: Model) -> str | None:

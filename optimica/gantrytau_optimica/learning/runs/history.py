@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from gantrytau import ModelError, Result
+from gantrytau import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.learning.laws.learning import Stability
+from gantrytau_optimica.learning.runs.corrections_file import write_corrections
 from gantrytau_optimica.learning.runs.reference import Reference
+from gantrytau_optimica.learning.servo_loop import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -162,9 +164,7 @@ class History:
 
         Formats are those of `Result.save`; times are those of the reference.
         """
-        columns = dict(zip(self.joints, self.corrected.T, strict=True))
-        units = dict.fromkeys(self.joints, "m")
-        return Result(self.reference.t, columns, units=units, title="corrections").save(path)
+        return write_corrections(path, self.reference.t, self.joints, self.corrected, unit_of(self.joints))
 
     def with_run(self, **rows: np.ndarray) -> "History":
         """With one run more, by the names of what is kept."""

@@ -1,0 +1,79 @@
+"""How well a robot repeats a motion: what no learning can take away."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gantrytau import ModelError
+from gantrytau_optimica.learning.filters.tukey import Tukey
+from gantrytau_optimica.learning.runs.corrections import Corrections
+from gantrytau_optimica.learning.runs.learn import RUNS
+from gantrytau_optimica.learning.runs.reference import Reference
+from gantrytau_optimica.learning.runs.robot_runs import Plant, forward_speed
+
+
+@dataclass(frozen=True, eq=False)
+class Repetitions:
+    """Runs of one motion. q: measured positions of the joints (K, N, n); error: reference less these in run 0, (N, n).
+
+    full: the samples (N,) by which they are judged.
+    """
+
+    joints: tuple[str, ...]
+    q: np.ndarray
+    error: np.ndarray
+    full: np.ndarray
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """Run 0 less each other, (K - 1, N, n): Dressler (2012), (7.26)."""
+        return self.q[0] - self.q[1:]
+
+    @property
+    def rms(self) -> np.ndarray:
+        """Of these, (n,)."""
+        return np.sqrt(np.mean(self.deviations[:, self.full] ** 2, axis=(0, 1)))
+
+    @property
+    def relative(self) -> np.ndarray:
+        """These in % of the error, (n,)."""
+        return 100 * self.rms / np.sqrt(np.mean(self.error[self.full] ** 2, axis=0))
+
+    def __str__(self) -> str:
+        rows = [f"repeated {len(self.q)} times, deviations from the first"]
+        rows += [
+            f"  {name:16s} {1e6 * rms:8.3g} um or urad rms, {part:.2g} % of the error"
+            for name, rms, part in zip(self.joints, self.rms, self.relative, strict=True)
+        ]
+        return "\n".join(rows)
+
+
+def repeat(
+    rig: Plant,
+    reference: Reference,
+    corrections: ArrayLike | None = None,
+    *,
+    runs: int = 5,
+    seed: int = 0,
+    window: Tukey | None = None,
+) -> Repetitions:
+    """Run a reference several times without learning, with corrections of the joints (N, n), such as `read_corrections` has.
+
+    window: the part that is judged, the whole run by default. Run k draws with the seed 100 seed + k. Raises ModelError for
+    corrections of another shape, and fewer than two runs.
+    """
+    if isinstance(runs, bool) or not isinstance(runs, (int, np.integer)) or runs < 2:
+        raise ModelError(f"repeat: found runs={runs!r}, expected a whole number, 2 and more", argument="runs")
+    at = Corrections(rig.kinematics, True, reference.moving)
+    q_r = at.wanted(reference.r)
+    u = np.zeros_like(q_r) if corrections is None else np.asarray(corrections, dtype=float)
+    if u.shape != q_r.shape or not np.all(np.isfinite(u)):
+        raise ModelError(
+            f"repeat: found corrections of shape {u.shape}, expected finite numbers, {q_r.shape}",
+            argument="corrections",
+        )
+    v = forward_speed(q_r + u, rig.period)
+    q = np.array([np.asarray(rig.run(q_r + u, v, seed=RUNS * seed + k)["measured.q"]) for k in range(runs)])
+    weights = (window or Tukey(lead=0.0)).full(len(reference), reference.period)
+    return Repetitions(rig.kinematics.joints, q, q_r - q[0], weights)

@@ -1,0 +1,89 @@
+"""Corrections on file, and how well a motion is repeated."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError
+from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
+from gantrytau_optimica import (
+    Learning,
+    Rig,
+    Scatter,
+    Tukey,
+    learn,
+    read_corrections,
+    repeat,
+    square_reference,
+)
+from tests.optimica.learning.runs.linear_plant import RESPONSE, LinearPlant, line
+
+WINDOW = Tukey(0.2, lead=0.2)
+
+
+def test_corrections_that_were_learnt_are_read_and_run_again(tmp_path):
+    """From a file, without learning, the plant does what it did in the last run."""
+    reference = line()
+    history = learn(LinearPlant(), reference, Learning(window=WINDOW), iterations=3, response=RESPONSE)
+    file = history.save_corrections(tmp_path / "u.csv")
+    u = read_corrections(file, history.joints, reference.t)
+    assert np.array_equal(u, history.corrected)
+    again = repeat(LinearPlant(), reference, u, runs=2)
+    assert again.q[0] == pytest.approx(history.q[-1], abs=1e-12)
+    assert np.all(again.rms < 1e-15)
+
+
+def test_deviations_are_those_of_noise():
+    """The difference of two readings has sqrt(2) times the deviation of one."""
+    found = repeat(LinearPlant(noise=1e-5), line(), runs=20, seed=3)
+    assert found.deviations.shape == (19, 400, 3)
+    assert found.rms == pytest.approx(np.sqrt(2) * 1e-5, rel=0.1)
+    assert "um or urad rms" in str(found)
+
+
+def test_the_flexible_robot_repeats_itself_to_a_tenth_of_its_error():
+    """ "An order of magnitude smaller": friction and where it rests are drawn for each run."""
+    record = prototypes.L1_flexible
+    robot = FlexibleGantryTau(record, friction=PreslidingFriction)
+    rig = Rig(robot, cart_servos(record), period=0.004, noise=Scatter(), stiff=GantryTau(record))
+    found = repeat(rig, square_reference(), window=Tukey(1.2, 4.5))
+    assert np.all(found.relative < 10)
+    assert np.all(found.rms > 1e-6)  # m, more than encoders read
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda text: text.replace("carts[1].s", "carts[4].s"),
+            r"no column carts\[1\].s, expected one for each",
+        ),
+        (lambda text: "\n".join(text.splitlines()[:-1]), "found 399 rows, expected 400"),
+        (lambda text: text.replace("0.008,", "0.009,", 1), "found the time 0.009 s in row 2"),
+        (
+            lambda text: text.replace("\n0.0,", "\n0.0,nan,0,0\n#", 1).replace("\n#", "\n0.0,", 1),
+            "rows|finite|table",
+        ),
+        (lambda text: "nothing", "no column"),
+    ],
+)
+def test_files_that_do_not_fit_are_told(tmp_path, change, words):
+    reference = line()
+    history = learn(LinearPlant(), reference, Learning(window=WINDOW), iterations=1, response=RESPONSE)
+    file = history.save_corrections(tmp_path / "u.csv")
+    file.write_text(change(file.read_text()))
+    with pytest.raises(ModelError, match=words):
+        read_corrections(file, history.joints, reference.t)
+
+
+def test_columns_in_another_order_are_found_and_a_missing_file_is_told(tmp_path):
+    reference = line()
+    history = learn(LinearPlant(), reference, Learning(window=WINDOW), iterations=1, response=RESPONSE)
+    file = history.save_corrections(tmp_path / "u.csv")
+    turned = read_corrections(file, history.joints[::-1], reference.t)
+    assert np.array_equal(turned, history.corrected[:, ::-1])
+    with pytest.raises(ModelError, match="no such file"):
+        read_corrections(tmp_path / "none.csv", history.joints, reference.t)
+    with pytest.raises(ModelError, match="runs=1, expected a whole number, 2"):
+        repeat(LinearPlant(), reference, runs=1)
+    with pytest.raises(ModelError, match=r"shape \(400, 2\), expected finite numbers, \(400, 3\)"):
+        repeat(LinearPlant(), reference, turned[:, :2])

@@ -1,0 +1,68 @@
+"""Robots whose joints turn learn as robots with carts do."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError
+from gantrytau_models import CartServo, DeltaRobot, JointServo
+from gantrytau_optimica import (
+    Gradient,
+    Learning,
+    NormOptimal,
+    Rig,
+    Scatter,
+    Tukey,
+    ZeroPhase,
+    learn,
+    square_reference,
+)
+
+PERIOD = 0.004
+WINDOW = Tukey(0.3, 1.6, lead=0.2)
+
+
+@pytest.fixture(scope="module")
+def delta() -> Rig:
+    servos = [JointServo(k_p=20.0, k_v=12.0, delay=2) for _ in range(3)]
+    return Rig(DeltaRobot(), servos, period=PERIOD, noise=Scatter(encoder=1e-5))
+
+
+def square(rig):
+    start = tuple(rig.kinematics.home.r)
+    return square_reference(0.02, start=start, move=0.2, edge=0.25, begin=0.4, rounds=1, duration=1.6)
+
+
+def test_a_turning_joint_follows_as_its_gain_says(delta):
+    """Steps of the angle have the pole exp(-k_p period), and measured angles the noise of the encoder, in rad."""
+    q = np.tile(delta.kinematics.home.q, (150, 1))
+    q[10:, 0] += 0.01
+    run = delta.run(q, seed=1)
+    left = 0.01 - (np.asarray(run["arms[0].phi"]) - q[0, 0])[30:60]
+    pole = (left[-1] / left[0]) ** (1 / (len(left) - 1))  # in the mean, as other arms swing along
+    assert pole == pytest.approx(np.exp(-20 * PERIOD), abs=0.015)
+    assert np.std(run["measured.q"][:9] - q[:9]) == pytest.approx(1e-5, rel=0.4)
+    assert run.unit("measured.q") == "rad"
+
+
+@pytest.mark.parametrize(
+    ("law", "hertz", "most"), [(None, 10.0, 8.0), (NormOptimal(), 25.0, 3.0), (Gradient(), 25.0, 25.0)]
+)
+def test_a_delta_robot_learns_a_square_by_three_laws(delta, law, hertz, most):
+    learning = Learning(law=law, q=ZeroPhase.butterworth(2, hertz), window=WINDOW)
+    found = learn(delta, square(delta), learning, iterations=5, seed=1)
+    assert found.stability is not None
+    assert found.stability.monotone
+    assert np.all(found.relative[5] < most)
+    assert np.all(found.tool_relative[5, :2] < most)
+    # no run leaves more than was foretold, but for noise and friction
+    for before, after in zip(found.relative[:3], found.relative[1:4], strict=True):
+        assert np.all(after < found.stability.sigma * before + 5)
+
+
+def test_servos_and_references_that_do_not_fit_are_told():
+    with pytest.raises(ModelError, match=r"of shape \(9, 2\), expected \(N, 3\)"):
+        Rig(DeltaRobot(), [JointServo() for _ in range(3)], period=PERIOD).run(np.zeros((9, 2)))
+    with pytest.raises(ModelError, match="found 2 controllers, expected one for each joint"):
+        Rig(DeltaRobot(), [JointServo(), JointServo()], period=PERIOD)
+    with pytest.raises(Exception, match="unit"):
+        Rig(DeltaRobot(), [CartServo() for _ in range(3)], period=PERIOD)
