@@ -10,6 +10,7 @@ import numpy as np
 
 from gantrytau import ModelError, Result, did_you_mean
 
+UNIT = re.compile(r"\s*\[([^\]]*[a-z%][^\]]*)\]$")  # behind a name; [0] is an index
 SAME = 1e-6  # of a period, by which times may differ
 
 
@@ -24,7 +25,7 @@ def write_corrections(
 def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.ndarray) -> np.ndarray:
     """Corrections (N, n) of joints, in their order, at times t (N,) of a reference, from a CSV file in SI.
 
-    Raises ModelError for files that are none, joints that are missing, other times, and what is not finite.
+    Raises ModelError for files that are none, joints that are missing, other units, other times, and what is not finite.
     """
     file = Path(path)
     try:
@@ -37,7 +38,13 @@ def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.
         raise ModelError(
             f"{file}: found a file that is no table of numbers ({error}), expected corrections"
         ) from None
-    names = [re.sub(r"\s*\[[^\]]*[a-z%][^\]]*\]$", "", name.strip()) for name in header]
+    units = [found[1] if (found := UNIT.search(name.strip())) else None for name in header]
+    names = [UNIT.sub("", name.strip()) for name in header]
+    for joint, unit in zip(names[1:], units[1:], strict=True):
+        if joint in joints and unit not in (None, "m", "rad"):
+            raise ModelError(
+                f"{file}: found the column {joint} in {unit}, expected m, or rad of joints that turn; convert it"
+            )
     for joint in joints:
         if joint not in names:
             raise ModelError(

@@ -58,7 +58,7 @@ def learn(
     estimator = Actuators() if estimator is None else estimator
     corrections = Corrections(rig.kinematics, estimator.joints, reference.moving)
     so_far, path = _kept(history)
-    _check(rig, reference, iterations, seed)
+    check_runs("learn", rig, reference, iterations=iterations, seed=seed)
     learning.window.weights(len(reference), reference.period)
     found = so_far or _started(rig, reference, learning, estimator, corrections)
     _check_history(found, reference, corrections)
@@ -100,15 +100,16 @@ def judged(learning: Learning, response: Response, samples: int, count: int, per
     return learning.stability(response, samples)
 
 
-def _check(rig: Plant, reference: Reference, iterations: int, seed: int) -> None:
-    for name, value in (("iterations", iterations), ("seed", seed)):
+def check_runs(verb: str, rig: Plant, reference: Reference, **counts: int) -> None:
+    """Raises ModelError for counts that are none, by their names, and for a reference of another period than the rig's."""
+    for name, value in counts.items():
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
             raise ModelError(
-                f"learn: found {name}={value!r}, expected a whole number, 0 and more", argument=name
+                f"{verb}: found {name}={value!r}, expected a whole number, 0 and more", argument=name
             )
     if abs(reference.period - rig.period) > 1e-6 * rig.period:
         raise ModelError(
-            f"learn: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "
+            f"{verb}: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "
             "again",
             argument="reference",
         )

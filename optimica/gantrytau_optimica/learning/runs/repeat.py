@@ -1,16 +1,17 @@
 """How well a robot repeats a motion: what no learning can take away."""
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau import ModelError
+from gantrytau import GantryTauError, ModelError
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.runs.corrections import Corrections
-from gantrytau_optimica.learning.runs.learn import RUNS
+from gantrytau_optimica.learning.runs.learn import RUNS, LearningError, check_runs
 from gantrytau_optimica.learning.runs.reference import Reference
-from gantrytau_optimica.learning.runs.robot_runs import Plant, forward_speed
+from gantrytau_optimica.learning.runs.robot_runs import Plant
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +62,34 @@ def repeat(
     """Run a reference several times without learning, with corrections of the joints (N, n), such as `read_corrections` has.
 
     window: the part that is judged, the whole run by default. Run k draws with the seed 100 seed + k. Raises ModelError for
-    corrections of another shape, and fewer than two runs.
+    corrections of another shape, or beyond the limits of joints, a reference of another period, and fewer than two runs;
+    LearningError for a run that fails.
     """
+    check_runs("repeat", rig, reference, seed=seed)
     if isinstance(runs, bool) or not isinstance(runs, (int, np.integer)) or runs < 2:
         raise ModelError(f"repeat: found runs={runs!r}, expected a whole number, 2 and more", argument="runs")
     at = Corrections(rig.kinematics, True, reference.moving)
     q_r = at.wanted(reference.r)
+    if isinstance(corrections, (str, os.PathLike)):
+        raise ModelError(
+            f"repeat: found corrections={str(corrections)!r}, expected numbers; read the file, "
+            "read_corrections(path, rig.kinematics.joints, reference.t)",
+            argument="corrections",
+        )
     u = np.zeros_like(q_r) if corrections is None else np.asarray(corrections, dtype=float)
     if u.shape != q_r.shape or not np.all(np.isfinite(u)):
         raise ModelError(
             f"repeat: found corrections of shape {u.shape}, expected finite numbers, {q_r.shape}",
             argument="corrections",
         )
-    v = forward_speed(q_r + u, rig.period)
-    q = np.array([np.asarray(rig.run(q_r + u, v, seed=RUNS * seed + k)["measured.q"]) for k in range(runs)])
+    q_ref, v_ref = at.references(reference.r, u, rig.period)
+    q = np.array([_measured(rig, q_ref, v_ref, RUNS * seed, k) for k in range(runs)])
     weights = (window or Tukey(lead=0.0)).full(len(reference), reference.period)
     return Repetitions(rig.kinematics.joints, q, q_r - q[0], weights)
+
+
+def _measured(rig: Plant, q_ref: np.ndarray, v_ref: np.ndarray, seed: int, k: int) -> np.ndarray:
+    try:
+        return np.asarray(rig.run(q_ref, v_ref, seed=seed + k)["measured.q"])
+    except GantryTauError as error:
+        raise LearningError(f"repeat: run {k} failed: {error}", argument=error.argument) from error

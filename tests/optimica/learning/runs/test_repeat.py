@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Result
+from gantrytau.kinematics import Kinematics
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_optimica import (
     Learning,
+    LearningError,
     Rig,
     Scatter,
     Tukey,
@@ -64,6 +66,10 @@ def test_the_flexible_robot_repeats_itself_to_a_tenth_of_its_error():
             "rows|finite|table",
         ),
         (lambda text: "nothing", "no column"),
+        (
+            lambda text: text.replace("carts[1].s [m]", "carts[1].s [mm]"),
+            r"column carts\[1\].s in mm, expected m",
+        ),
     ],
 )
 def test_files_that_do_not_fit_are_told(tmp_path, change, words):
@@ -87,3 +93,40 @@ def test_columns_in_another_order_are_found_and_a_missing_file_is_told(tmp_path)
         repeat(LinearPlant(), reference, runs=1)
     with pytest.raises(ModelError, match=r"shape \(400, 2\), expected finite numbers, \(400, 3\)"):
         repeat(LinearPlant(), reference, turned[:, :2])
+
+
+class Bounded(Kinematics):
+    """Of a robot whose carts stay within 10 m."""
+
+    @property
+    def limits(self) -> np.ndarray:
+        return np.tile([-10.0, 10.0], (len(self.joints), 1))
+
+
+def test_repetitions_keep_to_limits_and_to_the_period_of_the_rig():
+    """As `learn` does: a robot is not sent beyond its limits, nor faster than its reference."""
+    slow = LinearPlant()
+    slow.period = 0.008
+    with pytest.raises(ModelError, match=r"repeat: found a reference every 0.004 s, expected every 0.008 s"):
+        repeat(slow, line())
+    plant = LinearPlant()
+    plant.kinematics = Bounded(GantryTau(prototypes.L1))
+    with pytest.raises(ModelError, match=r"of carts\[\d\]\.s at .*within its limits, -10 to 10"):
+        repeat(plant, line(), np.full((400, 3), 50.0))
+    assert plant.runs == 0  # refused before it moved
+    for seed in (-1, 1.5, True):
+        with pytest.raises(ModelError, match=r"repeat: found seed=.*expected a whole number"):
+            repeat(plant, line(), seed=seed)
+    with pytest.raises(ModelError, match=r"found corrections='u.csv', expected numbers; read the file"):
+        repeat(plant, line(), "u.csv")  # pyright: ignore[reportArgumentType]
+
+
+def test_a_repetition_that_fails_is_told_with_its_number():
+    class Broken(LinearPlant):
+        def run(self, position: np.ndarray, velocity: np.ndarray, seed: int = 0) -> Result:
+            if seed == 2:
+                raise ModelError("the drive is off")
+            return super().run(position, velocity, seed)
+
+    with pytest.raises(LearningError, match="repeat: run 2 failed: the drive is off"):
+        repeat(Broken(), line())
