@@ -1,5 +1,7 @@
 """Corrections on file, and how well a motion is repeated."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -114,7 +116,8 @@ def test_repetitions_keep_to_limits_and_to_the_period_of_the_rig():
     with pytest.raises(ModelError, match=r"of carts\[\d\]\.s at .*within its limits, -10 to 10"):
         repeat(plant, line(), np.full((400, 3), 50.0))
     assert plant.runs == 0  # refused before it moved
-    for seed in (-1, 1.5, True):
+    wrong: list[Any] = [-1, 1.5, True]
+    for seed in wrong:
         with pytest.raises(ModelError, match=r"repeat: found seed=.*expected a whole number"):
             repeat(plant, line(), seed=seed)
     with pytest.raises(ModelError, match=r"found corrections='u.csv', expected numbers; read the file"):
