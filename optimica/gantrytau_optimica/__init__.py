@@ -72,6 +72,7 @@ from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
 from gantrytau_optimica.learning.laws.learning import Learning
+from gantrytau_optimica.learning.pose_maps import StraightAxes
 from gantrytau_optimica.learning.rig import Rig
 from gantrytau_optimica.learning.runs.corrections_file import read_corrections
 from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
@@ -175,6 +176,7 @@ __all__ = [
     "ServoModel",
     "SimulatorPlant",
     "StepResponse",
+    "StraightAxes",
     "TMac",
     "TradeOff",
     "Tukey",

@@ -11,6 +11,7 @@ from gantrytau.dae import Dae
 from gantrytau.errors import StructureError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.kinematics import driven_joints
+from gantrytau_optimica.learning.pose_maps import PoseMap, StraightAxes
 from gantrytau_optimica.learning.readings import with_readings
 from gantrytau_optimica.learning.scatter import STILL, Scatter
 from gantrytau_optimica.learning.servo_loop import drive, servo_loop, unit_of
@@ -48,7 +49,7 @@ class Rig:
             raise ModelError(f"Rig: found noise={noise!r}, expected a Scatter, or None for none")
         self.period = float(period)
         self._stiff = stiff
-        self._kinematics: Kinematics | None = None
+        self._kinematics: PoseMap | None = None
         self.noise = STILL if noise is None else noise
         self.robot = translate(model)
         self.joints = driven_joints(self.robot)
@@ -120,13 +121,18 @@ class Rig:
         return self._with_readings(t, values, units, sensed, random)
 
     @property
-    def kinematics(self) -> Kinematics:
-        """Those of the robot that does not give way. Raises ModelError for a robot that gives way without such a one."""
+    def kinematics(self) -> PoseMap:
+        """Those of the robot that does not give way; of a machine without a tool `StraightAxes`.
+
+        Raises ModelError for a robot that gives way without such a one, and for more than three joints without a tool.
+        """
         if self._kinematics is None:
             self._kinematics = self._found_kinematics()
         return self._kinematics
 
-    def _found_kinematics(self) -> Kinematics:
+    def _found_kinematics(self) -> PoseMap:
+        if self._stiff is None and "tool.r" not in self.robot.vectors:
+            return StraightAxes(self.joints)
         try:
             return Kinematics(self.robot if self._stiff is None else self._stiff)
         except StructureError:

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import Input, Model, ModelError, Parameter, Real, der
 from gantrytau_models import CartServo, DeltaRobot, JointServo
 from gantrytau_optimica import (
     Gradient,
     Learning,
     NormOptimal,
+    Reference,
     Rig,
     Scatter,
+    StraightAxes,
     Tukey,
     ZeroPhase,
     learn,
@@ -57,6 +59,55 @@ def test_a_delta_robot_learns_a_square_by_three_laws(delta, law, hertz, most):
     # no run leaves more than was foretold, but for noise and friction
     for before, after in zip(found.relative[:3], found.relative[1:4], strict=True):
         assert np.all(after < found.stability.sigma * before + 5)
+
+
+class Sledge(Model):
+    """A mass on a guideway, held by a spring."""
+
+    m = Parameter(80.0, unit="kg", description="mass")
+    c = Parameter(2e4, unit="N/m", description="stiffness")
+    s = Real(unit="m", description="position")
+    v = Real(unit="m/s", description="speed")
+    f = Input(unit="N", start=0.0, description="force")
+
+    def equations(self):
+        yield self.v == der(self.s)
+        yield self.m * der(self.v) + self.c * self.s == self.f
+
+
+class Machine(Model):
+    """Two axes without a tool."""
+
+    x, y = Sledge(), Sledge(m=40.0)
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_machines_of_one_and_two_axes_learn(axes):
+    class Lone(Model):
+        x = Sledge()
+
+    servos = [CartServo(k_v=300 * 80.0), CartServo(k_v=300 * 40.0)][:axes]
+    rig = Rig((Lone, Machine)[axes - 1](), servos, period=PERIOD, noise=Scatter())
+    t = PERIOD * np.arange(300)
+    share = np.clip((t - 0.3) / 0.5, 0, 1)
+    r = np.zeros((300, 3))
+    r[:, :axes] = (
+        0.02 * np.column_stack([np.sin(np.pi * share) ** 4, np.sin(2 * np.pi * share) ** 4])[:, :axes]
+    )
+    found = learn(rig, Reference(t, r), Learning(window=Tukey(0.2, 1.2, lead=0.1)), iterations=6, seed=1)
+    assert found.names == ("x.s", "y.s")[:axes]
+    assert found.stability is not None
+    assert found.stability.monotone
+    assert np.all(found.relative[6] < [5, 20][:axes])  # what is left lies above 10 Hz
+    assert found.tool_relative[6, :axes] == pytest.approx(found.relative[6], abs=0.5)
+
+
+def test_axes_that_are_not_there_cannot_move():
+    axes = StraightAxes(["x.s"])
+    assert axes.fk([[0.1], [0.2]])[0].tolist() == [[0.1, 0, 0], [0.2, 0, 0]]
+    assert np.isnan(axes.ik([[0.1, 0.0, 0.0], [0.1, 0.2, 0.0]])).tolist() == [[False], [True]]
+    with pytest.raises(ModelError, match="found the joints a, b, c, d, expected one to three"):
+        StraightAxes(list("abcd"))
 
 
 def test_servos_and_references_that_do_not_fit_are_told():

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.kinematics import Kinematics
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
 from gantrytau_optimica.learning.estimators.estimators import Measured
+from gantrytau_optimica.learning.pose_maps import PoseMap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ MOVES = 0.05  # of the largest motion, from which an axis is drawn
 def plot_estimates(
     run: Result,
     estimators: Mapping[str, Estimator],
-    kinematics: Kinematics,
+    kinematics: PoseMap,
     *,
     file: str | os.PathLike[str] | None = None,
 ) -> "Figure":

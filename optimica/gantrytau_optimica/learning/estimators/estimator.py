@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
+from gantrytau_optimica.learning.pose_maps import PoseMap
 
 SENSORS = {"q": "measured.q", "z": "measured.q", "a": "measured.a", "r": "measured.r"}
 MOVED = 1e-3  # of the motion, from which a reference has left its first position; corrections begin before it does
@@ -38,7 +38,7 @@ class Estimator:
         """Deviations of the estimate (N, n, ...) for those of what is read, by letter, samples every period s."""
         raise NotImplementedError
 
-    def estimate(self, run: Result, kinematics: Kinematics) -> np.ndarray:
+    def estimate(self, run: Result, kinematics: PoseMap) -> np.ndarray:
         """Positions (N, n) of the actuators, or (N, 3) of the tool, in m, by what was measured in a run from rest.
 
         Sensors are set to zero at rest, where arms do not bend. Raises ModelError for a run without the sensors that are
@@ -50,12 +50,12 @@ class Estimator:
         base = means[letter] if letter in means else self._signal(letter, run, kinematics)[still].mean(axis=0)
         return base + self.combine(signals, sampling_period(run))
 
-    def signals(self, run: Result, kinematics: Kinematics) -> dict[str, np.ndarray]:
+    def signals(self, run: Result, kinematics: PoseMap) -> dict[str, np.ndarray]:
         """Deviations from rest (N, n) of what is read, by letter; raises as `estimate` does."""
         return self._deviations(run, kinematics)[1]
 
     def _deviations(
-        self, run: Result, kinematics: Kinematics
+        self, run: Result, kinematics: PoseMap
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Means at rest, and deviations from them, by letter."""
         signals = {letter: self._signal(letter, run, kinematics) for letter in self.reads}
@@ -73,7 +73,7 @@ class Estimator:
             _check_accelerometer(type(self).__name__, found["z"], found["a"], sampling_period(run))
         return means, found
 
-    def _signal(self, letter: str, run: Result, kinematics: Kinematics) -> np.ndarray:
+    def _signal(self, letter: str, run: Result, kinematics: PoseMap) -> np.ndarray:
         name = SENSORS[letter]
         there = sorted({n.split("[")[0] for n in run.names if n.startswith("measured.")})
         if name not in there:

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from gantrytau import ModelError, Result
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
-from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.learning.estimators.estimator import Estimator, sampling_period
+from gantrytau_optimica.learning.pose_maps import PoseMap
 
 AXES = 3  # of the kinematics
 LASTING = 1e-6  # of its size, that a motion must lose at least from sample to sample to come to rest
@@ -69,7 +69,7 @@ class Kalman(Estimator):
         found[:, : len(self.system.C)] = simulated + answered(self._correction, left)[0]
         return found
 
-    def with_noise_of(self, run: Result, kinematics: Kinematics) -> "Kalman":
+    def with_noise_of(self, run: Result, kinematics: PoseMap) -> "Kalman":
         """The same with the covariance R2 of measured less simulated accelerations of a run, (7.22).
 
         Raises ModelError as `estimate` does.

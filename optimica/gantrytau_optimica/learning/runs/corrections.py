@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.kinematics import Kinematics
+from gantrytau_optimica.learning.pose_maps import PoseMap
 from gantrytau_optimica.learning.runs.robot_runs import forward_speed
 
 AXES = "xyz"
@@ -18,7 +18,7 @@ class Corrections:
     joints: whether of joints; moving: axes of the tool that are corrected otherwise.
     """
 
-    def __init__(self, kinematics: Kinematics, joints: bool, moving: Sequence[int]):
+    def __init__(self, kinematics: PoseMap, joints: bool, moving: Sequence[int]):
         self.kinematics = kinematics
         self.joints = joints
         self.picked = tuple(range(len(kinematics.joints))) if joints else tuple(moving)

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from gantrytau import Result
-from gantrytau.kinematics import Kinematics
+from gantrytau_optimica.learning.pose_maps import PoseMap
 
 
 class Plant(Protocol):
@@ -17,7 +17,7 @@ class Plant(Protocol):
     period: float
 
     @property
-    def kinematics(self) -> Kinematics: ...
+    def kinematics(self) -> PoseMap: ...
 
     def run(self, position: np.ndarray, velocity: np.ndarray, seed: int = 0) -> Result:
         """What it does for positions (N, n) and speeds (N, n) of its joints, given every period, from rest.

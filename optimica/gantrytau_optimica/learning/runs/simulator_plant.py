@@ -6,7 +6,7 @@ import numpy as np
 
 from gantrytau import ModelError, Result, Samples
 from gantrytau.errors import did_you_mean
-from gantrytau.kinematics import Kinematics
+from gantrytau_optimica.learning.pose_maps import PoseMap
 from gantrytau_optimica.learning.readings import with_readings
 from gantrytau_optimica.learning.scatter import STILL, Scatter
 
@@ -29,7 +29,7 @@ class SimulatorPlant:
     def __init__(
         self,
         simulator: Simulator,
-        kinematics: Kinematics,
+        kinematics: PoseMap,
         *,
         period: float,
         position: Names,
