@@ -95,6 +95,15 @@ class Learning:
 
     def __post_init__(self):
         Shifted(self.gain, self.shift)
+        for name, value, words, example in (
+            ("q", self.q, ("apply",), "ZeroPhase.butterworth(2, 10.0)"),
+            ("window", self.window, ("weights", "full"), "Tukey(1.2, 4.5)"),
+            ("law", self.law, ("corrections",), "Gradient()"),
+        ):
+            if not (name == "law" and value is None) and not all(hasattr(value, word) for word in words):
+                raise ModelError(
+                    f"Learning: found {name}={value!r}, expected one such as {example}", argument=name
+                )
 
     @property
     def corrections_of(self) -> CorrectionLaw:

@@ -160,8 +160,8 @@ def _foretelling(
     if best is None or best[0] < FAIR:
         there = f"{best[0]:.0f} % of the estimate foretold" if best else "no system that comes to rest"
         raise ModelError(
-            f"estimated_response: found {there}, expected {FAIR:.0f} % at least; take a larger amplitude, or name a "
-            f"response{words}",
+            f"estimated_response: found {there}, expected {FAIR:.0f} % at least; take "
+            f"response=estimated_response(..., amplitude=0.003), or a model of your own{words}",
             argument="response",
         )
     return best[1], best[2]
@@ -190,8 +190,8 @@ def dead_time(u: np.ndarray, y: np.ndarray) -> int:
         least = min(least, int(np.argmax(sure.any(axis=1))) if sure.any() else LAGS)
     if least == LAGS:
         raise ModelError(
-            "estimated_response: found nothing in what is measured that follows corrections; take a larger amplitude, or "
-            "look at the sensors"
+            "estimated_response: found nothing in what is measured that follows corrections; take "
+            "response=estimated_response(..., amplitude=0.003), or look at the sensors"
         )
     return least
 

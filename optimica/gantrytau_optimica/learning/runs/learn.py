@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, Result
-from gantrytau_optimica.learning.estimators.estimator import Estimator
-from gantrytau_optimica.learning.estimators.estimators import Actuators, Measured
+from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
+from gantrytau_optimica.learning.estimators.estimators import Actuators
 from gantrytau_optimica.learning.laws.learning import Learning, Stability
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, period_of
 from gantrytau_optimica.learning.runs.corrections import Corrections
@@ -19,9 +19,9 @@ from gantrytau_optimica.learning.runs.estimated_response import estimated_respon
 from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
+from gantrytau_optimica.learning.runs.run_checks import check_history, check_kinds, check_runs, check_window
 
 RUNS = 100  # seeds apart, so that no two runs of a trial draw the same
-SAME = 1e-9  # of a period, or m, by which references may differ
 
 
 class LearningError(GantryTauError):
@@ -56,12 +56,13 @@ def learn(
     """
     learning = Learning() if learning is None else learning
     estimator = Actuators() if estimator is None else estimator
+    check_kinds(rig, reference, learning, estimator)
+    check_runs("learn", rig, reference, iterations=iterations, seed=seed)
+    check_window(learning, reference)
     corrections = Corrections(rig.kinematics, estimator.joints, reference.moving)
     so_far, path = _kept(history)
-    check_runs("learn", rig, reference, iterations=iterations, seed=seed)
-    learning.window.weights(len(reference), reference.period)
     found = so_far or _started(rig, reference, learning, estimator, corrections)
-    _check_history(found, reference, corrections)
+    check_history(found, reference, corrections)
     if response is None:
         response = estimated_response(rig, reference, estimator, seed=RUNS * seed)
     learning = learning.with_response(response)
@@ -98,37 +99,6 @@ def judged(learning: Learning, response: Response, samples: int, count: int, per
             argument="response",
         )
     return learning.stability(response, samples)
-
-
-def check_runs(verb: str, rig: Plant, reference: Reference, **counts: int) -> None:
-    """Raises ModelError for counts that are none, by their names, and for a reference of another period than the rig's."""
-    for name, value in counts.items():
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
-            raise ModelError(
-                f"{verb}: found {name}={value!r}, expected a whole number, 0 and more", argument=name
-            )
-    if abs(reference.period - rig.period) > 1e-6 * rig.period:
-        raise ModelError(
-            f"{verb}: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "
-            "again",
-            argument="reference",
-        )
-
-
-def _check_history(history: History, reference: Reference, corrections: Corrections) -> None:
-    old = history.reference
-    if len(old) != len(reference) or np.abs(old.r - reference.r).max() > SAME:
-        raise ModelError(
-            "learn: found a reference that is not the one of the history, expected the same, as corrections belong to it; "
-            "start without history",
-            argument="reference",
-        )
-    if history.names != corrections.names:
-        raise ModelError(
-            f"learn: found a history of {', '.join(history.names)} and an estimator of {', '.join(corrections.names)}, "
-            "expected the same corrections; start without history",
-            argument="history",
-        )
 
 
 def _started(
@@ -182,7 +152,9 @@ def _next_run(
 
 
 def _tool(run: Result, rig: Plant) -> np.ndarray:
-    """Where the tool was, (N, 3): as measured, else by the kinematics of the measured joints."""
-    if any(name.startswith("measured.r") for name in run.names):
-        return Measured().estimate(run, rig.kinematics)
-    return rig.kinematics.fk(np.asarray(run["measured.q"]))[0]
+    """Where the tool was, (N, 3): as measured, set to the kinematics at rest, else by the kinematics alone."""
+    z = rig.kinematics.fk(np.asarray(run["measured.q"]))[0]
+    if not any(name.startswith("measured.r") for name in run.names):
+        return z
+    r, still = np.asarray(run["measured.r"]), at_rest(run)
+    return r + np.mean((z - r)[still], axis=0)

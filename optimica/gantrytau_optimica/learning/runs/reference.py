@@ -28,7 +28,8 @@ class Reference:
             expected = f"(N, {columns})" if columns else "(N,)"
             if found.ndim != 1 + (columns > 0) or (columns and found.shape[1] != columns) or len(found) < 3:
                 raise ModelError(
-                    f"Reference: found {name} of shape {found.shape}, expected {expected}", argument=name
+                    f"Reference: found {name} of shape {found.shape}, expected {expected}, N of 3 at least",
+                    argument=name,
                 )
             if not np.all(np.isfinite(found)):
                 raise ModelError(

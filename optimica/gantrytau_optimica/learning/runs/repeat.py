@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 from gantrytau import GantryTauError, ModelError
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.runs.corrections import Corrections
-from gantrytau_optimica.learning.runs.learn import RUNS, LearningError, check_runs
+from gantrytau_optimica.learning.runs.learn import RUNS, LearningError
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
+from gantrytau_optimica.learning.runs.run_checks import check_runs
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Learning on a plant that is known exactly: what lifted systems foretell is what runs do."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -168,6 +168,11 @@ def test_a_run_that_fails_is_told_with_those_before_it():
             "reference that rests",
         ),
         (dict(history="runs.txt"), "suffix '.txt', expected .npz"),
+        (dict(estimator=Measured), "found estimator=type, expected one such as Actuators"),
+        (dict(learning=Actuators()), "found learning=Actuators, expected one such as Learning"),
+        (dict(reference=line().r), "found reference=ndarray, expected one such as square_reference"),
+        (dict(learning=Learning(window=Tukey(0.4, 0.8, lead=0.2, alpha=1.0))), "a window whose flanks meet"),
+        (dict(response="none"), "the response 'none', expected a sampled linear system"),
     ],
 )
 def test_what_does_not_fit_is_told_by_name(wrong, words):
@@ -177,6 +182,28 @@ def test_what_does_not_fit_is_told_by_name(wrong, words):
     reference = asked.pop("reference")
     with pytest.raises(ModelError, match=words):
         learn(LinearPlant(), reference, asked.pop("learning"), asked.pop("estimator", None), **asked)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: learn(cast(Any, None), line()), "None without run, period, kinematics, expected a Rig"),
+        (lambda: Learning(law=cast(Any, "gradient")), "law='gradient', expected one such as Gradient"),
+        (lambda: Learning(q=cast(Any, 10.0)), r"q=10.0, expected one such as ZeroPhase.butterworth"),
+        (lambda: Learning(window=cast(Any, None)), "window=None, expected one such as Tukey"),
+        (
+            lambda: Reference([0.0, 0.004], np.zeros((2, 3))),
+            r"t of shape \(2,\), expected \(N,\), N of 3 at least",
+        ),
+        (
+            lambda: learn(LinearPlant(noise=1e-3), line(), Learning(window=WINDOW)),
+            r"follows corrections; take response=estimated_response\(..., amplitude=0.003\)",
+        ),
+    ],
+)
+def test_things_of_another_kind_are_told_by_name(wrong, words):
+    with pytest.raises(ModelError, match=words):
+        wrong()
 
 
 def test_another_reference_or_estimator_cannot_go_on_with_a_history():

@@ -1,5 +1,7 @@
 """Learning on an FMU is learning on the model that it was made of."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -93,7 +95,7 @@ class Recorded:
 
 
 def recorded(simulator, **words) -> SimulatorPlant:
-    asked = dict(period=PERIOD, position="q_ref", q="q", r="r") | words
+    asked: dict[str, Any] = dict(period=PERIOD, position="q_ref", q="q", r="r") | words
     return SimulatorPlant(simulator, KINEMATICS, **asked)
 
 
