@@ -24,7 +24,7 @@ class Corrections:
         self.picked = tuple(range(len(kinematics.joints))) if joints else tuple(moving)
         if not moving:
             raise ModelError(
-                "learn: found a reference that rests, expected one that moves", argument="reference"
+                "corrections: found a reference that rests, expected one that moves", argument="reference"
             )
 
     @property
@@ -62,7 +62,7 @@ class Corrections:
         if bad.size:
             when = f" at {bad[0] * period:g} s" if period else f" in row {bad[0]}"
             raise ModelError(
-                f"learn: found the tool at {np.round(r[bad[0]], 4).tolist()} m{when}, expected one within reach; "
+                f"corrections: found the tool at {np.round(r[bad[0]], 4).tolist()} m{when}, expected one within reach; "
                 "correct less, or move the reference inside",
                 argument="reference",
             )
@@ -75,7 +75,8 @@ class Corrections:
             row, joint = np.unravel_index(np.argmax(over), over.shape)
             low, high = limits[joint]
             raise ModelError(
-                f"learn: found the reference {q[row, joint]:.5g} of {self.kinematics.joints[joint]} at {row * period:g} s, "
-                f"expected one within its limits, {low:g} to {high:g}; correct less, or move the reference inside",
+                f"corrections: found the reference {q[row, joint]:.5g} of {self.kinematics.joints[joint]} at "
+                f"{row * period:g} s, expected one within its limits, {low:g} to {high:g}; correct less, or move "
+                "the reference inside",
                 argument="reference",
             )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError, Result, did_you_mean
+from gantrytau_optimica.learning.servo_loop import unit_of
 
 UNIT = re.compile(r"\s*\[([^\]]*[a-z%][^\]]*)\]$")  # behind a name; [0] is an index
 SAME = 1e-6  # of a period, by which times may differ
@@ -41,10 +42,12 @@ def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.
     units = [found[1] if (found := UNIT.search(name.strip())) else None for name in header]
     names = [UNIT.sub("", name.strip()) for name in header]
     for joint, unit in zip(names[1:], units[1:], strict=True):
-        if joint in joints and unit not in (None, "m", "rad"):
+        if joint in joints and unit not in (None, unit_of(joints)):
             raise ModelError(
-                f"{file}: found the column {joint} in {unit}, expected m, or rad of joints that turn; convert it"
+                f"{file}: found the column {joint} in {unit}, expected {unit_of(joints)}; convert it"
             )
+        if joint in joints and names.count(joint) > 1:
+            raise ModelError(f"{file}: found the column {joint} twice, expected one for each joint")
     for joint in joints:
         if joint not in names:
             raise ModelError(

@@ -54,6 +54,12 @@ def test_the_flexible_robot_repeats_itself_to_a_tenth_of_its_error():
     assert np.all(found.rms > 1e-6)  # m, more than encoders read
 
 
+def with_row(text, number, row):
+    lines = text.splitlines()
+    lines[number] = row
+    return "\n".join(lines)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -63,10 +69,10 @@ def test_the_flexible_robot_repeats_itself_to_a_tenth_of_its_error():
         ),
         (lambda text: "\n".join(text.splitlines()[:-1]), "found 399 rows, expected 400"),
         (lambda text: text.replace("0.008,", "0.009,", 1), "found the time 0.009 s in row 2"),
-        (
-            lambda text: text.replace("\n0.0,", "\n0.0,nan,0,0\n#", 1).replace("\n#", "\n0.0,", 1),
-            "rows|finite|table",
-        ),
+        (lambda text: with_row(text, 3, "0.008,nan,0,0"), "a correction that is not finite in row 2"),
+        (lambda text: with_row(text, 3, "0.008,x,0,0"), "no table of numbers"),
+        (lambda text: text.replace("carts[1].s [m]", "carts[1].s [rad]"), "in rad, expected m; convert it"),
+        (lambda text: text.replace("carts[2].s", "carts[1].s"), r"column carts\[1\].s twice, expected one"),
         (lambda text: "nothing", "no column"),
         (
             lambda text: text.replace("carts[1].s [m]", "carts[1].s [mm]"),
