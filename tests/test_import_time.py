@@ -23,6 +23,12 @@ HEAVY = [
 ]
 
 
+def test_the_language_leaves_all_of_scipy_alone():
+    code = "import sys, gantrytau; print(*[name for name in sys.modules if name.startswith('scipy')])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.split() == []
+
+
 @pytest.mark.parametrize("package", ["gantrytau", "gantrytau_models", "gantrytau_optimica"])
 def test_import_leaves_heavy_modules_alone(package):
     code = f"import sys, {package}; print(*[name for name in {HEAVY} if name in sys.modules])"

@@ -5,8 +5,6 @@ from collections.abc import Iterable
 
 import casadi as ca
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -43,6 +41,9 @@ def seen_sizes(coordinates: Coordinates, largest: np.ndarray) -> tuple[float, ..
     largest: absolute value of each state in the run, (n,). States that hang together are asked together: a small one
     among large ones may be nothing but rounding, and keeps its size.
     """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
     before = np.array(coordinates.sizes)
     if not np.any((largest > 0) & (largest < SMALL * before)):
         return None

@@ -3,7 +3,6 @@
 import warnings
 
 import numpy as np
-from scipy.linalg import expm, logm
 
 
 def held(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -11,6 +10,8 @@ def held(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.nd
 
     Van Loan, Computing integrals involving the matrix exponential, IEEE Trans. Automatic Control 23 (1978).
     """
+    from scipy.linalg import expm
+
     n, m = B.shape
     whole = expm(period * np.block([[A, B], [np.zeros((m, n + m))]]))
     return whole[:n, :n], whole[:n, n:]
@@ -22,6 +23,8 @@ def unheld(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.
     By the principal logarithm, which takes every mode to be below half of the sampling frequency. A must have no
     eigenvalue at zero or on the negative real axis: there is no real logarithm. NaN where rounding spoils all.
     """
+    from scipy.linalg import logm
+
     n, m = B.shape
     whole = np.block([[A, B], [np.zeros((m, n)), np.eye(m)]])
     with warnings.catch_warnings():
@@ -35,6 +38,8 @@ def unheld(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.
 
 def ramped(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Phi, G0, G1 with x(t + T) = Phi x + G0 u(t) + G1 u(t + T), u on a straight line in between."""
+    from scipy.linalg import expm
+
     n, m = B.shape
     whole = np.zeros((n + 2 * m, n + 2 * m))
     whole[:n, : n + m] = period * np.hstack([A, B])

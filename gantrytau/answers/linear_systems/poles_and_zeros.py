@@ -1,7 +1,6 @@
 """Poles, transmission zeros and damping of linear systems."""
 
 import numpy as np
-from scipy.linalg import matrix_balance
 
 ROUNDING = 1e-10  # of the largest singular value, below which a direction of a balanced system is none
 SAME = 9  # digits to which sizes of poles are compared when they are sorted
@@ -53,6 +52,8 @@ def _balanced(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The same system with states, inputs and outputs measured so that units count little; zeros stay."""
+    from scipy.linalg import matrix_balance
+
     n = len(A)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n] = A
