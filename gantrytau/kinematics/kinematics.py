@@ -288,7 +288,7 @@ def driven_joints(dae: Dae) -> tuple[str, ...]:
     if not lengths and not angles:
         raise ModelError(
             f"Kinematics: {dae.name} has the inputs {', '.join(dae.inputs) or 'none'}, expected forces x.f beside x.s or "
-            "torques x.tau beside x.phi; name the actuator coordinates by joints="
+            "torques x.tau beside x.phi, where x is a component; name the actuator coordinates by joints="
         )
     return (*lengths, *angles)
 

@@ -1,12 +1,22 @@
 """`gantrytau learn`: a robot that learns a motion from run to run, in several ways, as a file describes them."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import CommandError, as_json, note, refusing, reporting
+from gantrytau.commands.printing.reporting import (
+    INTERRUPTED,
+    CommandError,
+    as_json,
+    fail,
+    note,
+    refusing,
+    reporting,
+)
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
@@ -17,7 +27,8 @@ SPELLING = Spelling(
     ("learn", "design_q", "estimated_response", "square_reference", "Tukey"),
     {"iterations": "--iterations", "seed": "--seed", "history": "--output", "learning": "learning"}
     | {"limit": "open_to", "window": "learning.window", "reference": "reference"},
-    exactly={"force=True runs it all the same": "--force runs it all the same"},
+    exactly={"force=True runs it all the same": "--force runs it all the same"}
+    | {"start without history": "take another --output"},
 )
 
 
@@ -68,7 +79,8 @@ def learn(
         if output is not None:
             output.mkdir(parents=True, exist_ok=True)
         tell = None if json else lambda words: note(f"{words} ...")
-        found = learn_cases(rig, folder=output, force=force, progress=tell)
+        with _interrupts(output, json):
+            found = learn_cases(rig, folder=output, force=force, progress=tell)
         files = [] if output is None else kept(found, output)
         if json:
             typer.echo(as_json({**summary(found), "files": [str(path) for path in files]}))
@@ -78,6 +90,24 @@ def learn(
         typer.echo(str(found))
         for path in files:
             typer.echo(f"Written: {path}")
+
+
+@contextmanager
+def _interrupts(folder: Path | None, json: bool) -> Iterator[None]:
+    """Ctrl-C says where the runs are that were finished."""
+    from gantrytau_optimica import LearningError
+
+    try:
+        yield
+    except (KeyboardInterrupt, LearningError) as error:
+        if isinstance(error, LearningError) and not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        where = (
+            "nothing was written; --output keeps runs as they are finished"
+            if folder is None
+            else f"finished runs are kept in {folder}, and the same command goes on from them"
+        )
+        fail(f"Interrupted; {where}", INTERRUPTED, json)
 
 
 def kept(found: "LearntCases", folder: Path) -> list[Path]:

@@ -26,9 +26,10 @@ class Rig:
     """A robot model with a controller for each driven joint, that runs references given every `period` seconds.
 
     controllers: components such as `gantrytau_models.CartServo`, one for each force x.f beside x.s, or `JointServo` for
-    each torque x.tau beside x.phi, with q_ref, v_ref, q, v, f_ff and f. noise: what differs from run to run (`Scatter`),
-    nothing if None; friction that differs is one with the inputs `level` and `z_0`, such as `PreslidingFriction`. stiff:
-    the robot that does not give way, whose `kinematics` the controllers go by; by default the model itself.
+    each torque x.tau beside x.phi, where x is a component of the model, with q_ref, v_ref, q, v, f_ff and f. noise: what
+    differs from run to run (`Scatter`), nothing if None; friction that differs is one with the inputs `level` and `z_0`,
+    such as `PreslidingFriction`. stiff: the robot that does not give way, whose `kinematics` the controllers go by; by
+    default the model itself.
     Translation takes about a second, once; each run some tenths of one.
     Raises ModelError for a period that is not above zero or not that of the controllers, controllers that do not fit, and
     friction that cannot differ although it should.
@@ -52,7 +53,13 @@ class Rig:
         self._kinematics: PoseMap | None = None
         self.noise = STILL if noise is None else noise
         self.robot = translate(model)
-        self.joints = driven_joints(self.robot)
+        try:
+            self.joints = driven_joints(self.robot)
+        except ModelError as error:
+            told = str(error).removeprefix("Kinematics: ").partition(";")[0]
+            raise ModelError(
+                f"Rig: {told}; make what is driven a component with the input f, and s and v beside it"
+            ) from error
         self.loop = translate(servo_loop(model, controllers, self.joints), events=True)
         for k in range(len(self.joints)):
             own = self.loop.parameter_values.get(f"controllers[{k}].period", period)
@@ -168,7 +175,8 @@ class Rig:
         return found
 
     def __repr__(self) -> str:
-        return f"<Rig: {self.robot.name} under {len(self.joints)} servos, every {self.period:g} s>"
+        n = len(self.joints)
+        return f"<Rig: {self.robot.name} under {n} servo{'s' * (n > 1)}, every {self.period:g} s>"
 
     def _reference(self, word: str, values: ArrayLike) -> np.ndarray:
         try:

@@ -1,10 +1,12 @@
 """`gantrytau learn`: from a file to histories, corrections and pictures; what is wrong with it, by its place."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
+from gantrytau import ModelError
 from gantrytau_optimica import RIG_EXAMPLE, History, read_rig
 
 PLANT = """\
@@ -18,6 +20,20 @@ def swinging():
 
 
 nothing = 3
+"""
+STOPPED = """
+
+class Stopped(LinearPlant):
+    calls = 0
+
+    def run(self, *words, **more):
+        self.calls += 1
+        if self.calls == {call}:
+            raise KeyboardInterrupt
+        return super().run(*words, **more)
+
+
+stopped = Stopped(noise=1e-6)
 """
 RIG = """\
 [rig]
@@ -70,6 +86,40 @@ def test_ways_to_learn_are_compared_and_kept(run, rig, tmp_path):
     assert np.array_equal(np.array(told["cases"][0]["relative"])[:3], first.relative)
     assert len(told["cases"][0]["relative"]) == 4
     assert told["cases"][0]["sigma"] < 1
+
+
+def test_runs_on_file_are_not_gone_on_with_by_another_law_or_estimator(run, rig, tmp_path):
+    """Their errors would stand beside the sigma of a law that did not make them."""
+    folder = tmp_path / "learnt"
+    assert run("learn", rig, "--case", "one", "--output", folder).exit_code == 0
+    for old, new, word in (
+        ("cut_off = 10.0", "cut_off = 10.0\ngain = 0.5", "gain, shift, law, Q or window"),
+        ('"actuators"', '"kinematic"', "estimator"),
+    ):
+        rig.write_text(RIG.replace(old, new))
+        answer = run("learn", rig, "--case", "one", "--output", folder)
+        assert answer.exit_code != 0
+        assert f"case-one.npz by another {word}, expected what learns now; take another folder" in " ".join(
+            answer.output.split()
+        )
+    rig.write_text(RIG)
+    assert run("learn", rig, "--case", "one", "--output", folder).exit_code == 0
+    rig.write_text(RIG.replace("200 ms", "190 ms"))
+    assert "take another --output" in run("learn", rig, "--case", "one", "--output", folder).output
+
+
+def test_an_interrupt_says_where_finished_runs_are(run, rig, tmp_path):
+    """Whether it comes within a run of learning, or while what corrections do is measured."""
+    folder = tmp_path / "learnt"
+    for call in (1, 4):
+        (tmp_path / "plant.py").write_text(PLANT + STOPPED.format(call=call))
+        rig.write_text(RIG.replace("plant.py:rig", "plant.py:stopped"))
+        answer = run("learn", rig, "--case", "one", "--output", folder)
+        assert answer.exit_code == 130
+        assert f"Interrupted; finished runs are kept in {folder}" in answer.output.replace("\n", "")
+        assert (folder / "case-one.npz").exists() == (call > 1)
+    answer = run("learn", rig, "--case", "one")
+    assert "Interrupted; nothing was written; --output keeps runs" in " ".join(answer.output.split())
 
 
 def test_what_diverges_is_refused_by_its_option(run, rig):
@@ -134,6 +184,13 @@ def test_names_and_files_that_do_not_exist(run, rig, tmp_path):
     assert "gantrytau learn --example > rig.toml" in run("learn").output
 
 
+def test_a_plant_imports_what_stands_beside_it(rig, tmp_path):
+    (tmp_path / "beside_the_plant.py").write_text(PLANT)
+    (tmp_path / "plant.py").write_text("from beside_the_plant import rig\n")
+    assert read_rig(rig).plant().period == 0.004
+    assert str(tmp_path) not in sys.path
+
+
 def test_a_motion_of_ones_own_is_read_from_a_file(rig, tmp_path):
     t = 0.004 * np.arange(300)
     r = np.column_stack([t, 0.9 + 0.01 * np.clip(t - 0.4, 0, 0.5), 2.7 + 0 * t, -0.7 + 0 * t])
@@ -141,6 +198,13 @@ def test_a_motion_of_ones_own_is_read_from_a_file(rig, tmp_path):
     start, _, rest = RIG.partition("[reference]")
     rig.write_text(f'{start}[reference]\nfile = "motion.csv"\n[learning]{rest.partition("[learning]")[2]}')
     assert read_rig(rig).reference.r[-1, 0] == pytest.approx(0.905)
+    for header in ("t [s],x [m],y [m],z [m]", "t,x [mm],y [mm],z [mm]", "x,y,z,t", "0,0.9,2.7,-0.7"):
+        np.savetxt(tmp_path / "motion.csv", r, delimiter=",", header=header, comments="")
+        if header.startswith("t [s]"):
+            assert len(read_rig(rig).reference) == 300
+            continue
+        with pytest.raises(ModelError, match=r"found the first line '.*' in .*, expected the names t,x,y,z"):
+            read_rig(rig)
     np.savetxt(tmp_path / "motion.csv", r[:, :3], delimiter=",", header="t,x,y")
     with pytest.raises(Exception, match=r"found 3 columns in .*, expected t, x, y, z in s and m"):
         read_rig(rig)

@@ -83,9 +83,6 @@ class Machine(Model):
 
 @pytest.mark.parametrize("axes", [1, 2])
 def test_machines_of_one_and_two_axes_learn(axes):
-    class Lone(Model):
-        x = Sledge()
-
     servos = [CartServo(k_v=300 * 80.0), CartServo(k_v=300 * 40.0)][:axes]
     rig = Rig((Lone, Machine)[axes - 1](), servos, period=PERIOD, noise=Scatter())
     t = PERIOD * np.arange(300)
@@ -100,6 +97,46 @@ def test_machines_of_one_and_two_axes_learn(axes):
     assert found.stability.monotone
     assert np.all(found.relative[6] < [5, 20][:axes])  # what is left lies above 10 Hz
     assert found.tool_relative[6, :axes] == pytest.approx(found.relative[6], abs=0.5)
+
+
+class Lone(Model):
+    """One axis without a tool."""
+
+    x = Sledge()
+
+
+def test_a_line_of_one_axis_is_drawn_over_time(tmp_path):
+    """To and fro on one axis the way over the plane would be a line; over time, it is the reference and what was driven."""
+    rig = Rig(Lone(), [CartServo(k_v=300 * 80.0)], period=PERIOD)
+    t = PERIOD * np.arange(300)
+    r = np.outer(0.02 * np.sin(np.pi * np.clip((t - 0.3) / 0.5, 0, 1)) ** 4, [1, 0, 0])
+    found = learn(rig, Reference(t, r), Learning(window=Tukey(0.2, 1.2, lead=0.1)), iterations=1, seed=1)
+    (axis,) = found.plot("path", file=tmp_path / "path.png").axes
+    lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axis.lines}
+    assert list(lines) == ["reference", "run 0", "run 1"]
+    assert lines["reference"] == pytest.approx(1e3 * r[:, 0])  # mm
+    assert axis.get_xlabel() == "time [s]"
+    assert axis.get_ylabel() == "x from the start [mm]"
+    assert {what: found.plot(what).axes[0].get_title() for what in ("error", "input", "tool")} == {
+        "error": "errors of what is learnt from",
+        "input": "corrections",
+        "tool": "errors of the tool",
+    }
+
+
+def test_what_a_lone_axis_cannot_do_is_told_in_its_words():
+    rig = Rig(Lone(), [CartServo()], period=PERIOD)
+    t = PERIOD * np.arange(300)
+    across = Reference(t, np.outer(0.01 * np.clip(t - 0.3, 0, 0.5), [0, 1, 0]))
+    with pytest.raises(
+        ModelError, match=r"reference: found the tool at .* in row \d+, .* within reach of x.s; move it"
+    ):
+        learn(rig, across)
+    with pytest.raises(
+        ModelError, match=r"Rig: Sledge has the inputs f, expected .*; make what is driven a component"
+    ):
+        Rig(Sledge(), [CartServo()], period=PERIOD)
+    assert repr(rig) == "<Rig: Lone under 1 servo, every 0.004 s>"
 
 
 def test_axes_that_are_not_there_cannot_move():

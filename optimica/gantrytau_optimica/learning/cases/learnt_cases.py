@@ -1,5 +1,6 @@
 """Several ways to learn one motion, run one after the other: Dressler (2012), Table 7.2."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from gantrytau_optimica.learning.runs.estimated_response import arm_model, estim
 from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.learn import RUNS, learn
 from gantrytau_optimica.learning.runs.robot_runs import Plant
+from gantrytau_optimica.learning.runs.run_checks import check_window
 
 SETTLED = 5  # runs, after which errors are averaged in Table 7.2
 
@@ -57,7 +59,7 @@ def learn_cases(
     """Learn the motion of a file in all its ways.
 
     folder: where the history of each is kept, `case-NAME.npz`, and gone on from; force: learn what diverges, too; progress:
-    is told what begins. Raises what `learn` and `design_q` raise.
+    is told what begins. Raises what `learn` and `design_q` raise, and ModelError for histories of other laws or estimators.
     """
     plant = rig.plant()
     found: dict[str, History] = {}
@@ -78,6 +80,8 @@ def _learnt(
     force: bool,
     tell: Callable[[str], None],
 ) -> History:
+    file = None if folder is None else folder / f"case-{case.name}.npz"
+    check_window(Learning(window=rig.window), rig.reference)
     tell(f"case {case.name}: what corrections do")
     estimator = _estimator(case, plant, rig)
     response = estimated_response(plant, rig.reference, estimator, seed=RUNS * rig.seed)
@@ -87,6 +91,8 @@ def _learnt(
         learning = replace(learning, q=design_q(response, limit=case.open_to, learning=learning))
     else:
         learning = replace(learning, q=ZeroPhase.butterworth(2, float(case.cut_off or 0.0)))
+    if file is not None and file.exists():
+        _check_kept(file, learning, estimator)
     tell(f"case {case.name}: {rig.iterations + 1} runs")
     return learn(
         plant,
@@ -97,8 +103,25 @@ def _learnt(
         seed=rig.seed,
         response=response,
         force=force,
-        history=None if folder is None else folder / f"case-{case.name}.npz",
+        history=file,
     )
+
+
+def _check_kept(file: Path, learning: Learning, estimator: Estimator) -> None:
+    """Raises ModelError for runs on file that were learnt in another way: their errors would stand beside a wrong sigma."""
+    kept = History.load(file).settings
+    for word, now in (("learning", repr(learning)), ("estimator", repr(estimator))):
+        if _rounded(str(kept.get(word))) != _rounded(now):
+            raise ModelError(
+                f"learn: found {file} by another {'gain, shift, law, Q or window' if word == 'learning' else word}, "
+                "expected what learns now; take another folder, or remove the file",
+                argument="history",
+            )
+
+
+def _rounded(words: str) -> str:
+    """With numbers to three digits, as a Q that is designed elsewhere may differ in the last ones."""
+    return re.sub(r"\d+\.\d+(e[-+]?\d+)?", lambda number: f"{float(number[0]):.3g}", words)
 
 
 def _quietly(words: str) -> None:

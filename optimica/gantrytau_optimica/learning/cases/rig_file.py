@@ -1,7 +1,9 @@
 """`rig.toml`: a robot, what differs from run to run, a motion, and ways to learn it."""
 
 import importlib
+import re
 import runpy
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,6 +67,7 @@ RIG_EXAMPLE = """\
 record = "L1_flexible"     # a Gantry-Tau robot that gives way, under its servos; or a plant of your own:
 # plant = "robot.py:rig"   # what has .period, .kinematics and .run(position, velocity, seed), or a function that makes it
 period = "4 ms"
+# place = ["0.9 m", "2.7 m", "-0.7 m"]  # of the tool, where the square begins
 
 [scatter]                  # what differs from run to run; without this table nothing does
 encoder = "1 um"           # standard deviations of noise
@@ -76,12 +79,14 @@ rest = 0.6                 # and rests at the start within these parts of it
 [reference]                # a square in x and y, which stops in each corner
 size = "10 mm"
 rounds = 2
-# file = "motion.csv"      # or a motion of your own: columns t, x, y, z in s and m, from rest
+# move = "220 ms"          # of motion along an edge, of edge = "412 ms" with its stop; after begin = "1.2 s" of rest, in
+                           # duration = "4.8 s" of the run
+# file = "motion.csv"      # or a motion of your own: columns t,x,y,z in s and m, from rest
 
 [learning]
 window = ["1.2 s", "4.5 s"]  # what is learnt of a run
 lead = "400 ms"              # in which it fades in and out
-gain = 0.9                   # L = gain q^shift
+gain = 0.9                   # L = gain q^shift; a case may have its own
 shift = 5
 iterations = 10
 seed = 1
@@ -90,6 +95,7 @@ seed = 1
 name = "1"
 estimator = "actuators"    # or kinematic, complementary, kalman, measured
 cut_off = 10.0             # Hz, of Q, a Butterworth filter of order 2 both ways
+# law = "norm-optimal"     # or gradient: by the response that is measured, with a higher cut_off, in place of the shift
 
 [[case]]
 name = "2A"
@@ -230,7 +236,9 @@ def _reference(place: str, table: Any, rig: Mapping[str, Any], folder: Path) -> 
         )
     path = folder / own["file"]
     try:
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        with path.open(encoding="utf-8-sig") as text:
+            header = [name.strip() for name in text.readline().lstrip("# ").split(",")]
+            rows = np.loadtxt(text, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:
         raise ModelError(
             f"{at(place, 'file')}: {path} cannot be read ({error}), expected columns t, x, y, z"
@@ -238,6 +246,13 @@ def _reference(place: str, table: Any, rig: Mapping[str, Any], folder: Path) -> 
     if rows.shape[1] != 4:
         raise ModelError(
             f"{at(place, 'file')}: found {rows.shape[1]} columns in {path}, expected t, x, y, z in s and m"
+        )
+    if [re.sub(rf"\s*\[{unit}\]$", "", name) for name, unit in zip(header, "smmm", strict=False)] != [
+        *"txyz"
+    ]:
+        raise ModelError(
+            f"{at(place, 'file')}: found the first line {','.join(header)!r} in {path}, expected the names t,x,y,z of "
+            "columns in s and m"
         )
     return _made(place, Reference, dict(t=rows[:, 0], r=rows[:, 1:]))
 
@@ -271,6 +286,7 @@ def _own_plant(place: str, name: str, folder: Path) -> Plant:
     python, _, attribute = name.partition(":")
     path = folder / python
     try:
+        sys.path.insert(0, str(folder.absolute()))  # what stands beside it can be imported, as in a script
         found: Any = runpy.run_path(str(path))[attribute]
         found = found() if callable(found) and not hasattr(found, "run") else found
     except (OSError, KeyError, ImportError, SyntaxError, TypeError) as error:
@@ -278,6 +294,8 @@ def _own_plant(place: str, name: str, folder: Path) -> Plant:
             f'{place}: found "{name}", which cannot be made ({error!r}), expected robot.py:rig, a plant or a function that '
             "makes one"
         ) from error
+    finally:
+        sys.path.remove(str(folder.absolute()))
     lacking = [word for word in ("run", "period", "kinematics") if not hasattr(found, word)]
     if lacking:
         raise ModelError(

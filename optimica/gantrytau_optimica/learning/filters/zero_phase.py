@@ -5,6 +5,7 @@
 Qc is the causal filter from rest, and backwards from rest as well, so that it is one matrix over a whole run.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -110,7 +111,7 @@ def digital(sections: Sequence[BiquadSection], period: float) -> np.ndarray:
 
 def _low_pass(order: int, hz: float) -> tuple[BiquadSection, ...]:
     pairs = [
-        BiquadSection(hz, (0.0, 0.0, 1.0), (1.0, 2 * np.sin(np.pi * (2 * k + 1) / (2 * order)), 1.0))
+        BiquadSection(hz, (0.0, 0.0, 1.0), (1.0, 2 * math.sin(math.pi * (2 * k + 1) / (2 * order)), 1.0))
         for k in range(order // 2)
     ]
     return (*pairs, *([BiquadSection(hz, (0.0, 0.0, 1.0), (0.0, 1.0, 1.0))] if order % 2 else []))

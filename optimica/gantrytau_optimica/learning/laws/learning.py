@@ -69,7 +69,7 @@ class Stability:
 
     def __str__(self) -> str:
         alone = ", ".join(f"{s:.3f}" for s in self.diagonal)
-        remedy = "lower the cut-off of q, or notch it at the resonances"
+        remedy = "lower the cut-off of q, notch it at the resonances, or take another gain and shift"
         if self.monotone:
             words = f"monotone: each run leaves at most {self.sigma:.0%} of the way to where learning ends"
         elif self.diverges:

@@ -56,14 +56,22 @@ class Corrections:
         return q, forward_speed(q, period)
 
     def joints_at(self, r: np.ndarray, period: float | None = None) -> np.ndarray:
-        """Joints (N, n) for the tool at r (N, 3). Raises ModelError for a tool that is out of reach."""
+        """Joints (N, n) for the tool at r (N, 3), of a reference, or with corrections in it every period s.
+
+        Raises ModelError for a tool that is out of reach.
+        """
         q = self.kinematics.ik(r)
         bad = np.flatnonzero(~np.isfinite(q).all(axis=1))
         if bad.size:
-            when = f" at {bad[0] * period:g} s" if period else f" in row {bad[0]}"
+            place, within = (
+                np.round(r[bad[0]], 4).tolist(),
+                f"within reach of {', '.join(self.kinematics.joints)}",
+            )
             raise ModelError(
-                f"corrections: found the tool at {np.round(r[bad[0]], 4).tolist()} m{when}, expected one within reach; "
-                "correct less, or move the reference inside",
+                f"reference: found the tool at {place} m in row {bad[0]}, expected one {within}; move it inside"
+                if period is None
+                else f"corrections: found the tool at {place} m at {bad[0] * period:g} s, expected one {within}; correct "
+                "less, or move the reference inside",
                 argument="reference",
             )
         return q

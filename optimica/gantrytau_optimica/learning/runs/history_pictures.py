@@ -101,7 +101,7 @@ def _errors(history: Runs) -> "Figure":
     return figure
 
 
-def _over_time(history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
+def _over_time(title: str, history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
     """An axis for each of rows, with lines over time in mm; what is applied in full is shaded."""
     import matplotlib.pyplot as plt
 
@@ -111,11 +111,12 @@ def _over_time(history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]
     t = history.reference.t
     within = t[history.full]
     for axis, (name, lines) in zip(axes[:, 0], rows, strict=True):
-        axis.axvspan(within[0], within[-1], color="0.94")
+        axis.axvspan(within[0], within[-1], color="0.94", label="judged")
         for label, values in lines:
             axis.plot(t, MILLI * values, label=label)
         axis.set_ylabel(f"{name} [mm]")
     axes[0, 0].legend(loc="upper right")
+    axes[0, 0].set_title(title)
     axes[-1, 0].set_xlabel("time [s]")
     return figure
 
@@ -126,6 +127,7 @@ def _ends(history: Runs) -> list[int]:
 
 def _error(history: Runs) -> "Figure":
     return _over_time(
+        "errors of what is learnt from",
         history,
         [
             (name, [(f"run {k}", history.error(k)[:, i]) for k in _ends(history)])
@@ -137,6 +139,7 @@ def _error(history: Runs) -> "Figure":
 def _input(history: Runs) -> "Figure":
     shown = sorted({min(1, len(history) - 1), len(history) - 1})
     return _over_time(
+        "corrections",
         history,
         [
             (name, [(f"run {k}", history.inputs[k][:, i]) for k in shown])
@@ -147,6 +150,7 @@ def _input(history: Runs) -> "Figure":
 
 def _tool(history: Runs) -> "Figure":
     return _over_time(
+        "errors of the tool",
         history,
         [
             (f"tool {'xyz'[i]}", [(f"run {k}", history.tool_error(k)[:, i]) for k in _ends(history)])
@@ -158,10 +162,14 @@ def _tool(history: Runs) -> "Figure":
 def _path(history: Runs) -> "Figure":
     import matplotlib.pyplot as plt
 
-    first, second = np.sort(np.argsort(-np.ptp(history.reference.r, axis=0), kind="stable")[:2])
-    figure, axis = plt.subplots(figsize=(5.2, 4.8), layout="constrained")
     centre = history.reference.r[0]
     lines = [("reference", history.reference.r), *((f"run {k}", history.tool[k]) for k in _ends(history))]
+    if len(history.reference.moving) == 1:  # to and fro on one line, which would hide itself
+        (k,) = history.reference.moving
+        rows = [(f"{'xyz'[k]} from the start", [(label, (r - centre)[:, k]) for label, r in lines])]
+        return _over_time("way of the tool", history, rows)
+    first, second = np.sort(np.argsort(-np.ptp(history.reference.r, axis=0), kind="stable")[:2])
+    figure, axis = plt.subplots(figsize=(5.2, 4.8), layout="constrained")
     for (label, r), colour in zip(lines, ("0.6", "C0", "C1"), strict=False):
         axis.plot(*(MILLI * (r - centre)[:, (first, second)].T), color=colour, label=label)
     axis.set(xlabel=f"{'xyz'[first]} from the start [mm]", ylabel=f"{'xyz'[second]} from the start [mm]")

@@ -13,6 +13,7 @@ from gantrytau_optimica.learning.runs.learn import RUNS, LearningError
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
 from gantrytau_optimica.learning.runs.run_checks import check_runs
+from gantrytau_optimica.learning.servo_loop import unit_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class Repetitions:
     def __str__(self) -> str:
         rows = [f"repeated {len(self.q)} times, deviations from the first"]
         rows += [
-            f"  {name:16s} {1e6 * rms:8.3g} um or urad rms, {part:.2g} % of the error"
+            f"  {name:16s} {1e6 * rms:8.3g} u{unit_of([name])} rms, {part:.2g} % of the error"
             for name, rms, part in zip(self.joints, self.rms, self.relative, strict=True)
         ]
         return "\n".join(rows)

@@ -11,7 +11,7 @@ from gantrytau_optimica.learning.readings import with_readings
 from gantrytau_optimica.learning.scatter import STILL, Scatter
 
 Simulator = Callable[[Mapping[str, Samples], float], Result]
-Names = str | Sequence[str]  # of a vector, or of its elements
+Names = str | Sequence[str]  # of a vector, of a scalar where there is one, or of all elements
 LATE = 1e-6  # of a period, by which a time may be off
 
 
@@ -22,7 +22,8 @@ class SimulatorPlant:
 
     kinematics: those of its controller; period: s, of references; position, velocity: names of the inputs for references of
     the joints, no speeds if None; q: of the true positions of the joints in the result, r: of the tool, a: of its
-    acceleration, each of a vector or of its elements; noise: of the readings, none if None; the simulator draws all else.
+    acceleration, each of a vector or of its elements, and of a scalar for a single joint; noise: of the readings, none if
+    None; the simulator draws all else.
     Raises ModelError for a period that is not above zero.
     """
 
@@ -83,14 +84,15 @@ class SimulatorPlant:
                 "s; communicate every period, or at fractions of it",
                 argument="period",
             )
+        read = {letter: [_scalar(name, found) for name in names] for letter, names in self._read.items()}
         true = {
-            letter: np.column_stack([self._column(found, n)[rows] for n in names])
-            for letter, names in self._read.items()
+            letter: np.column_stack([self._column(found, name)[rows] for name in names])
+            for letter, names in read.items()
         }
         values = {f"q_ref[{k}]": column for k, column in enumerate(references[0].T)}
         values |= {f"v_ref[{k}]": column for k, column in enumerate(references[1].T)}
         run = Result(t, values, title=found.title)
-        unit = found.unit(self._read["q"][0])
+        unit = found.unit(read["q"][0])
         return with_readings(run, true, unit, self.noise, np.random.default_rng(seed))
 
     def _column(self, found: Result, name: str) -> np.ndarray:
@@ -99,6 +101,12 @@ class SimulatorPlant:
                 f"SimulatorPlant: found a result without {name}, expected it{did_you_mean(name, found.names)}"
             )
         return np.asarray(found[name], dtype=float)
+
+
+def _scalar(name: str, found: Result) -> str:
+    """The variable itself where the only element of a vector was meant, and it is none."""
+    whole = name.removesuffix("[0]")
+    return whole if name not in found.names and whole in found.names else name
 
 
 def _elements(word: str, names: Names, count: int) -> Sequence[str]:

@@ -41,7 +41,7 @@ def test_deviations_are_those_of_noise():
     found = repeat(LinearPlant(noise=1e-5), line(), runs=20, seed=3)
     assert found.deviations.shape == (19, 400, 3)
     assert found.rms == pytest.approx(np.sqrt(2) * 1e-5, rel=0.1)
-    assert "um or urad rms" in str(found)
+    assert "um rms" in str(found)
 
 
 def test_the_flexible_robot_repeats_itself_to_a_tenth_of_its_error():

@@ -15,6 +15,7 @@ from gantrytau_optimica import (
     Rig,
     Scatter,
     SimulatorPlant,
+    StraightAxes,
     Tukey,
     estimated_response,
     learn,
@@ -97,6 +98,21 @@ class Recorded:
 def recorded(simulator, **words) -> SimulatorPlant:
     asked: dict[str, Any] = dict(period=PERIOD, position="q_ref", q="q", r="r") | words
     return SimulatorPlant(simulator, KINEMATICS, **asked)
+
+
+def test_a_single_joint_may_be_a_scalar():
+    """An FMU of one axis has x.s and no x.s[0], and q_ref[0], as its references are a vector."""
+    t = PERIOD * np.arange(5)
+    plant = SimulatorPlant(
+        lambda inputs, stop: Result(t, {"x.s": 2 * np.ravel(inputs["q_ref[0]"].values)}, units={"x.s": "m"}),
+        StraightAxes(["x.s"]),
+        period=PERIOD,
+        position="q_ref",
+        q="x.s",
+    )
+    run = plant.run(t[:, None], 0 * t[:, None])
+    assert run["measured.q"][:, 0] == pytest.approx(2 * t)
+    assert run.unit("measured.q") == "m"
 
 
 def test_noise_is_that_of_its_seed():
