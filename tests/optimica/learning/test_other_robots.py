@@ -1,9 +1,17 @@
 """Robots whose joints turn learn as robots with carts do."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import gantrytau
+import gantrytau_models
+import gantrytau_optimica
 from gantrytau import Input, Model, ModelError, Parameter, Real, der
+from gantrytau.mechanics.translational import Force, Mass
+from gantrytau_fmu import cosimulate, export_fmu
 from gantrytau_models import CartServo, DeltaRobot, JointServo
 from gantrytau_optimica import (
     Gradient,
@@ -16,8 +24,10 @@ from gantrytau_optimica import (
     Tukey,
     ZeroPhase,
     learn,
+    read_corrections,
     square_reference,
 )
+from gantrytau_optimica.learning.runs.corrections_file import write_corrections
 
 PERIOD = 0.004
 WINDOW = Tukey(0.3, 1.6, lead=0.2)
@@ -154,3 +164,38 @@ def test_servos_and_references_that_do_not_fit_are_told():
         Rig(DeltaRobot(), [JointServo(), JointServo()], period=PERIOD)
     with pytest.raises(Exception, match="unit"):
         Rig(DeltaRobot(), [CartServo() for _ in range(3)], period=PERIOD)
+
+
+def test_corrections_of_joints_that_slide_and_turn_have_units_of_their_own(tmp_path):
+    """A robot of carts and turntables: m of one, rad of the other, in the file and in what reads it."""
+    t, u = PERIOD * np.arange(3), np.array([[0.0, 0.0], [1e-3, 2e-3], [0.0, 1e-3]])
+    joints = ["carts[0].s", "turntables[0].phi"]
+    file = write_corrections(tmp_path / "u.csv", t, joints, u)
+    assert file.read_text().splitlines()[0] == "time [s],carts[0].s [m],turntables[0].phi [rad]"
+    assert read_corrections(file, joints, t) == pytest.approx(u, abs=1e-15)
+    file.write_text(file.read_text().replace("[rad]", "[m]"))
+    with pytest.raises(
+        ModelError, match=r"found the column turntables\[0\].phi in m, expected rad; convert it"
+    ):
+        read_corrections(file, joints, t)
+
+
+def test_errors_of_joints_that_turn_are_drawn_in_mrad(delta):
+    found = learn(delta, square(delta), Learning(window=WINDOW), iterations=1, seed=1)
+    assert found.plot("error").axes[0].get_ylabel() == "arms[0].phi [mrad]"
+    assert found.plot("tool").axes[0].get_ylabel() == "tool x [mm]"
+
+
+def test_the_machine_of_the_page_learns_as_a_model_and_as_an_fmu(tmp_path, monkeypatch):
+    """The blocks of optimica/README.md, as they stand there."""
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parents[3] / "optimica" / "README.md").read_text(encoding="utf-8")
+    part = page[page.index("**A machine of your own**") : page.index("**Paths.**")]
+    names = {"np": np, "Mass": Mass, "Force": Force, "export_fmu": export_fmu, "cosimulate": cosimulate}
+    for package in (gantrytau, gantrytau_models, gantrytau_optimica):
+        names |= {name: getattr(package, name) for name in package.__all__}
+    for block in re.findall(r"```python\n(.*?)```", part, re.DOTALL):
+        exec(block, names)
+    assert names["history"].relative[3, 0] < 0.2
+    told = {name: learn(names[name], names["way"], iterations=1).relative[1, 0] for name in ("rig", "plant")}
+    assert told["rig"] == pytest.approx(told["plant"], abs=0.01)

@@ -16,11 +16,12 @@ SAME = 1e-6  # of a period, by which times may differ
 
 
 def write_corrections(
-    path: str | os.PathLike[str], t: np.ndarray, joints: Sequence[str], u: np.ndarray, unit: str
+    path: str | os.PathLike[str], t: np.ndarray, joints: Sequence[str], u: np.ndarray
 ) -> Path:
     """Corrections u (N, n) of joints at times t (N,), in the formats of `Result.save`."""
     columns = dict(zip(joints, u.T, strict=True))
-    return Result(t, columns, units=dict.fromkeys(joints, unit), title="corrections").save(path)
+    units = {joint: unit_of([joint]) for joint in joints}
+    return Result(t, columns, units=units, title="corrections").save(path)
 
 
 def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.ndarray) -> np.ndarray:
@@ -42,9 +43,9 @@ def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.
     units = [found[1] if (found := UNIT.search(name.strip())) else None for name in header]
     names = [UNIT.sub("", name.strip()) for name in header]
     for joint, unit in zip(names[1:], units[1:], strict=True):
-        if joint in joints and unit not in (None, unit_of(joints)):
+        if joint in joints and unit not in (None, unit_of([joint])):
             raise ModelError(
-                f"{file}: found the column {joint} in {unit}, expected {unit_of(joints)}; convert it"
+                f"{file}: found the column {joint} in {unit}, expected {unit_of([joint])}; convert it"
             )
         if joint in joints and names.count(joint) > 1:
             raise ModelError(f"{file}: found the column {joint} twice, expected one for each joint")

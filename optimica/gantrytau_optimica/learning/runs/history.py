@@ -13,7 +13,6 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.learning.laws.learning import Stability
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
 from gantrytau_optimica.learning.runs.reference import Reference
-from gantrytau_optimica.learning.servo_loop import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,7 +163,7 @@ class History:
 
         Formats are those of `Result.save`; times are those of the reference.
         """
-        return write_corrections(path, self.reference.t, self.joints, self.corrected, unit_of(self.joints))
+        return write_corrections(path, self.reference.t, self.joints, self.corrected)
 
     def with_run(self, **rows: np.ndarray) -> "History":
         """With one run more, by the names of what is kept."""

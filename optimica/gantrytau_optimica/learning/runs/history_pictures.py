@@ -10,6 +10,7 @@ from gantrytau import ModelError
 from gantrytau.errors import did_you_mean
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.learning.runs.reference import Reference
+from gantrytau_optimica.learning.servo_loop import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,7 +103,7 @@ def _errors(history: Runs) -> "Figure":
 
 
 def _over_time(title: str, history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
-    """An axis for each of rows, with lines over time in mm; what is applied in full is shaded."""
+    """An axis for each of rows, with lines over time in mm or mrad; what is applied in full is shaded."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(
@@ -114,8 +115,8 @@ def _over_time(title: str, history: Runs, rows: list[tuple[str, list[tuple[str, 
         axis.axvspan(within[0], within[-1], color="0.94", label="judged")
         for label, values in lines:
             axis.plot(t, MILLI * values, label=label)
-        axis.set_ylabel(f"{name} [mm]")
-    axes[0, 0].legend(loc="upper right")
+        axis.set_ylabel(f"{name} [m{unit_of([name])}]")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside right upper")
     axes[0, 0].set_title(title)
     axes[-1, 0].set_xlabel("time [s]")
     return figure
