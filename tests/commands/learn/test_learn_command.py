@@ -129,6 +129,7 @@ def test_what_diverges_is_refused_by_its_option(run, rig):
     answer = run("learn", rig, "--case", "two")
     assert answer.exit_code != 0
     assert "diverges: after 10 runs" in answer.output
+    assert "rig.toml: case two: " in answer.output
     assert "--force runs it all the same" in answer.output
     assert run("learn", rig, "--case", "two", "--force", "--iterations", "1").exit_code == 0
 

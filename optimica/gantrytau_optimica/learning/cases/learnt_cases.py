@@ -18,7 +18,7 @@ from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptim
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
 from gantrytau_optimica.learning.runs.history import History
-from gantrytau_optimica.learning.runs.learn import RUNS, learn
+from gantrytau_optimica.learning.runs.learn import RUNS, LearningError, learn
 from gantrytau_optimica.learning.runs.robot_runs import Plant
 from gantrytau_optimica.learning.runs.run_checks import check_window
 
@@ -69,6 +69,11 @@ def learn_cases(
             found[case.name] = _learnt(case, plant, rig, folder, force, tell)
         except ModelError as error:
             raise ModelError(f"{rig.file}: case {case.name}: {error}", argument=error.argument) from error
+        except LearningError as error:
+            if isinstance(error.__cause__, KeyboardInterrupt):
+                raise
+            told = f"{rig.file}: case {case.name}: {error}"
+            raise LearningError(told, history=error.history, argument=error.argument) from error
     return LearntCases(found)
 
 

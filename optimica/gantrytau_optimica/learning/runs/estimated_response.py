@@ -43,7 +43,7 @@ class Seen:
         return self.estimator.combine(signals, self.period)[:, list(self.picked)]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EstimatedResponse:
     """From corrections (N, m) to what is learnt from, F_u + F_y T_uy of Dressler (2012), (7.15).
 
@@ -55,6 +55,10 @@ class EstimatedResponse:
     delay: int
     seen: Seen
     fit: np.ndarray
+
+    def __repr__(self) -> str:
+        fit = ", ".join(f"{part:.1f}" for part in self.fit)
+        return f"<EstimatedResponse: {self.system.title}, {self.delay} samples late, fits {fit} %>"
 
     @property
     def period(self) -> float:

@@ -1,5 +1,6 @@
 """Learning on a plant that is known exactly: what lifted systems foretell is what runs do."""
 
+import re
 from typing import Any, cast
 
 import numpy as np
@@ -70,6 +71,10 @@ def test_laws_by_a_model_learn_with_the_response_that_is_measured(law):
 def test_a_response_is_measured_where_none_is_given():
     """Delay and answer of (6.11), and of a tool that swings at 9 Hz, in noise of a micrometre."""
     found = estimated_response(LinearPlant(noise=1e-6), line(), Actuators())
+    assert re.fullmatch(
+        r"<EstimatedResponse: system of order \d+, every 0.004 s, \d samples late, fits 9.*, 9.*, 9.* %>",
+        repr(found),
+    )
     assert found.delay == DELAY
     hz = np.array([0.5, 2.0, 5.0, 10.0])
     exact = np.column_stack([each.response(hz)[0, 0] for each in RESPONSE])
