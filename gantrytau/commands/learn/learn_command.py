@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gantrytau import GantryTauError
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import (
     INTERRUPTED,
@@ -95,12 +96,15 @@ def learn(
 @contextmanager
 def _interrupts(folder: Path | None, json: bool) -> Iterator[None]:
     """Ctrl-C says where the runs are that were finished."""
-    from gantrytau_optimica import LearningError
-
     try:
         yield
-    except (KeyboardInterrupt, LearningError) as error:
-        if isinstance(error, LearningError) and not isinstance(error.__cause__, KeyboardInterrupt):
+    except (KeyboardInterrupt, GantryTauError) as error:
+        first: BaseException = (
+            error  # simulations and runs tell of Ctrl-C as errors of their own, with what they have
+        )
+        while first.__cause__ is not None:
+            first = first.__cause__
+        if not isinstance(first, KeyboardInterrupt):
             raise
         where = (
             "nothing was written; --output keeps runs as they are finished"

@@ -22,6 +22,8 @@ def swinging():
 nothing = 3
 """
 STOPPED = """
+from gantrytau import SolveError
+
 
 class Stopped(LinearPlant):
     calls = 0
@@ -29,7 +31,7 @@ class Stopped(LinearPlant):
     def run(self, *words, **more):
         self.calls += 1
         if self.calls == {call}:
-            raise KeyboardInterrupt
+            raise SolveError("interrupted") from KeyboardInterrupt()  # as of `simulate`
         return super().run(*words, **more)
 
 
