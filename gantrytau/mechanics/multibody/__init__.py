@@ -26,6 +26,7 @@ from gantrytau.mechanics.multibody.contact import (
     PegContact,
     SurfaceContact,
 )
+from gantrytau.mechanics.multibody.elastic_peg import ElasticPegContact
 from gantrytau.mechanics.multibody.forces import (
     FrameForce,
     FrameTorque,
@@ -57,6 +58,7 @@ __all__ = [
     "ContactLaw",
     "CutSensor",
     "Cylindrical",
+    "ElasticPegContact",
     "Fixed",
     "FixedRotation",
     "FixedTranslation",
