@@ -234,7 +234,7 @@ def test_below_the_mouth_the_tip_is_where_less_energy_holds_it(contact):
     assert inside["inserted"] > 0
     assert outside["inserted"] == 0
     assert strained(inside) == pytest.approx(
-        strained(outside), rel=0.02
+        strained(outside), rel=0.05
     )  # but for the edge, just above the tip
 
 
