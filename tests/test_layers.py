@@ -28,7 +28,7 @@ ORDER = {  # a room imports the rooms before it
     "devices trust surveys __init__",
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies fleet workspace_resolution candidates pose_choice "
     "trials ways plan_verdict pose_plan documents calibration_plan plan_calibration cells measured_plan",
-    "gantrytau_fmu": "description code describing building reading export systems __init__",
+    "gantrytau_fmu": "description code describing building reading export systems controller __init__",
 }
 READMES = {  # the page with the map of a folder
     "gantrytau": ROOT / "gantrytau" / "README.md",

@@ -1,0 +1,1 @@
+"""A robot controller whose references others overwrite from sample to sample."""
