@@ -21,7 +21,7 @@ PACKAGES = {
 ORDER = {  # a room imports the rooms before it
     "gantrytau": "errors interruption whole_files progress language flattening compiler results inputs simulation writing "
     "answers dae ensembles __init__ kinematics mechanics blocks electrical commands cli",
-    "gantrytau_models": "quantities prototypes mechanisms control __init__",
+    "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy given prepared optimize "
     "studies estimation paths calibration procedure identification learning __init__",
     "gantrytau_optimica.calibration": "data rods fitting design judging report calibration calibrate "

@@ -68,6 +68,7 @@ def sorted_out(
     margins = substitution.inserted([turn.margin for turn in turns])
     turns = [Turn(turn.mode, m, turn.closed, turn.counts) for turn, m in zip(turns, margins, strict=True)]
     own = {turn.mode.name() for turn in turns}
+    turns = _in_order(turns, own)
     needed = _modes_in(ca.vertcat(*(ca.vec(e) for e in moving)), own) if turns else set()
     settled: set[str] = set()
     for turn in turns:  # a mode that hangs on itself, or on one behind it, cannot follow from its margin
@@ -75,12 +76,29 @@ def sorted_out(
         if not within <= settled:
             needed.add(turn.mode.name())
         settled.add(turn.mode.name())
-    for turn in reversed(turns):
-        if turn.mode.name() in needed:
-            needed |= _modes_in(turn.margin, own)
+    found: set[str] = set()
+    while needed != found:
+        found = set(needed)
+        for turn in reversed(turns):
+            if turn.mode.name() in needed:
+                needed |= _modes_in(turn.margin, own)
     live = [turn for turn in turns if turn.mode.name() in needed]
     rest = tuple((turn.mode, turn.value) for turn in turns if turn.mode.name() not in needed)
     return live, Substitution(rest)
+
+
+def _in_order(turns: Sequence[Turn], own: set[str]) -> list[Turn]:
+    """The turns with those before each that its margin hangs on, wherever they do not hang on each other.
+
+    Equations come in the order in which they are written, which need not be that in which one follows from another.
+    """
+    left = {turn.mode.name(): turn for turn in turns}
+    within = {name: _modes_in(turn.margin, own) - {name} for name, turn in left.items()}
+    ordered: list[Turn] = []
+    while left:
+        free = [name for name in left if not within[name] & left.keys()]
+        ordered += [left.pop(name) for name in free or [next(iter(left))]]
+    return ordered
 
 
 def _modes_in(expression: ca.SX, modes: set[str]) -> set[str]:

@@ -1,0 +1,87 @@
+"""The match and its hole as a record, and what is random around them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gantrytau import ModelError, white_noise
+from gantrytau.inputs.random_signals import WhiteNoise
+
+PERIOD = 0.004  # s, of the controller (printed)
+EYE_PERIOD = 0.1  # s, that a guess of the eye is held
+EYE_TIME = 0.6  # s, in which the eye changes its mind
+ALWAYS = 1e6  # s, longer than a run
+
+
+@dataclass(frozen=True)
+class Match:
+    """A wooden match and the hole for it, SI.
+
+    length, edge: of the match, m, as printed, and depth of the hole, m; modulus of elasticity, Pa. clearance: radius of the
+    hole less what the match has, m; the printed 4 mm hole is narrower than the diagonal of the match, so that it stands for
+    how far edges and wood give way. wall: stiffness of edges, N/m; mu: friction. What is not printed stands in `assumed`.
+    Raises ModelError for what is not above zero (mu: below).
+    """
+
+    length: float = 0.095
+    edge: float = 0.003
+    depth: float = 0.03
+    modulus: float = 10e9
+    clearance: float = 3e-4
+    wall: float = 5e3
+    mu: float = 0.3
+    source: str = "Dressler (2012), section 8.4"
+    assumed: tuple[str, ...] = ("depth", "modulus", "clearance", "wall", "mu")
+
+    def __post_init__(self):
+        for name in ("length", "edge", "depth", "modulus", "clearance", "wall"):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and 0 < value < np.inf):
+                raise ModelError(
+                    f"Match: found {name}={value!r}, expected a finite number above zero, in SI units"
+                )
+        if not (isinstance(self.mu, int | float) and 0 <= self.mu < np.inf):
+            raise ModelError(f"Match: found mu={self.mu!r}, expected a finite number, zero or more")
+
+    @property
+    def bending(self) -> float:
+        """Stiffness at the tip, 3 E I / length^3 with I = edge^4 / 12, N/m."""
+        return self.modulus * self.edge**4 / (4 * self.length**3)
+
+    @property
+    def free_tilt(self) -> float:
+        """Tilt at which it touches at two points over the whole depth, 2 clearance / depth, rad."""
+        return float(np.arctan(2 * self.clearance / self.depth))
+
+
+WOODEN = Match()
+
+
+@dataclass(frozen=True)
+class PegDisturbances:
+    """Standard deviations of what is random in a `PegInHole`, all assumed, not printed.
+
+    force, torque: noise of the tool's sensor in each sample, N and N.m, about the tool centre point; handle: of the
+    handle's, N; force_bias, torque_bias, handle_bias: what they are off in a run; eye: misjudged place of the hole, m.
+    """
+
+    force: float = 0.05
+    torque: float = 3e-3
+    handle: float = 0.05
+    force_bias: float = 0.03
+    torque_bias: float = 5e-4
+    handle_bias: float = 0.05
+    eye: float = 3e-4
+
+    def inputs(self) -> dict[str, WhiteNoise]:
+        """As inputs of a simulation, whose seed, or that of a study, draws them."""
+        guess = self.eye * float(np.sqrt(2 * EYE_TIME / EYE_PERIOD))  # which the eye's slowness makes less
+        return {
+            "force_noise": white_noise(self.force, PERIOD),
+            "torque_noise": white_noise(self.torque, PERIOD),
+            "handle_noise": white_noise(self.handle, PERIOD),
+            "force_bias": white_noise(self.force_bias, ALWAYS),
+            "torque_bias": white_noise(self.torque_bias, ALWAYS),
+            "handle_bias": white_noise(self.handle_bias, ALWAYS),
+            "hand.guess": white_noise(guess, EYE_PERIOD),
+        }

@@ -1,0 +1,100 @@
+"""A tool that is led by its velocities, and the hand that leads it into a hole."""
+
+from gantrytau import (
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Real,
+    acos,
+    cross,
+    der,
+    dot,
+    fmax,
+    fmin,
+    if_else,
+    limit,
+    norm_2,
+    sampled,
+    time,
+)
+from gantrytau.language.statements import root
+from gantrytau.mechanics.multibody import Frame
+from gantrytau.mechanics.multibody.orientation import of_quaternion
+from gantrytau_models.leadthrough.peg_match import EYE_TIME
+
+
+class PegTool(Model):
+    """A peg on a robot whose servos follow velocities as a lag of first order, whatever pushes the peg.
+
+    frame_b: origin in the middle of the tip, z along the peg to its clamp. Velocities are those of the tool centre point,
+    which is `tcp` from the tip towards the clamp.
+    """
+
+    T = Parameter(2.303e-3, unit="s", min=0.0, description="lag of the servos (assumed)")
+    tcp = Parameter(0.0, unit="m", description="from the tip to the tool centre point, along the peg")
+    v_ref = Input(3, unit="m/s", description="wanted velocity of the tool centre point")
+    w_ref = Input(3, unit="rad/s", description="wanted angular velocity")
+    r = Real(
+        3, unit="m", start=[0.0, 0.0, 0.01], fixed=True, description="place of the tip where nothing bends"
+    )
+    q = Real(
+        4, unit="1", start=[1.0, 0.0, 0.0, 0.0], fixed=True, description="orientation, a unit quaternion"
+    )
+    v = Real(3, unit="m/s", start=0.0, fixed=True, description="velocity of the tool centre point")
+    w = Real(3, unit="rad/s", start=0.0, fixed=True, description="angular velocity")
+    axis = Real(3, unit="1", description="direction from the tip to the clamp")
+    angle = Real(unit="rad", description="tilt of the peg against the vertical")
+    frame_b = Frame()
+
+    def equations(self):
+        s, u, w = self.q[0], self.q[1:4], self.w
+        R = of_quaternion(self.q / norm_2(self.q))
+        yield root(self.frame_b, R=R, w=w)
+        yield self.frame_b.r == self.r
+        yield self.axis == R[:, 2]
+        yield self.angle == acos(fmax(-1, fmin(1, self.axis[2])))
+        yield self.T * der(self.v) == self.v_ref - self.v
+        yield self.T * der(w) == self.w_ref - w
+        yield der(self.r) == self.v - cross(w, self.tcp * self.axis)
+        yield der(self.q[0]) == -dot(w, u) / 2
+        yield der(self.q[1:4]) == (s * w + cross(w, u)) / 2
+
+
+class PegHand(Model):
+    """An operator who puts a peg into a hole at the origin, by eye: moves above it, pushes gently, and draws it out again.
+
+    What he sees is late by `delay`, and the place of the hole is misjudged by a slow random error. He wants velocities
+    that lead to where the peg shall be, and pushes the handle after the speed that he feels. Decided every `period`.
+    """
+
+    period = Parameter(0.004, unit="s", description="period of decisions")
+    gain = Parameter(3.0, unit="1/s", min=0.0, description="velocity for a distance")
+    delay = Parameter(0.2, unit="s", min=0.0, description="lag of what is seen")
+    mind = Parameter(EYE_TIME, unit="s", min=0.0, description="lag of the error of the eye")
+    arm = Parameter(60.0, unit="N.s/m", min=0.0, description="force for a velocity")
+    muscle = Parameter(0.08, unit="s", min=0.0, description="lag of the force")
+    speed = Parameter(5e-3, unit="m/s", min=0.0, description="largest wanted speed into the hole")
+    fast = Parameter(0.02, unit="m/s", min=0.0, description="largest wanted speed out of it")
+    above = Parameter(3e-3, unit="m", description="height at which he aims")
+    below = Parameter(-0.0295, unit="m", description="height to which he pushes")
+    away = Parameter(0.03, unit="m", description="height to which he withdraws")
+    begin = Parameter(20.0, unit="s", description="when he begins to push")
+    leave = Parameter(79.0, unit="s", description="when he withdraws")
+    guess = Input(2, unit="m", start=0.0, description="random error of the eye, before its slowness")
+    r = Input(3, unit="m", description="place of the tip")
+    v = Input(3, unit="m/s", description="velocity of the handle")
+    seen = Real(3, unit="m", start=[0.0, 0.0, 0.01], fixed=True, description="place of the tip as it is seen")
+    error = Real(2, unit="m", start=0.0, fixed=True, description="how far the hole is misjudged")
+    wanted = Real(3, unit="m/s", start=0.0, description="wanted velocity")
+    f = Output(3, unit="N", start=0.0, fixed=True, description="force of the hand on the handle")
+
+    def equations(self):
+        goal = if_else(time < self.begin, self.above, if_else(time < self.leave, self.below, self.away))
+        sideways = self.gain * (self.error - self.seen[:2])
+        upwards = limit(self.gain * (goal - self.seen[2]), -self.speed, self.fast)
+        yield self.delay * der(self.seen) == self.r - self.seen
+        yield self.mind * der(self.error) == self.guess - self.error
+        yield sampled(self.wanted[:2], sideways, period=self.period)
+        yield sampled(self.wanted[2], upwards, period=self.period)
+        yield self.muscle * der(self.f) == self.arm * (self.wanted - self.v) - self.f
