@@ -1,6 +1,7 @@
-"""FMUs of gantrytau models, written and read, and systems of FMUs simulated together."""
+"""FMUs of gantrytau models, written and read, and systems of FMUs, models and functions simulated together."""
 
 from gantrytau_fmu.building.archive import check_target
+from gantrytau_fmu.controller.channels import Channel
 from gantrytau_fmu.description import Experiment
 from gantrytau_fmu.export import SOLVERS, export_fmu
 from gantrytau_fmu.reading.check_fmu import check_fmu
@@ -10,13 +11,16 @@ from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_fmu.systems.master import ORDERS
 from gantrytau_fmu.systems.run_fmu import run_fmu
+from gantrytau_fmu.systems.sources.python_component import PythonComponent
 from gantrytau_fmu.systems.ssp.system_description import check_system, read_system
 from gantrytau_fmu.systems.ssp.write_ssp import write_ssp
 
 __all__ = [
     "ORDERS",
     "SOLVERS",
+    "Channel",
     "Experiment",
+    "PythonComponent",
     "UnconnectedInputs",
     "check_fmu",
     "check_system",

@@ -4,7 +4,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,7 @@ from gantrytau.errors import ModelError, SolveError, did_you_mean
 from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result
-from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.component import Component, numeric, read_component
+from gantrytau_fmu.systems.component import Component, numeric
 from gantrytau_fmu.systems.connected_system import (
     ConnectedSystem,
     SystemConnection,
@@ -25,10 +24,11 @@ from gantrytau_fmu.systems.connected_system import (
     warn_of,
 )
 from gantrytau_fmu.systems.initialize import initialize
-from gantrytau_fmu.systems.isolation import Isolated
 from gantrytau_fmu.systems.master import ORDERS, Grid, Master, Order, RunningComponent, make_grid, paces_of
 from gantrytau_fmu.systems.recorder import Recorder
-from gantrytau_fmu.systems.slave import RunEnded, Slave
+from gantrytau_fmu.systems.slave import RunEnded
+from gantrytau_fmu.systems.sources.component_sources import Source, describe_source, run_source
+from gantrytau_fmu.systems.sources.python_component import PythonComponent
 from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
 from gantrytau_fmu.systems.step_order import sequence_of
 
@@ -37,7 +37,7 @@ Wires = Sequence[SystemConnection | tuple[str, str]]
 
 
 def cosimulate(
-    components: Mapping[str, FileName] | FileName,
+    components: Mapping[str, Source] | FileName,
     connections: Wires = (),
     *,
     stop: float | None = None,
@@ -58,10 +58,11 @@ def cosimulate(
     iterations: int = 50,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
-    """Simulate FMUs together and return their variables at the communication points begin + k step.
+    """Simulate components together and return their variables at the communication points begin + k step.
 
-    components: name -> .fmu file (FMI 2 or 3, Co-Simulation), or one .ssp file, which also brings connections, start
-        values and, if they are not given, stop and step. Variables are named 'component.variable'.
+    components: name -> .fmu file (FMI 2 or 3, Co-Simulation), model instance, which is compiled first, or `PythonComponent`;
+        or one .ssp file, which also brings connections, start values and, if they are not given, stop and step. Variables
+        are named 'component.variable'.
     connections: pairs (output, input), scalars or whole vectors; units are converted, dimensions have to match.
     stop, step, begin: s; if the step does not divide the span, the last one is shorter.
     start: name -> value of parameters, inputs and states before initialisation.
@@ -87,15 +88,14 @@ def cosimulate(
         told = _structure(components, connections, Path(folder))
         grid = _grid(told, begin, stop, step)
         _check(order, tolerance, agreement, iterations)
+        _check_functions(told.components, isolate, error_estimate)
         alone = isolate if isinstance(isolate, Sequence) else tuple(told.components) if isolate else ()
-        system = _system(told, start or {}, with_seeds(inputs or {}, seed), grid, alone, Path(folder))
+        parts = _read(told.components, Path(folder), alone, tolerance)
+        system = _system(parts, told, start or {}, with_seeds(inputs or {}, seed), grid)
         plan = _Plan(order, sequence, steps or {}, outputs, tolerance, alone, timeout, agreement, iterations)
+        plan = replace(plan, sources=told.components)
         result = _run(system, plan, grid, progress)
-        if error_estimate:
-            finer = replace(plan, steps={name: own / 2 for name, own in plan.steps.items()})
-            half = _run(system, finer, make_grid(grid.begin, grid.stop, grid.step / 2), progress)
-            result = _with_errors(result, half)
-    return result
+        return _with_errors(result, _halved(system, plan, grid, progress)) if error_estimate else result
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,7 @@ class _Plan:
     timeout: float
     agreement: float
     iterations: int
+    sources: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _run(
@@ -148,6 +149,14 @@ def _run(
     return recorder.complete()
 
 
+def _halved(
+    system: ConnectedSystem, plan: _Plan, grid: Grid, progress: Callable[[float], None] | None
+) -> Result:
+    """The same with half of every step."""
+    finer = replace(plan, steps={name: own / 2 for name, own in plan.steps.items()})
+    return _run(system, finer, make_grid(grid.begin, grid.stop, grid.step / 2), progress)
+
+
 def _advance(
     plan: _Plan, grid: Grid, master: Master, recorder: Recorder, progress: Callable[[float], None] | None
 ) -> None:
@@ -167,7 +176,8 @@ def _running(system: ConnectedSystem, plan: _Plan) -> Iterator[dict[str, Running
     parts: dict[str, RunningComponent] = {}
     try:
         for name, component in system.components.items():
-            parts[name] = Isolated(component, plan.timeout) if name in plan.isolate else Slave(component)
+            timeout = plan.timeout if name in plan.isolate else None
+            parts[name] = run_source(component, plan.sources[name], timeout)
         yield parts
     finally:
         for part in reversed(parts.values()):
@@ -175,7 +185,7 @@ def _running(system: ConnectedSystem, plan: _Plan) -> Iterator[dict[str, Running
 
 
 def _structure(
-    components: Mapping[str, FileName] | FileName, connections: Wires, folder: Path
+    components: Mapping[str, Source] | FileName, connections: Wires, folder: Path
 ) -> SystemStructure:
     """The files and connections of the system, from the arguments or from an SSP."""
     if isinstance(components, (str, os.PathLike)):
@@ -186,11 +196,11 @@ def _structure(
         return read_ssp(components, folder / "system")
     if not isinstance(components, Mapping) or not components:
         raise ModelError(
-            f"components: found {components!r}, expected {{name: FMU file}} or the path of an .ssp file"
+            f"components: found {components!r}, expected {{name: FMU file or model}} or the path of an .ssp file"
         )
     if isinstance(connections, str) or not isinstance(connections, Sequence):
         raise ModelError(f"connections: found {connections!r}, expected [('a.y', 'b.u'), ...]")
-    return SystemStructure({name: Path(path) for name, path in components.items()}, tuple(connections))
+    return SystemStructure(dict(components), tuple(connections))
 
 
 def _grid(told: SystemStructure, begin: float | None, stop: float | None, step: float | None) -> Grid:
@@ -202,15 +212,13 @@ def _grid(told: SystemStructure, begin: float | None, stop: float | None, step: 
 
 
 def _system(
+    parts: Mapping[str, Component],
     told: SystemStructure,
     start: Mapping[str, Any],
     inputs: Mapping[str, Any],
     grid: Grid,
-    isolate: Sequence[str],
-    folder: Path,
 ) -> ConnectedSystem:
-    """The components, unpacked and connected; a warning of inputs that nothing drives."""
-    parts = _read(told.components, folder, isolate)
+    """The components, connected; a warning of inputs that nothing drives."""
     values = {**matching(parts, told.start), **start}
     system = build_system(parts, told.connections, values, inputs, (grid.begin, grid.stop))
     if len(parts) > 1:
@@ -218,7 +226,9 @@ def _system(
     return system
 
 
-def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> dict[str, Component]:
+def _read(
+    files: Mapping[str, Source], folder: Path, isolate: Sequence[str], tolerance: float | None
+) -> dict[str, Component]:
     """Unpack and describe each component."""
     for name in isolate:
         if name not in files:
@@ -227,10 +237,25 @@ def _read(files: Mapping[str, Path], folder: Path, isolate: Sequence[str]) -> di
     for count, (name, file) in enumerate(files.items()):
         if not isinstance(name, str) or not name.strip():
             raise ModelError(f"components: found the name {name!r}, expected a text that is not empty")
-        place = unpack(file, folder / f"fmu{count}")
-        found[name] = read_component(name, file, place)
+        found[name] = describe_source(name, file, folder / f"fmu{count}", tolerance)
     _check_alone(found, isolate)
     return found
+
+
+def _check_functions(sources: Mapping[str, Any], isolate: Sequence[str] | bool, error_estimate: bool) -> None:
+    """ModelError for what a Python function cannot do: run in another process, or once more from its beginning."""
+    for name, source in sources.items():
+        if not isinstance(source, PythonComponent):
+            continue
+        if isolate is True or (not isinstance(isolate, bool) and name in isolate):
+            raise ModelError(
+                f"isolate: {name} is a Python function, expected an FMU; name the others", argument="isolate"
+            )
+        if error_estimate:
+            raise ModelError(
+                f"error_estimate: {name} is a Python function, which a second run would find with what it remembers of "
+                "the first; simulate twice yourself, with half the step"
+            )
 
 
 def _check_alone(components: Mapping[str, Component], isolate: Sequence[str]) -> None:

@@ -32,9 +32,12 @@ Node = tuple[str, str]  # element, "" for the outermost system, and connector
 
 @dataclass(frozen=True)
 class SystemStructure:
-    """A system as its file describes it: FMU files by component, connections, start values, default times in s."""
+    """A system as its file describes it: FMU files by component, connections, start values, default times in s.
 
-    components: Mapping[str, Path]
+    Of `cosimulate` components may be models and functions, too.
+    """
+
+    components: Mapping[str, Any]
     connections: tuple[SystemConnection | tuple[str, str], ...] = ()
     start: Mapping[str, float | str] = field(default_factory=dict)
     begin: float | None = None

@@ -1,0 +1,1 @@
+"""What can be a component of a system."""
