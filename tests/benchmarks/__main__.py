@@ -14,6 +14,7 @@ from tests.benchmarks import (
     kinematics,
     mechanisms,
     motion,
+    peg_seeds,
     procedure,
     rig_runs,
     sampling,
@@ -39,6 +40,13 @@ if __name__ == "__main__":
         kinematics.rows(),
         calibration.rows(),
     )
-    timed = (fmus.rows(), sampling.rows(), studies.rows(), identification.rows(), rig_runs.rows())
+    timed = (
+        fmus.rows(),
+        sampling.rows(),
+        studies.rows(),
+        identification.rows(),
+        rig_runs.rows(),
+        peg_seeds.rows(),
+    )
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))

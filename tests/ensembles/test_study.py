@@ -116,6 +116,24 @@ def test_cases_that_take_long_go_on_in_processes(monkeypatch):
         )
 
 
+@pytest.mark.parametrize(("lasting", "expected"), [([5.0, 0.1], 8), ([5.0, 5.0], 2), ([60.0], 1)])
+def test_a_first_case_that_makes_what_others_find_is_not_taken_for_all(lasting, expected, monkeypatch):
+    here, clock, computed = places.computed, [0.0], []
+
+    def timed(task, case):
+        clock[0] += lasting[min(len(computed), len(lasting) - 1)]
+        computed.append(case)
+        return here(task, case)
+
+    monkeypatch.setattr(places, "computed", timed)
+    monkeypatch.setattr(places, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(places, "processors", lambda: 2)
+    monkeypatch.setattr(places, "in_processes", lambda task, cases: (here(task, case) for case in cases))
+    found = study(Decay(), stop=1.0, over={"k": np.linspace(0.5, 2.0, 8).tolist()}, inputs={"u": 0.0})
+    assert len(computed) == expected
+    assert len(found.values) == 8
+
+
 class Held(Model):
     """A quantity that decays towards what a noise holds: x' = k (u - x)."""
 

@@ -13,6 +13,7 @@ from gantrytau.errors import ModelError, did_you_mean
 Place = str
 PROCESSES = "processes"
 BEGIN = 3.0  # s, in which a process starts, imports, reads its task and makes what later cases find made
+LONG = 10.0  # s, of a first case behind which it is not worth waiting for a second to tell what the first one made
 NAMES = (PROCESSES, "dask")
 
 
@@ -43,13 +44,15 @@ def outcomes(task: Task, cases: Sequence[Case], place: Place, *, safe: bool = Fa
 def _begun_here(task: Task, cases: Sequence[Case]) -> Iterator[Outcome]:
     """Cases here for as long as processes take to begin, and to the end where these would gain less; the rest in processes.
 
-    What the first case took longer than the last one was spent on what later ones find made, in every process anew.
+    What the first case took longer than the last one was spent on what later ones find made, in every process anew: a
+    second one tells how much that is, unless the first was long.
     """
     begin, first, last = perf_counter(), 0.0, 0.0
     for number, case in enumerate(cases):
         since = perf_counter()
         gain = last * (len(cases) - number) * (1 - 1 / processors())
-        if since - begin > BEGIN and gain > BEGIN + max(first - last, 0.0):
+        told = number != 1 or first > LONG
+        if told and since - begin > BEGIN and gain > BEGIN + max(first - last, 0.0):
             yield from in_processes(task, cases[number:])
             return
         yield computed(task, case)

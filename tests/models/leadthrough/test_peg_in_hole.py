@@ -14,7 +14,7 @@ from gantrytau_models.leadthrough.peg_figures import (
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole
 from gantrytau_models.leadthrough.peg_match import Match, PegDisturbances
 
-STOP, POINTS = 85.0, 426
+STOP, POINTS, TOLERANCE = 85.0, 426, 1e-6  # forces feed back through samples only, so that errors do not grow
 ZERO = [0.0, 0.0, 0.0]
 HELD = 79.0  # s, when the hand withdraws
 KEPT = ["tool.angle", "tool.r", "tool.axis", "yaw", "f", "t", "control.contact"]
@@ -25,7 +25,8 @@ def runs(seeds, **changes):
     dae = translate(PegInHole(**changes), events=True)
     inputs = PegDisturbances().inputs()
     return [
-        simulate(dae, stop=STOP, inputs=inputs, seed=k, points=POINTS, outputs=KEPT) for k in range(seeds)
+        simulate(dae, stop=STOP, inputs=inputs, seed=k, points=POINTS, outputs=KEPT, tolerance=TOLERANCE)
+        for k in range(seeds)
     ]
 
 
@@ -91,7 +92,7 @@ def test_a_gated_normal_leaves_forces_across_the_tool(reference):
 
 
 def test_steel_and_other_clearances_align_too():
-    for match in (Match(modulus=210e9), Match(clearance=1e-4), Match(mu=0.6)):
+    for match in (Match(modulus=210e9, mu=0.6), Match(clearance=1e-4)):
         (result,) = runs(1, match=match)
         angle, depth, _ = figures(result)
         assert angle < 2.2
