@@ -1,0 +1,113 @@
+"""A tool that is led along a surface, section 8.4 of Dressler (2012)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+
+from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_noise
+from gantrytau.inputs.random_signals import WhiteNoise
+from gantrytau_models.leadthrough import operators
+from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
+from gantrytau_models.leadthrough.lead_through import LeadThrough
+from gantrytau_models.leadthrough.operator import Operator
+from gantrytau_models.leadthrough.records import OperatorRecord, SurfaceRecord
+
+SLOW = 1e-3  # m/s, below which rolling resistance fades
+LONG = 1e6  # s: noise of this period is one number for a run
+START = -0.03  # m, of the tool before the surface
+
+
+class Surface(Model):
+    """A surface that a rigid tool presses in: f = stiffness times the depth, along its normal, and rolling resistance.
+
+    z of the tool points into it. The tool is moved by its velocity, so the force is what a sensor sees and moves nothing.
+    """
+
+    stiffness = Parameter(unit="N/m", min=0.0, description="stiffness against the tool")
+    tilt = Parameter(0.0, unit="rad", description="angle against the x axis of the tool")
+    ripple = Parameter(0.0, unit="m", min=0.0, description="amplitude of its ripple")
+    ripple_length = Parameter(0.03, unit="m", min=0.0, description="length of a ripple along x")
+    rolling = Parameter(0.0, unit="1", min=0.0, description="rolling resistance over normal force")
+    r = Input(3, unit="m", description="position of the tool")
+    v = Input(3, unit="m/s", description="velocity of the tool")
+    height = Output(unit="m", description="of the tool before the surface, along z; negative inside it")
+    n = Real(3, unit="1", description="normal into the surface")
+    load = Real(unit="N", description="force along the normal")
+    f = Output(3, unit="N", description="force of the tool on the surface")
+
+    def equations(self):
+        wave = 2 * ca.pi / self.ripple_length
+        slope = ca.tan(self.tilt)
+        z = slope * self.r[0] + self.ripple * ca.sin(wave * self.r[0])
+        rise = slope + self.ripple * wave * ca.cos(wave * self.r[0])
+        yield self.height == z - self.r[2]
+        yield self.n == ca.vertcat(-rise, 0, 1) / ca.sqrt(1 + rise**2)
+        # the depth along the normal of a face that is nearly flat
+        yield self.load == self.stiffness * ca.fmax(0.0, -self.height) * self.n[2]
+        slip = self.v - ca.dot(self.v, self.n) * self.n
+        yield self.f == self.load * (self.n + self.rolling * slip / ca.sqrt(ca.dot(slip, slip) + SLOW**2))
+
+
+class SurfaceTracking(Model):
+    """A tool that is led along a surface and holds 2 N there by itself, with a rigid arm that follows velocities.
+
+    surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`. Axes are
+    those of the tool, z into the surface. Its noise comes from outside: `inputs=noises(model)`. Raises ModelError for what is
+    no such record.
+    """
+
+    tool_control = True
+    period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
+    hand = Operator.open(period=period)
+    handle = ForceSensor(std_bias_f=0.05)
+    sensor = ForceSensor()
+    control = LeadThrough(period=period)
+    arm = VelocityServo(r=dict(start=[0.0, 0.0, START]))
+    surface = Surface()
+    f_n = Real(unit="N", description="force of the tool along z")
+
+    def __init__(
+        self,
+        surface: SurfaceRecord,
+        *,
+        tool_control: bool = True,
+        operator: OperatorRecord = operators.SKILLED,
+        **modifications: Any,
+    ):
+        if not isinstance(surface, SurfaceRecord):
+            raise ModelError(
+                f"SurfaceTracking: found {type(surface).__name__}, expected a record such as surfaces.METAL"
+            )
+        face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
+        hand = Operator(operator, pressing=tool_control).modifications
+        chosen = dict(surface=face, hand=dict(hand), control=dict(tool_control=tool_control))
+        super().__init__(chosen, **modifications)
+
+    def equations(self):
+        arm, control, surface = self.arm, self.control, self.surface
+        yield surface.r == arm.r
+        yield surface.v == arm.v
+        yield self.sensor.f == surface.f
+        yield self.sensor.t == 0
+        yield self.hand.height == surface.height
+        yield self.hand.v == arm.v
+        yield self.handle.f == self.hand.f
+        yield self.handle.t == 0
+        yield control.f_h == self.handle.f_seen
+        yield control.f_t == self.sensor.f_seen
+        yield control.t_t == 0
+        yield control.v_tool == arm.v
+        yield arm.v_ref == control.v
+        yield self.f_n == surface.f[2]
+
+
+def noises(period: float = 0.004, sensors: Mapping[str, Any] | None = None) -> dict[str, WhiteNoise]:
+    """Noise for the inputs of sensors and hand of `SurfaceTracking`, without seeds: `simulate(..., seed=1)` gives them."""
+    found: dict[str, WhiteNoise] = {}
+    for sensor in ("handle", "sensor"):
+        found[f"{sensor}.white_f"] = white_noise([1.0] * 3, period)
+        found[f"{sensor}.bias_f"] = white_noise([1.0] * 3, LONG)
+    found["hand.white"] = found["hand.white_force"] = white_noise(1.0, period)
+    found["hand.draw"] = white_noise([1.0] * 3, LONG)
+    return found
