@@ -3,7 +3,6 @@
 from gantrytau import Input, Model, Output, Parameter, der, require
 
 
-
 class VelocityServo(Model):
     """A robot that follows velocities, and that no force pushes back: T_v v' = v_ref - v, r' = v.
 
@@ -32,7 +31,9 @@ class ForceSensor(Model):
     std_f = Parameter(0.05, unit="N", min=0.0, description="standard deviation of a sample of the force")
     std_t = Parameter(0.0, unit="N.m", min=0.0, description="standard deviation of a sample of the torque")
     std_bias_f = Parameter(0.03, unit="N", min=0.0, description="standard deviation of the bias of the force")
-    std_bias_t = Parameter(0.0, unit="N.m", min=0.0, description="standard deviation of the bias of the torque")
+    std_bias_t = Parameter(
+        0.0, unit="N.m", min=0.0, description="standard deviation of the bias of the torque"
+    )
     m = Parameter(0.0, unit="kg", min=0.0, description="mass beyond the sensor")
     m_known = Parameter(m, unit="kg", min=0.0, description="mass whose weight is taken off")
     gravity = Parameter([0.0, 0.0, 9.81], unit="m/s2", description="gravity in axes of the tool")

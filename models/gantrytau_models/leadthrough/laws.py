@@ -23,7 +23,9 @@ class Impedance(Model):
     anti_windup = True
     period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
     M = Parameter([2.0] * 3, unit="kg", min=0.0, description="mass felt at the handle, along each axis")
-    D = Parameter([40.0] * 3, unit="N.s/m", min=0.0, description="damping felt at the handle, along each axis")
+    D = Parameter(
+        [40.0] * 3, unit="N.s/m", min=0.0, description="damping felt at the handle, along each axis"
+    )
     f = Input(3, unit="N", start=0.0, description="force of the hand on the handle")
     v_tool = Input(3, unit="m/s", start=0.0, description="velocity of the tool")
     passed = Input(3, unit="m/s", start=0.0, description="what was let through of v, P_h(V_h)")
@@ -31,7 +33,9 @@ class Impedance(Model):
     v = Output(3, unit="m/s", start=0.0, description="velocity for the force, V_h, before it is projected")
 
     def equations(self):
-        yield require(ca.mmin(self.M) > 0, "expected masses above zero; a small mass follows the hand at once")
+        yield require(
+            ca.mmin(self.M) > 0, "expected masses above zero; a small mass follows the hand at once"
+        )
         yield self.a == (self.f - self.D * self.v_tool) / self.M
         before = self.passed if self.anti_windup else self.v
         yield sampled(self.v, before + self.period * self.a, period=self.period)
@@ -91,7 +95,9 @@ class NormalEstimate(Model):
     estimate, as a peg in a hole needs.
     """
 
-    gate = Parameter(0.1745329251994330, unit="rad", min=0.0, description="angle within which it is believed, phi_L")
+    gate = Parameter(
+        0.1745329251994330, unit="rad", min=0.0, description="angle within which it is believed, phi_L"
+    )
     nominal = Parameter([0.0, 0.0, 1.0], unit="1", description="nominal normal, n_n, of length one")
     least = Parameter(0.05, unit="N", min=0.0, description="force below which there is no estimate")
     f = Input(3, unit="N", start=0.0, description="force of the tool")
@@ -102,9 +108,7 @@ class NormalEstimate(Model):
         size = norm_2(self.f)
         estimate = self.f / ca.fmax(size, TINY)
         near = ca.logic_or(self.gate >= ca.pi, dot(estimate, self.nominal) >= ca.cos(self.gate))
-        yield require(
-            ca.fabs(norm_2(self.nominal) - 1) < 1e-9, "expected a nominal normal of length one"
-        )
+        yield require(ca.fabs(norm_2(self.nominal) - 1) < 1e-9, "expected a nominal normal of length one")
         yield self.passed == if_else(ca.logic_and(size >= self.least, near), 1.0, 0.0)
         yield self.n == if_else(self.passed > 0.5, estimate, self.nominal)
 

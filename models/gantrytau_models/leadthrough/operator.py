@@ -60,7 +60,7 @@ class Operator(Model):
 
     def _spread(self, k: int) -> Any:
         """A factor near 1, the same for a run."""
-        return 1 + self.spread * ca.fmax(-1.0, ca.fmin(self.draw[k], 1.0))
+        return 1 + self.spread * ca.sin(self.draw[k])
 
     def equations(self):
         period, pulling = self.period, time >= self.pull_time
@@ -82,6 +82,8 @@ class Operator(Model):
             yield sampled(self.intended[k], beside if k == 2 else 0.0, period=period)
         yield sampled(self.noisy, 1 + self.force_noise * self.white_force, period=period)
         arm = self.arm * self._spread(2)
-        yield self.muscle_time * der(self.muscle) == arm * (self.wanted - self.v) + self.intended - self.muscle
+        yield (
+            self.muscle_time * der(self.muscle) == arm * (self.wanted - self.v) + self.intended - self.muscle
+        )
         swing = self.tremor * ca.sin(2 * math.pi * self.tremor_frequency * time)
         yield self.f == self.noisy * self.muscle + swing * ca.vertcat(0.6, 0.0, 0.8)

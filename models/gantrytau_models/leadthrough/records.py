@@ -43,10 +43,14 @@ class OperatorRecord:
     muscle_time: float = field(metadata=quantity("s", "time constant of the force", positive=True))
     tremor: float = field(metadata=quantity("N", "amplitude of the tremor", least=0.0))
     tremor_frequency: float = field(metadata=quantity("Hz", "frequency of the tremor", positive=True))
-    force_noise: float = field(metadata=quantity("1", "standard deviation of the force over itself", least=0.0))
+    force_noise: float = field(
+        metadata=quantity("1", "standard deviation of the force over itself", least=0.0)
+    )
     press: float = field(metadata=quantity("N", "force by which contact is helped", least=0.0))
     pull: float = field(metadata=quantity("N", "force that ends the contact", least=0.0))
-    spread: float = field(metadata=quantity("1", "largest deviation from run to run, of speed, depth and arm", least=0.0))
+    spread: float = field(
+        metadata=quantity("1", "largest deviation from run to run, of speed, depth and arm", least=0.0)
+    )
 
     def __post_init__(self):
         hold_numbers(self, f"operator {self.name}")

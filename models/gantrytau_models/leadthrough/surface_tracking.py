@@ -1,5 +1,6 @@
 """A tool that is led along a surface, section 8.4 of Dressler (2012)."""
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +9,7 @@ import casadi as ca
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_noise
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau_models.leadthrough import operators
+from gantrytau_models.leadthrough.contact_loop import CriticalGain, contact_loop
 from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.lead_through import LeadThrough
 from gantrytau_models.leadthrough.operator import Operator
@@ -83,6 +85,13 @@ class SurfaceTracking(Model):
         hand = Operator(operator, pressing=tool_control).modifications
         chosen = dict(surface=face, hand=dict(hand), control=dict(tool_control=tool_control))
         super().__init__(chosen, **modifications)
+        if tool_control and (loop := contact_loop(self)).share >= 1:
+            warnings.warn(
+                f"SurfaceTracking: the tool will hop on the surface: {loop}; a smaller control.tool.K or a softer "
+                "surface holds it",
+                CriticalGain,
+                stacklevel=2,
+            )
 
     def equations(self):
         arm, control, surface = self.arm, self.control, self.surface

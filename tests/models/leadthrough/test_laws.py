@@ -1,0 +1,130 @@
+"""The laws of lead-through against what they say: (8.1) to (8.11)."""
+
+import numpy as np
+import pytest
+
+from gantrytau import Model, Samples, simulate
+from gantrytau_models.leadthrough.devices import VelocityServo
+from gantrytau_models.leadthrough.laws import (
+    ContactState,
+    Impedance,
+    NormalEstimate,
+    Projection,
+    ToolForceControl,
+)
+from gantrytau_models.leadthrough.lead_through import LeadThrough
+
+PERIOD = 0.004
+
+
+def after(model, samples, **inputs):
+    """Result of a block with inputs held from sample to sample; values just behind an instant are between two of them."""
+    return simulate(model, stop=samples * PERIOD, points=2 * samples + 1, inputs=inputs)
+
+
+def behind(result, name, k):
+    """A variable in the middle between sample k and the next."""
+    return result.at((k + 0.5) * PERIOD, name)
+
+
+def held(rows):
+    """Inputs that change a little before each instant, so that no jump meets one."""
+    return Samples((np.arange(len(rows)) - 0.25) * PERIOD, np.array(rows, dtype=float), kind="constant")
+
+
+def test_a_force_is_an_acceleration_after_one_sample():
+    run = after(Impedance(M=[2.0, 4.0, 1.0]), 3, **{"f": [3.0, 4.0, 0.0]})
+    assert np.allclose(behind(run, "v", 0), PERIOD * np.array([1.5, 1.0, 0.0]), rtol=1e-14)
+    # nothing is passed on, so that it starts anew: no wind-up
+    assert np.allclose(behind(run, "v", 2), PERIOD * np.array([1.5, 1.0, 0.0]), rtol=1e-14)
+
+
+def test_without_anti_windup_velocity_adds_up():
+    run = after(Impedance(anti_windup=False), 10, **{"f": [0.0, 0.0, 3.0]})
+    assert np.isclose(behind(run, "v[2]", 9), 10 * PERIOD * 1.5, rtol=1e-12)
+
+
+def test_the_hand_moves_the_tool_with_its_damping_alone_in_the_end():
+    class Free(Model):
+        control = LeadThrough()
+        arm = VelocityServo()
+
+        def equations(self):
+            yield self.control.f_h == [2.0, -1.0, 0.5]
+            yield self.control.f_t == 0
+            yield self.control.t_t == 0
+            yield self.control.v_tool == self.arm.v
+            yield self.arm.v_ref == self.control.v
+
+    run = after(Free(), 800)
+    assert np.allclose(behind(run, "arm.v", 799), np.array([2.0, -1.0, 0.5]) / 40.0, atol=1e-9)
+
+
+def test_tool_force_is_driven_to_its_reference_along_the_normal():
+    run = after(
+        ToolForceControl(K_tau=[3.0] * 3), 1, **{"f": [0.3, 0.0, 1.0], "t": [0, 0.1, 0], "n": [0, 0, 1]}
+    )
+    assert np.allclose(run["v"][0], 0.03 * np.array([-0.3, 0.0, 1.0]))
+    assert np.allclose(run["w"][0], [0.0, -0.3, 0.0])
+
+
+CONTACT = [  # force of the tool, pull of the hand -> contact
+    (0.0, 0.0, 0),
+    (0.4, 0.0, 0),  # not yet
+    (0.6, 0.0, 1),
+    (0.0, 0.0, 1),  # a lost force ends nothing
+    (2.0, 7.9, 1),
+    (2.0, 8.1, 0),  # released
+    (2.0, 16.0, 0),  # the force is still there
+    (2.0, 0.0, 0),
+    (0.3, 0.0, 0),
+    (0.1, 0.0, 0),  # armed again
+    (0.6, 0.0, 1),
+]
+
+
+def contacts(**modifications):
+    f_n, pull, _ = zip(*CONTACT, strict=True)
+    run = after(ContactState(**modifications), len(CONTACT), f_n=held(f_n), pull=held(pull))
+    return [round(behind(run, "touched", k)) for k in range(len(CONTACT))]
+
+
+def test_contact_begins_ends_and_is_armed_again():
+    assert contacts() == [state for *_, state in CONTACT]
+
+
+def test_without_being_armed_contact_comes_back_at_once():
+    assert contacts(rearm=1e9)[6] == 1
+
+
+@pytest.mark.parametrize(
+    ("degrees", "gate", "passed"),
+    [(9.9, 10, 1), (10.1, 10, 0), (0.0, 0, 1), (0.1, 0, 0), (90.0, 180, 1), (180.0, 180, 1), (180.0, 179, 0)],
+)
+def test_normals_are_believed_within_the_gate(degrees, gate, passed):
+    f = 3 * np.array([np.sin(np.deg2rad(degrees)), 0.0, np.cos(np.deg2rad(degrees))])
+    run = after(NormalEstimate(gate=np.deg2rad(gate)), 1, f=f)
+    assert run["passed"][0] == passed
+    assert np.allclose(run["n"][0], f / 3 if passed else [0, 0, 1], atol=1e-12)
+
+
+def test_a_force_that_is_nothing_has_no_direction():
+    run = after(NormalEstimate(gate=np.pi), 1, f=[0.0, 0.0, 0.0])
+    assert np.array_equal(run["n"][0], [0, 0, 1])
+    assert np.array_equal(after(NormalEstimate(gate=np.pi), 1, f=[0.049, 0, 0])["n"][0], [0, 0, 1])
+
+
+def test_hand_and_tool_share_the_directions():
+    n, v_h, v_t = np.array([0.6, 0.0, 0.8]), np.array([0.1, 0.05, -0.02]), np.array([0.01, 0.02, 0.03])
+    given = dict(n=n, v_h=v_h, v_t=v_t, w_t=[1.0, 2.0, 3.0])
+    free, touching = (after(Projection(v_max=10.0), 1, contact=c, **given) for c in (0.0, 1.0))
+    assert np.allclose(free["p_h"][0], v_h)
+    assert not np.any(free["p_t"][0]) and not np.any(free["w"][0])
+    assert np.allclose(touching["p_h"][0], v_h - (n @ v_h) * n)
+    assert np.allclose(touching["p_t"][0], (n @ v_t) * n)
+    assert np.allclose(touching["w"][0], [1, 2, 3])
+
+
+def test_the_hand_has_a_largest_speed():
+    run = after(Projection(), 1, n=[0, 0, 1], v_h=[3.0, 4.0, 0.0], v_t=[0, 0, 0], w_t=[0, 0, 0])
+    assert np.allclose(run["p_h"][0], [0.15, 0.2, 0.0])
