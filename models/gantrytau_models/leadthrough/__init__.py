@@ -1,5 +1,16 @@
 """Robots that are led by hand while their tool touches something: Dressler (2012), chapter 8."""
 
+from gantrytau_models.leadthrough.assumed import operators, surfaces
+from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
+from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
+from gantrytau_models.leadthrough.laws import (
+    ContactState,
+    Impedance,
+    NormalEstimate,
+    Projection,
+    ToolForceControl,
+)
+from gantrytau_models.leadthrough.lead_through import LeadThrough
 from gantrytau_models.leadthrough.peg_control import PegControl
 from gantrytau_models.leadthrough.peg_figures import (
     plot_peg_forces,
@@ -9,15 +20,44 @@ from gantrytau_models.leadthrough.peg_figures import (
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole
 from gantrytau_models.leadthrough.peg_match import Match, PegDisturbances
 from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool
+from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
+from gantrytau_models.leadthrough.surface.operator import Operator
+from gantrytau_models.leadthrough.surface.surface_figures import plot_oscillation, plot_tool_force
+from gantrytau_models.leadthrough.surface.surface_tracking import (
+    Surface,
+    SurfaceTracking,
+    surface_disturbances,
+)
 
 __all__ = [
+    "ContactLoop",
+    "ContactState",
+    "CriticalGain",
+    "ForceSensor",
+    "Impedance",
+    "LeadThrough",
     "Match",
+    "NormalEstimate",
+    "Operator",
+    "OperatorRecord",
     "PegControl",
     "PegDisturbances",
     "PegHand",
     "PegInHole",
     "PegTool",
+    "Projection",
+    "Surface",
+    "SurfaceRecord",
+    "SurfaceTracking",
+    "ToolForceControl",
+    "VelocityServo",
+    "contact_loop",
+    "operators",
+    "plot_oscillation",
     "plot_peg_forces",
     "plot_peg_orientation",
     "plot_peg_torques",
+    "plot_tool_force",
+    "surface_disturbances",
+    "surfaces",
 ]

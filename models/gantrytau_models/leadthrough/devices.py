@@ -25,7 +25,7 @@ class ForceSensor(Model):
     known of that weight.
 
     `white_f`, `white_t` and `bias_f`, `bias_t` are given by white noise of standard deviation 1, the biases with one number
-    for a run: `noises(model)` has them.
+    for a run: `surface_disturbances()` has them.
     """
 
     std_f = Parameter(0.05, unit="N", min=0.0, description="standard deviation of a sample of the force")

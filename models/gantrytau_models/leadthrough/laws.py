@@ -16,8 +16,8 @@ class Impedance(Model):
     """The handle as a mass with damping: a = M^-1 (F_h - D V_tool), V_h(k + 1) = P_h(V_h(k)) + T a(k), (8.6) and (8.7).
 
     The velocity starts anew from what was let through of it, so that what is projected away or beyond the limit does not
-    wind up. anti_windup=False goes on from V_h(k) itself, (8.5). One sample after a force begins the velocity is T F / M: the
-    printed form, with its operator of time, is a sample late.
+    wind up. anti_windup=False goes on from V_h(k) itself, (8.5). One sample after a force begins the velocity is T F / M:
+    the printed form, with its operator of time, is a sample late.
     """
 
     anti_windup = True

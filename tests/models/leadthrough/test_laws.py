@@ -33,14 +33,14 @@ def held(rows):
 
 
 def test_a_force_is_an_acceleration_after_one_sample():
-    run = after(Impedance(M=[2.0, 4.0, 1.0]), 3, **{"f": [3.0, 4.0, 0.0]})
+    run = after(Impedance(M=[2.0, 4.0, 1.0]), 3, f=[3.0, 4.0, 0.0])
     assert np.allclose(behind(run, "v", 0), PERIOD * np.array([1.5, 1.0, 0.0]), rtol=1e-14)
     # nothing is passed on, so that it starts anew: no wind-up
     assert np.allclose(behind(run, "v", 2), PERIOD * np.array([1.5, 1.0, 0.0]), rtol=1e-14)
 
 
 def test_without_anti_windup_velocity_adds_up():
-    run = after(Impedance(anti_windup=False), 10, **{"f": [0.0, 0.0, 3.0]})
+    run = after(Impedance(anti_windup=False), 10, f=[0.0, 0.0, 3.0])
     assert np.isclose(behind(run, "v[2]", 9), 10 * PERIOD * 1.5, rtol=1e-12)
 
 
@@ -61,9 +61,7 @@ def test_the_hand_moves_the_tool_with_its_damping_alone_in_the_end():
 
 
 def test_tool_force_is_driven_to_its_reference_along_the_normal():
-    run = after(
-        ToolForceControl(K_tau=[3.0] * 3), 1, **{"f": [0.3, 0.0, 1.0], "t": [0, 0.1, 0], "n": [0, 0, 1]}
-    )
+    run = after(ToolForceControl(K_tau=[3.0] * 3), 1, f=[0.3, 0.0, 1.0], t=[0, 0.1, 0], n=[0, 0, 1])
     assert np.allclose(run["v"][0], 0.03 * np.array([-0.3, 0.0, 1.0]))
     assert np.allclose(run["w"][0], [0.0, -0.3, 0.0])
 
@@ -119,7 +117,8 @@ def test_hand_and_tool_share_the_directions():
     given = dict(n=n, v_h=v_h, v_t=v_t, w_t=[1.0, 2.0, 3.0])
     free, touching = (after(Projection(v_max=10.0), 1, contact=c, **given) for c in (0.0, 1.0))
     assert np.allclose(free["p_h"][0], v_h)
-    assert not np.any(free["p_t"][0]) and not np.any(free["w"][0])
+    assert not np.any(free["p_t"][0])
+    assert not np.any(free["w"][0])
     assert np.allclose(touching["p_h"][0], v_h - (n @ v_h) * n)
     assert np.allclose(touching["p_t"][0], (n @ v_t) * n)
     assert np.allclose(touching["w"][0], [1, 2, 3])

@@ -1,19 +1,18 @@
 """A tool that is led along a surface, section 8.4 of Dressler (2012)."""
 
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_noise
 from gantrytau.inputs.random_signals import WhiteNoise
-from gantrytau_models.leadthrough import operators
-from gantrytau_models.leadthrough.contact_loop import CriticalGain, contact_loop
+from gantrytau_models.leadthrough.assumed import operators
+from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
 from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.lead_through import LeadThrough
-from gantrytau_models.leadthrough.operator import Operator
-from gantrytau_models.leadthrough.records import OperatorRecord, SurfaceRecord
+from gantrytau_models.leadthrough.surface.contact_loop import CriticalGain, contact_loop
+from gantrytau_models.leadthrough.surface.operator import Operator
 
 SLOW = 1e-3  # m/s, below which rolling resistance fades
 LONG = 1e6  # s: noise of this period is one number for a run
@@ -54,9 +53,9 @@ class Surface(Model):
 class SurfaceTracking(Model):
     """A tool that is led along a surface and holds 2 N there by itself, with a rigid arm that follows velocities.
 
-    surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`. Axes are
-    those of the tool, z into the surface. Its noise comes from outside: `inputs=noises(model)`. Raises ModelError for what is
-    no such record.
+    surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`. Axes
+    are those of the tool, z into the surface. What is random comes from outside: `inputs=surface_disturbances()`. Warns of a
+    gain beyond the critical one (`CriticalGain`). Raises ModelError for what is no such record.
     """
 
     tool_control = True
@@ -66,7 +65,7 @@ class SurfaceTracking(Model):
     sensor = ForceSensor()
     control = LeadThrough(period=period)
     arm = VelocityServo(r=dict(start=[0.0, 0.0, START]))
-    surface = Surface()
+    face = Surface()
     f_n = Real(unit="N", description="force of the tool along z")
 
     def __init__(
@@ -83,7 +82,7 @@ class SurfaceTracking(Model):
             )
         face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
         hand = Operator(operator, pressing=tool_control).modifications
-        chosen = dict(surface=face, hand=dict(hand), control=dict(tool_control=tool_control))
+        chosen = dict(face=face, hand=dict(hand), control=dict(tool_control=tool_control))
         super().__init__(chosen, **modifications)
         if tool_control and (loop := contact_loop(self)).share >= 1:
             warnings.warn(
@@ -94,12 +93,12 @@ class SurfaceTracking(Model):
             )
 
     def equations(self):
-        arm, control, surface = self.arm, self.control, self.surface
-        yield surface.r == arm.r
-        yield surface.v == arm.v
-        yield self.sensor.f == surface.f
+        arm, control, face = self.arm, self.control, self.face
+        yield face.r == arm.r
+        yield face.v == arm.v
+        yield self.sensor.f == face.f
         yield self.sensor.t == 0
-        yield self.hand.height == surface.height
+        yield self.hand.height == face.height
         yield self.hand.v == arm.v
         yield self.handle.f == self.hand.f
         yield self.handle.t == 0
@@ -108,11 +107,11 @@ class SurfaceTracking(Model):
         yield control.t_t == 0
         yield control.v_tool == arm.v
         yield arm.v_ref == control.v
-        yield self.f_n == surface.f[2]
+        yield self.f_n == face.f[2]
 
 
-def noises(period: float = 0.004, sensors: Mapping[str, Any] | None = None) -> dict[str, WhiteNoise]:
-    """Noise for the inputs of sensors and hand of `SurfaceTracking`, without seeds: `simulate(..., seed=1)` gives them."""
+def surface_disturbances(period: float = 0.004) -> dict[str, WhiteNoise]:
+    """What is random in a `SurfaceTracking`, as inputs of a simulation, whose seed, or that of a study, draws them."""
     found: dict[str, WhiteNoise] = {}
     for sensor in ("handle", "sensor"):
         found[f"{sensor}.white_f"] = white_noise([1.0] * 3, period)

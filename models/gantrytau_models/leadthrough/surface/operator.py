@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
-from gantrytau_models.leadthrough.records import OperatorRecord
+from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
 DELAY = 50  # samples, 0.2 s, between what is seen and what is done about it
 
@@ -16,8 +16,8 @@ class Operator(Model):
     slow misjudgement, and at last pulls the tool off. It feels the handle, never the force of the tool.
 
     record: as `operators.SKILLED`; pressing: whether it helps the contact with some force. The force follows with the time
-    constant of the muscle. `spread` and the `white` inputs are given by white noise of standard deviation 1, as `noises(model)`
-    has them. Raises ModelError for what is no record.
+    constant of the muscle. `draw` and the `white` inputs are given by white noise of standard deviation 1, as
+    `surface_disturbances()` has them. Raises ModelError for what is no record.
     """
 
     period = Parameter(0.004, unit="s", min=0.0, description="between two decisions")

@@ -1,8 +1,8 @@
 """The linear loop behind a tool in contact: sensor, force control, robot and the stiffness of the surface, sampled.
 
-A force gives a velocity, K, the robot follows it, the position presses the surface, stiffness: the gain is g = K stiffness in
-1/s, and only the servo, the period and delays say how large it may be. Section 8.4 of Dressler (2012) prints 68 Hz on a metal
-plate and none on cardboard: this is what an almost unstable loop of 4 ms shows, of which noise is enough to make it sound.
+A force gives a velocity, K, the robot follows it, the position presses the surface, stiffness: the gain is g = K stiffness
+in 1/s, and only the servo, the period and delays say how large it may be. Section 8.4 of Dressler (2012) prints 68 Hz on a
+metal plate and none on cardboard: an almost unstable loop of 4 ms shows that, and noise is enough to make it sound.
 """
 
 import math
@@ -61,7 +61,7 @@ class ContactLoop:
         whole, part = divmod(self.delay, self.period)
         # the input changes `part` after the instant: x(k + 1) = Phi x + early u(k - 1) + late u(k)
         Phi, both = held(A, B, self.period)
-        rest, late = held(A, B, self.period - part)
+        __, late = held(A, B, self.period - part)
         early = both - late
         n, lags = len(A), int(whole) + 1
         big, into = np.zeros((n + lags, n + lags)), np.zeros((n + lags, 1))
@@ -132,18 +132,17 @@ class ContactLoop:
     def rivals(self) -> str:
         """What else would sound at the same frequency, which a recording of the force alone cannot tell apart."""
         crossover, sampling = self.crossover, 1 / self.period
+        share, mode = f"{100 * self.share:.0f} % of its critical gain", f"{1.03 * crossover:.0f} Hz"
         return (
-            f"{crossover:.1f} Hz may be this loop at {100 * self.share:.0f} % of its critical gain; or a mode of the structure near "
-            f"{1.03 * crossover:.0f} Hz with little damping, at a tenth of the gain; or {sampling - crossover:.0f} Hz, if the force was "
-            f"recorded every {1000 * self.period:g} ms without a filter before it. A step of the gain tells: only the loop's own "
-            "frequency stays while its amplitude grows without bound."
+            f"{crossover:.1f} Hz may be this loop at {share}; or a mode of the structure near {mode} with little damping, "
+            f"at a tenth of the gain; or {sampling - crossover:.0f} Hz, if the force was recorded every "
+            f"{1000 * self.period:g} ms without a filter before it. A step of the gain tells: only the loop's own frequency "
+            "stays while its amplitude grows without bound."
         )
 
     def __str__(self) -> str:
-        return (
-            f"gain {self.gain:.4g} 1/s, {100 * self.share:.0f} % of the critical {self.critical_gain:.4g} 1/s, where it swings with "
-            f"{self.crossover:.1f} Hz"
-        )
+        critical = f"{100 * self.share:.0f} % of the critical {self.critical_gain:.4g} 1/s"
+        return f"gain {self.gain:.4g} 1/s, {critical}, where it swings with {self.crossover:.1f} Hz"
 
     def plot_nyquist(self, file: str | os.PathLike[str] | None = None) -> "Figure":
         """The open loop in the complex plane with the critical point; file: also save the figure there."""
@@ -176,7 +175,7 @@ def contact_loop(model: Model) -> ContactLoop:
     flat = flatten(model)
     values = parameter_table(flat).values
     try:
-        gain = values["control.tool.K[2]"] * values["surface.stiffness"]
+        gain = values["control.tool.K[2]"] * values["face.stiffness"]
         return ContactLoop(float(gain), float(values["arm.T_v"]), float(values["control.period"]))
     except KeyError as error:
         raise ModelError(

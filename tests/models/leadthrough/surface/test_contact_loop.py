@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_models.leadthrough import surfaces
-from gantrytau_models.leadthrough.contact_loop import ContactLoop, CriticalGain, contact_loop
-from gantrytau_models.leadthrough.surface_tracking import SurfaceTracking
+from gantrytau_models import Pendulum
+from gantrytau_models.leadthrough.assumed import surfaces
+from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
+from gantrytau_models.leadthrough.surface.surface_tracking import SurfaceTracking
 
 
 def test_the_loop_of_four_milliseconds_sounds_with_68_hertz():
@@ -42,13 +43,15 @@ def test_delays_go_over_into_each_other():
         ContactLoop(1.0, delay=d).critical_gain for d in (0.0, 1e-9, 2e-3, 4e-3 - 1e-9, 4e-3, 4e-3 + 1e-9)
     ]
     assert np.all(np.diff(gains) < 1e-3)
-    assert np.isclose(gains[0], gains[1], rtol=1e-5) and np.isclose(gains[3], gains[5], rtol=1e-5)
+    assert np.isclose(gains[0], gains[1], rtol=1e-5)
+    assert np.isclose(gains[3], gains[5], rtol=1e-5)
 
 
 def test_a_stiff_structure_changes_nothing_and_a_soft_one_rules():
     assert np.isclose(ContactLoop(1.0, mode=5000.0, damping=0.7).critical_gain, 690.5, rtol=0.03)
     soft = ContactLoop(1.0, T_v=0.0, mode=70.0, damping=0.02)
-    assert abs(soft.crossover - 68) < 1.0 and soft.critical_gain < 40
+    assert abs(soft.crossover - 68) < 1.0
+    assert soft.critical_gain < 40
 
 
 def test_numbers_are_those_of_the_model():
@@ -67,7 +70,9 @@ def test_a_gain_beyond_the_critical_one_is_told_before_the_run():
 
 def test_rivals_are_named_and_the_curve_is_drawn(tmp_path):
     loop = ContactLoop(0.95 * 690)
-    assert "182 Hz" in loop.rivals() and "95 %" in loop.rivals() and "mode of the structure" in loop.rivals()
+    assert "182 Hz" in loop.rivals()
+    assert "95 %" in loop.rivals()
+    assert "mode of the structure" in loop.rivals()
     loop.plot_nyquist(tmp_path / "nyquist.png")
     assert (tmp_path / "nyquist.png").stat().st_size > 5000
 
@@ -82,7 +87,5 @@ def test_wrong_loops_are_refused(wrong):
 
 
 def test_another_model_has_no_such_loop():
-    from gantrytau_models import Pendulum
-
-    with pytest.raises(ModelError, match="found Pendulum without control.tool.K"):
+    with pytest.raises(ModelError, match=r"found Pendulum without control\.tool\.K"):
         contact_loop(Pendulum())

@@ -1,0 +1,1 @@
+"""Surfaces and people: values that are assumed, not printed."""
