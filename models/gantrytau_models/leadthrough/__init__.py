@@ -2,7 +2,6 @@
 
 from gantrytau_models.leadthrough.assumed import operators, surfaces
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
-from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.laws import (
     ContactState,
     Impedance,
@@ -20,6 +19,7 @@ from gantrytau_models.leadthrough.peg_figures import (
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole
 from gantrytau_models.leadthrough.peg_match import Match, PegDisturbances
 from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool
+from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
 from gantrytau_models.leadthrough.surface.operator import Operator
 from gantrytau_models.leadthrough.surface.surface_figures import plot_oscillation, plot_tool_force

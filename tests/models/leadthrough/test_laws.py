@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from gantrytau import Model, Samples, simulate
-from gantrytau_models.leadthrough.devices import VelocityServo
 from gantrytau_models.leadthrough.laws import (
     ContactState,
     Impedance,
@@ -13,6 +12,7 @@ from gantrytau_models.leadthrough.laws import (
     ToolForceControl,
 )
 from gantrytau_models.leadthrough.lead_through import LeadThrough
+from gantrytau_models.leadthrough.servo_and_sensors import VelocityServo
 
 PERIOD = 0.004
 

@@ -9,8 +9,8 @@ from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_n
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau_models.leadthrough.assumed import operators
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
-from gantrytau_models.leadthrough.devices import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.lead_through import LeadThrough
+from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, VelocityServo
 from gantrytau_models.leadthrough.surface.contact_loop import CriticalGain, contact_loop
 from gantrytau_models.leadthrough.surface.operator import Operator
 
