@@ -24,6 +24,7 @@ from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, Criti
 from gantrytau_models.leadthrough.surface.operator import Operator
 from gantrytau_models.leadthrough.surface.surface_figures import plot_oscillation, plot_tool_force
 from gantrytau_models.leadthrough.surface.surface_tracking import (
+    LedTool,
     Surface,
     SurfaceTracking,
     surface_disturbances,
@@ -36,6 +37,7 @@ __all__ = [
     "ForceSensor",
     "Impedance",
     "LeadThrough",
+    "LedTool",
     "Match",
     "NormalEstimate",
     "Operator",

@@ -7,6 +7,7 @@ import casadi as ca
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_noise
 from gantrytau.inputs.random_signals import WhiteNoise
+from gantrytau.language.model import merge
 from gantrytau_models.leadthrough.assumed import operators
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
 from gantrytau_models.leadthrough.lead_through import LeadThrough
@@ -50,7 +51,66 @@ class Surface(Model):
         yield self.f == self.load * (self.n + self.rolling * slip / ca.sqrt(ca.dot(slip, slip) + SLOW**2))
 
 
-class SurfaceTracking(Model):
+class ToolOnSurface(Model):
+    """A tool on a surface with its sensors and whoever leads it; what moves it is said by others.
+
+    Arguments as of `SurfaceTracking`; pressing: whether the hand helps the contact.
+    """
+
+    period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
+    v_ref = Real(3, unit="m/s", description="velocity that is asked for")
+    f_h = Output(3, unit="N", description="force of the hand, as measured")
+    f_t = Output(3, unit="N", description="force of the tool, as measured")
+    v_tool = Output(3, unit="m/s", description="velocity of the tool")
+    f_n = Output(unit="N", description="force of the tool along z")
+    hand = Operator.open(period=period)
+    handle = ForceSensor(std_bias_f=0.05)
+    sensor = ForceSensor()
+    arm = VelocityServo(r=dict(start=[0.0, 0.0, START]))
+    face = Surface()
+
+    def __init__(
+        self,
+        surface: SurfaceRecord,
+        *,
+        pressing: bool = True,
+        operator: OperatorRecord = operators.SKILLED,
+        **modifications: Any,
+    ):
+        if not isinstance(surface, SurfaceRecord):
+            raise ModelError(
+                f"{type(self).__name__}: found {type(surface).__name__}, expected a record such as surfaces.METAL"
+            )
+        face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
+        hand = Operator(operator, pressing=pressing).modifications
+        super().__init__(dict(face=face, hand=dict(hand)), **modifications)
+
+    def equations(self):
+        arm, face = self.arm, self.face
+        yield arm.v_ref == self.v_ref
+        yield self.v_tool == arm.v
+        yield face.r == arm.r
+        yield face.v == arm.v
+        yield self.f_n == face.f[2]
+        yield self.sensor.f == face.f
+        yield self.sensor.t == 0
+        yield self.f_t == self.sensor.f_seen
+        yield self.hand.height == face.height
+        yield self.hand.v == arm.v
+        yield self.handle.f == self.hand.f
+        yield self.handle.t == 0
+        yield self.f_h == self.handle.f_seen
+
+
+class LedTool(ToolOnSurface):
+    """All of `SurfaceTracking` but its controller: velocities in, `v_ref`; measured forces of handle and tool out, `f_h` and
+    `f_t`. To be exported as an FMU beside one of `LeadThrough`.
+    """
+
+    v_ref = Input(3, unit="m/s", start=0.0, description="velocity that is asked for")
+
+
+class SurfaceTracking(ToolOnSurface):
     """A tool that is led along a surface and holds 2 N there by itself, with a rigid arm that follows velocities.
 
     surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`. Axes
@@ -58,15 +118,7 @@ class SurfaceTracking(Model):
     gain beyond the critical one (`CriticalGain`). Raises ModelError for what is no such record.
     """
 
-    tool_control = True
-    period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
-    hand = Operator.open(period=period)
-    handle = ForceSensor(std_bias_f=0.05)
-    sensor = ForceSensor()
-    control = LeadThrough(period=period)
-    arm = VelocityServo(r=dict(start=[0.0, 0.0, START]))
-    face = Surface()
-    f_n = Real(unit="N", description="force of the tool along z")
+    control = LeadThrough(period=ToolOnSurface.period)
 
     def __init__(
         self,
@@ -76,14 +128,8 @@ class SurfaceTracking(Model):
         operator: OperatorRecord = operators.SKILLED,
         **modifications: Any,
     ):
-        if not isinstance(surface, SurfaceRecord):
-            raise ModelError(
-                f"SurfaceTracking: found {type(surface).__name__}, expected a record such as surfaces.METAL"
-            )
-        face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
-        hand = Operator(operator, pressing=tool_control).modifications
-        chosen = dict(face=face, hand=dict(hand), control=dict(tool_control=tool_control))
-        super().__init__(chosen, **modifications)
+        control = merge(dict(tool_control=tool_control), modifications.pop("control", {}))
+        super().__init__(surface, pressing=tool_control, operator=operator, control=control, **modifications)
         if tool_control and (loop := contact_loop(self)).share >= 1:
             warnings.warn(
                 f"SurfaceTracking: the tool will hop on the surface: {loop}; a smaller control.tool.K or a softer "
@@ -93,21 +139,13 @@ class SurfaceTracking(Model):
             )
 
     def equations(self):
-        arm, control, face = self.arm, self.control, self.face
-        yield face.r == arm.r
-        yield face.v == arm.v
-        yield self.sensor.f == face.f
-        yield self.sensor.t == 0
-        yield self.hand.height == face.height
-        yield self.hand.v == arm.v
-        yield self.handle.f == self.hand.f
-        yield self.handle.t == 0
-        yield control.f_h == self.handle.f_seen
-        yield control.f_t == self.sensor.f_seen
+        yield from super().equations()
+        control = self.control
+        yield control.f_h == self.f_h
+        yield control.f_t == self.f_t
         yield control.t_t == 0
-        yield control.v_tool == arm.v
-        yield arm.v_ref == control.v
-        yield self.f_n == face.f[2]
+        yield control.v_tool == self.v_tool
+        yield self.v_ref == control.v
 
 
 def surface_disturbances(period: float = 0.004) -> dict[str, WhiteNoise]:
