@@ -227,7 +227,7 @@ def _system(
 
 
 def _read(
-    files: Mapping[str, Source], folder: Path, isolate: Sequence[str], tolerance: float | None
+    files: Mapping[str, Source], folder: Path, isolate: Sequence[str], tolerance: float | None = None
 ) -> dict[str, Component]:
     """Unpack and describe each component."""
     for name in isolate:
