@@ -146,8 +146,10 @@ class Declaration:
         return {name: vector[place] for name, place in self.slices.items()}
 
     def refusal(self, vector: Any) -> str:
-        """Why a vector cannot be taken, in words, or "" if it can: its size, numbers that are not finite, limits."""
-        if not isinstance(vector, np.ndarray) or vector.shape != (self.size,):
+        """Why a vector cannot be taken, in words, or "" if it can: its kind, size, numbers that are not finite, limits."""
+        if not isinstance(vector, np.ndarray) or vector.dtype.kind not in "fiu":
+            return f"found {type(vector).__name__}, expected an array of numbers"
+        if vector.shape != (self.size,):
             return f"found values of shape {np.shape(vector)}, expected ({self.size},)"
         bad = ~((vector >= self.minimum) & (vector <= self.maximum) & np.isfinite(vector))
         if not bad.any():

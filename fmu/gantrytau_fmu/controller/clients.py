@@ -25,7 +25,10 @@ class Sample:
 
 @runtime_checkable
 class Client(Protocol):
-    """One that is given every sample and may answer with values for the controller. No call raises or blocks."""
+    """One that is given every sample and may answer with values for the controller. No call raises or blocks.
+
+    One behind a wire may have `dropped` besides: how many messages never became answers.
+    """
 
     @property
     def name(self) -> str:
@@ -46,7 +49,10 @@ class Client(Protocol):
         ...
 
     def settled(self, k: int) -> bool:
-        """Whether it has done with sample k, so that a virtual clock may go on; one without answers always has."""
+        """Whether it has done with sample k, so that a virtual clock may go on.
+
+        One that answers nothing, or that has gone, always has.
+        """
         ...
 
     def close(self) -> None:

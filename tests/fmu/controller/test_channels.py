@@ -38,9 +38,16 @@ def test_what_is_not_finite_is_refused_at_every_place(bad, place):
     assert MOTION.elements[place] in MOTION.refusal(vector)
 
 
-@pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((4, 1)), np.float64(0), [0.0] * 4])
+@pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((4, 1)), np.array(0.0)])
 def test_another_shape_is_refused(wrong):
     assert "expected (4,)" in MOTION.refusal(wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong", [[0.0] * 4, None, "abcd", np.array(list("abcd")), np.zeros(4, dtype=complex)]
+)
+def test_what_is_no_array_of_numbers_is_refused(wrong):
+    assert "expected an array of numbers" in MOTION.refusal(wrong)
 
 
 def test_nothing_is_a_declaration_too():

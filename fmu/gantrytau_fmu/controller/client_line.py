@@ -1,0 +1,76 @@
+"""What the controller keeps of a client: the values that count, and how often it held, refused or missed some."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gantrytau.errors import in_words
+from gantrytau_fmu.controller.channels import Declaration, Values
+from gantrytau_fmu.controller.clients import Client, Sample
+from gantrytau_fmu.controller.timing import ClientCounts
+
+OLDEST = 25  # samples: an answer to an earlier one is stale even if it is the newest
+
+
+class ClientLine:
+    """The way to a client. values: what it sent last and was taken; before that 0, or the limit next to 0.
+
+    A client that raises is not asked any more, and its values stay: the robot goes on.
+    """
+
+    def __init__(self, client: Client):
+        self.client, self.name = client, client.name
+        self.sends: Declaration = client.sends
+        self.values: Values = np.clip(np.zeros(self.sends.size), self.sends.minimum, self.sends.maximum)
+        self.taken_k = -1
+        self.taken = self.held = self.stale = self.refused = 0
+        self.failure = ""
+
+    def submit(self, sample: Sample, declaration: Declaration) -> None:
+        """Give it sample k; its own copy of the values."""
+        self._ask(
+            lambda: self.client.submit(Sample(sample.k, sample.time, sample.values.copy()), declaration)
+        )
+
+    def obtain(self, k: int) -> Values:
+        """What it says in sample k: its answer to k - 1, or what it said before."""
+        if not self.sends.size:
+            return self.values
+        found = self._ask(lambda: self.client.answer(k))
+        whole = isinstance(found, Sample) and isinstance(found.k, int)
+        if found is None or (whole and found.k == self.taken_k):
+            self.held += 1
+        elif not whole or found.k > k - 1 or self.sends.refusal(found.values):
+            self.refused += 1
+        elif found.k < self.taken_k or found.k < k - 1 - OLDEST:
+            self.stale += 1
+        else:
+            self.held += found.k < k - 1  # the answer to an earlier sample
+            self.taken += found.k == k - 1
+            self.taken_k, self.values = found.k, np.array(found.values, dtype=np.float64)
+        return self.values
+
+    def settled(self, k: int) -> bool:
+        """Whether it has done with sample k."""
+        found = self._ask(lambda: self.client.settled(k))
+        return bool(found) or bool(self.failure)
+
+    def close(self) -> None:
+        """The run has ended."""
+        self._ask(self.client.close)
+
+    @property
+    def counts(self) -> ClientCounts:
+        """Until now."""
+        dropped = getattr(self.client, "dropped", 0)  # of clients behind a wire
+        return ClientCounts(self.taken, self.held, self.stale, self.refused, int(dropped), self.failure)
+
+    def _ask(self, call: Callable[[], Any]) -> Any:
+        if self.failure:
+            return None
+        try:
+            return call()
+        except Exception as error:  # of a client, which must not stop the robot
+            self.failure = f"raised {type(error).__name__}: {in_words(error)}"
+            return None

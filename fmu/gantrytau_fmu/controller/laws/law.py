@@ -1,0 +1,168 @@
+"""What the user's controller may be: a Python function, a model or an FMU. From all that is known to references."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from gantrytau.errors import ModelError, SolveError, did_you_mean, in_words
+from gantrytau.language.units import dimension
+from gantrytau_fmu.controller.board import Board
+from gantrytau_fmu.controller.channels import Channel, Declaration, Values
+from gantrytau_fmu.controller.stepped_part import SteppedPart
+
+LawFunction = Callable[[float, Mapping[str, Any]], Mapping[str, Any]]
+
+
+class Law(Protocol):
+    """A user's controller, called in every sample, whatever the state is, so that it may follow before it leads."""
+
+    @property
+    def tunables(self) -> Declaration:
+        """Parameters that it has itself."""
+        ...
+
+    @property
+    def tuned(self) -> Values:
+        """Their values at first."""
+        ...
+
+    def fit(self, board: Board, references: Declaration) -> None:
+        """What there is, and what it may give; ModelError where it does not fit."""
+        ...
+
+    def begin(self, stop: float) -> None:
+        """The run begins, to end at `stop`, s."""
+        ...
+
+    def set(self, name: str, values: Values) -> None:
+        """One of its parameters changes, between samples."""
+        ...
+
+    def references(self, k: int, time: float, period: float, nominal: Values) -> Values:
+        """References (m,) of sample k; nominal: those that it leaves as they are."""
+        ...
+
+    def close(self) -> None:
+        """The run has ended."""
+        ...
+
+
+class FunctionLaw:
+    """`function(t, values) -> {reference: value}`; references that it does not name stay nominal."""
+
+    tunables, tuned = Declaration(), np.zeros(0)
+
+    def __init__(self, function: LawFunction):
+        self._function = function
+        self._name = getattr(function, "__name__", type(function).__name__)
+
+    def fit(self, board: Board, references: Declaration) -> None:
+        """See `Law.fit`."""
+        self._board, self._references = board, references
+
+    def begin(self, stop: float) -> None:
+        """Nothing to prepare."""
+
+    def set(self, name: str, values: Values) -> None:
+        """It has no parameters of its own."""
+
+    def references(self, k: int, time: float, period: float, nominal: Values) -> Values:
+        """See `Law.references`; SolveError where the function raises, or names what is no reference."""
+        try:
+            found = self._function(time, self._board.by_name())
+        except Exception as error:  # whatever a function of the user raises
+            raise self._failure(f"raised {type(error).__name__}: {in_words(error)}; mend it", time) from error
+        if not isinstance(found, Mapping):
+            raise self._failure(f"answered {found!r}, expected {{name: value}} of references", time)
+        wanted = nominal.copy()
+        for name, value in found.items():
+            place = self._references.slices.get(name)
+            if place is None:
+                words = did_you_mean(str(name), self._references.names)
+                raise self._failure(f"answered '{name}', which is no reference{words}", time)
+            try:
+                wanted[place] = np.asarray(value, dtype=float).reshape(place.stop - place.start)
+            except (TypeError, ValueError):
+                count = place.stop - place.start
+                raise self._failure(f"answered {name} = {value!r}, expected numbers, {count}", time) from None
+        return wanted
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _failure(self, words: str, time: float) -> SolveError:
+        return SolveError(f"controller: the function {self._name} {words} (at t = {time:.6g} s)", time=time)
+
+
+class PartLaw:
+    """A model, an FMU or a `PythonComponent`: its inputs by the names of what is known, its outputs by those of references.
+
+    wires: input -> name of what is known, and output -> reference, where these differ.
+    """
+
+    def __init__(self, part: SteppedPart, wires: Mapping[str, str]):
+        self.part, self._wires = part, dict(wires)
+        self.tunables, self.tuned = part.tunables, part.tuned
+
+    def fit(self, board: Board, references: Declaration) -> None:
+        """See `Law.fit`."""
+        own = (*self.part.inputs.names, *self.part.outputs.names)
+        for name in self._wires:
+            if name not in own:
+                raise ModelError(f"wires: the controller has no '{name}'{did_you_mean(name, own)}")
+        self._board = board
+        taken = [self._fitting(channel, board.declaration, "what is known") for channel in self.part.inputs]
+        self._taken = _places(taken)
+        given = [
+            c
+            for c in self.part.outputs
+            if self._wires.get(c.name, c.name) in references or c.name in self._wires
+        ]
+        if not given:
+            raise ModelError(
+                f"controller: found the outputs {', '.join(self.part.outputs.names) or 'none'}, expected one that is a "
+                f"reference, {', '.join(references.names)}; wires={{output: reference}} joins other names"
+            )
+        self._to = _places([self._fitting(channel, references, "the references") for channel in given])
+        self._from = _places([self.part.outputs.slices[channel.name] for channel in given])
+
+    def begin(self, stop: float) -> None:
+        """See `Law.begin`."""
+        self.part.begin(self._board.values[self._taken], stop)
+
+    def set(self, name: str, values: Values) -> None:
+        """See `Law.set`."""
+        self.part.set(name, values)
+
+    def references(self, k: int, time: float, period: float, nominal: Values) -> Values:
+        """See `Law.references`."""
+        found = self.part.step(time, period, self._board.values[self._taken])
+        wanted = nominal.copy()
+        wanted[self._to] = found[self._from]
+        return wanted
+
+    def close(self) -> None:
+        """See `Law.close`."""
+        self.part.close()
+
+    def _fitting(self, channel: Channel, there: Declaration, where: str) -> slice:
+        """The place of what a channel is joined with; ModelError where there is none, or of another size or dimension."""
+        name = self._wires.get(channel.name, channel.name)
+        if name not in there:
+            words = did_you_mean(name, there.names)
+            raise ModelError(
+                f"controller.{channel.name}: found no '{name}' among {where}{words} wires={{'{channel.name}': name}} joins "
+                "it with another"
+            )
+        other = there[name]
+        if other.size != channel.size or dimension(other.unit) != dimension(channel.unit):
+            raise ModelError(
+                f"controller.{channel.name}: found {channel.size} in {channel.unit}, expected {other.size} in {other.unit}, "
+                f"as {name} has"
+            )
+        return there.slices[name]
+
+
+def _places(slices: list[slice]) -> np.ndarray:
+    return np.array([k for place in slices for k in range(place.start, place.stop)], dtype=int)
