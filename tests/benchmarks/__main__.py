@@ -19,6 +19,7 @@ from tests.benchmarks import (
     rig_runs,
     sampling,
     studies,
+    surface_seeds,
 )
 from tests.benchmarks.peers import rows as peers
 from tests.benchmarks.table import Row, at_most, print_table
@@ -47,6 +48,7 @@ if __name__ == "__main__":
         identification.rows(),
         rig_runs.rows(),
         peg_seeds.rows(),
+        surface_seeds.rows(),
     )
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))
