@@ -91,7 +91,7 @@ class Controller:
         self._pressed, self._ran, self._wall = 0, False, 0.0
         self.k = -1
         for client in clients:
-            self.attach(client)
+            self._lines.append(self._line(client))
         self._board = self._made_board()
 
     @property
@@ -133,15 +133,12 @@ class Controller:
             raise ModelError(
                 "controller: found a client that comes while it runs, expected it before; attach it first"
             )
-        if not isinstance(client, Client):
-            raise ModelError(
-                f"clients: found {client!r}, expected name, sends, submit, answer, settled and close, see `clients.py`"
-            )
-        if client.name in {line.name for line in self._lines} | set(_GROUPS):
-            raise ModelError(f"clients: found '{client.name}' twice, expected each name once; rename one")
-        self._lines.append(ClientLine(client))
-        if hasattr(self, "_board"):
+        lines, self._lines = self._lines, [*self._lines, self._line(client)]
+        try:
             self._board = self._made_board()
+        except ModelError:
+            self._lines = lines
+            raise
 
     def set(self, name: str, value: ArrayLike, *, at: float | None = None) -> None:
         """Set a tunable parameter at the next sample, or from `at`, s. ModelError for a value that is none."""
@@ -264,7 +261,7 @@ class Controller:
             self._board.put(group, values)
         for line in self._lines:
             self._board.put(line.name, line.values)
-        self._law.begin(stop)
+        self._law.begin(stop + self.period)  # it takes the last sample, too
 
     def _act(self, k: int, log: SampleLog) -> None:
         """What was planned for this sample, then what was asked for since the last, in this order."""
@@ -321,6 +318,16 @@ class Controller:
             modes={"state": STATES},
             timing=self.timing,
         )
+
+    def _line(self, client: Client) -> ClientLine:
+        if not isinstance(client, Client):
+            raise ModelError(
+                f"clients: found {client!r}, expected name, sends, submit, answer, settled and close, see `clients.py`"
+            )
+        Channel(client.name, "1")  # its name begins those of channels, and obeys their rules
+        if client.name in {line.name for line in self._lines} | set(_GROUPS):
+            raise ModelError(f"clients: found '{client.name}' twice, expected each name once; rename one")
+        return ClientLine(client)
 
     def _made_board(self) -> Board:
         groups = (self.tunables, self._plant.outputs, self._path.declaration)
