@@ -19,8 +19,9 @@ from gantrytau_models.leadthrough.peg_figures import (
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole
 from gantrytau_models.leadthrough.peg_match import Match, PegDisturbances
 from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool
-from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, VelocityServo
+from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, LedArm, VelocityServo
 from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
+from gantrytau_models.leadthrough.surface.led_robot import LedRobot
 from gantrytau_models.leadthrough.surface.operator import Operator
 from gantrytau_models.leadthrough.surface.surface_figures import plot_oscillation, plot_tool_force
 from gantrytau_models.leadthrough.surface.surface_tracking import (
@@ -37,6 +38,8 @@ __all__ = [
     "ForceSensor",
     "Impedance",
     "LeadThrough",
+    "LedArm",
+    "LedRobot",
     "LedTool",
     "Match",
     "NormalEstimate",

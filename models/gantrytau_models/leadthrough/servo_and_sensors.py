@@ -3,16 +3,22 @@
 from gantrytau import Input, Model, Output, Parameter, der, require
 
 
-class VelocityServo(Model):
-    """A robot that follows velocities, and that no force pushes back: T_v v' = v_ref - v, r' = v.
+class LedArm(Model):
+    """Base of arms that follow velocities of their tool, in axes of the tool."""
 
-    "A servo much faster than the lead-through loop" (printed) fits 2.3 ms. r: m, in axes of the tool.
+    v_ref = Input(3, unit="m/s", start=0.0, description="velocity that is asked for")
+    f = Input(3, unit="N", start=0.0, description="force of the tool on what it touches")
+    v = Output(3, unit="m/s", start=0.0, description="velocity of the tool")
+    r = Output(3, unit="m", start=0.0, description="position of the tool")
+
+
+class VelocityServo(LedArm):
+    """A rigid arm that follows velocities, and that no force pushes back: T_v v' = v_ref - v, r' = v.
+
+    "A servo much faster than the lead-through loop" (printed) fits 2.3 ms.
     """
 
     T_v = Parameter(2.303e-3, unit="s", min=0.0, description="time constant of the velocity")
-    v_ref = Input(3, unit="m/s", start=0.0, description="velocity that is asked for")
-    v = Output(3, unit="m/s", start=0.0, description="velocity of the tool")
-    r = Output(3, unit="m", start=0.0, description="position of the tool")
 
     def equations(self):
         yield require(self.T_v > 0, "expected a time constant above zero")

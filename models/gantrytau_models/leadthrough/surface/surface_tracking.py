@@ -11,7 +11,7 @@ from gantrytau.language.model import merge
 from gantrytau_models.leadthrough.assumed import operators
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
 from gantrytau_models.leadthrough.lead_through import LeadThrough
-from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, VelocityServo
+from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, LedArm, VelocityServo
 from gantrytau_models.leadthrough.surface.contact_loop import CriticalGain, contact_loop
 from gantrytau_models.leadthrough.surface.operator import Operator
 
@@ -66,7 +66,7 @@ class ToolOnSurface(Model):
     hand = Operator.open(period=period)
     handle = ForceSensor(std_bias_f=0.05)
     sensor = ForceSensor()
-    arm = VelocityServo(r=dict(start=[0.0, 0.0, START]))
+    arm = LedArm()
     face = Surface()
 
     def __init__(
@@ -75,6 +75,7 @@ class ToolOnSurface(Model):
         *,
         pressing: bool = True,
         operator: OperatorRecord = operators.SKILLED,
+        arm: LedArm | None = None,
         **modifications: Any,
     ):
         if not isinstance(surface, SurfaceRecord):
@@ -83,11 +84,13 @@ class ToolOnSurface(Model):
             )
         face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
         hand = Operator(operator, pressing=pressing).modifications
-        super().__init__(dict(face=face, hand=dict(hand)), **modifications)
+        rigid = VelocityServo(r=dict(start=[0.0, 0.0, START]))
+        super().__init__(dict(face=face, hand=dict(hand), arm=arm or rigid), **modifications)
 
     def equations(self):
         arm, face = self.arm, self.face
         yield arm.v_ref == self.v_ref
+        yield arm.f == face.f
         yield self.v_tool == arm.v
         yield face.r == arm.r
         yield face.v == arm.v
@@ -111,10 +114,11 @@ class LedTool(ToolOnSurface):
 
 
 class SurfaceTracking(ToolOnSurface):
-    """A tool that is led along a surface and holds 2 N there by itself, with a rigid arm that follows velocities.
+    """A tool that is led along a surface and holds 2 N there by itself.
 
-    surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`. Axes
-    are those of the tool, z into the surface. What is random comes from outside: `inputs=surface_disturbances()`. Warns of a
+    surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`; arm: a
+    rigid one that follows velocities unless given, as `LedRobot(prototypes.L1)`. Axes are those of the tool, z into the
+    surface. What is random comes from outside: `inputs=surface_disturbances()`. Warns of a
     gain beyond the critical one (`CriticalGain`). Raises ModelError for what is no such record.
     """
 
