@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau import study
-from gantrytau_models.leadthrough import PegDisturbances, PegInHole
+from gantrytau_models.leadthrough import PegInHole, peg_disturbances
 from tests.benchmarks.table import Row, at_least, at_most, print_table
 
 SEEDS, STOP, HELD = 20, 85.0, 79.0  # the hand withdraws at the last, s
@@ -21,7 +21,7 @@ def rows() -> Iterator[Row]:
         PegInHole(),
         stop=STOP,
         seeds=SEEDS,
-        inputs=PegDisturbances().inputs(),
+        inputs=peg_disturbances(),
         outputs=["tool.angle", "tool.r"],
         points=426,
         tolerance=TOLERANCE,

@@ -130,9 +130,25 @@ def solve_levels(
                 try:
                     (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
                 except InitializationError:
-                    if not _solve_switching(level, moving, values, started, title):
+                    if not _follows(level, moving, values, chosen) and not _solve_switching(
+                        level, moving, values, started, title
+                    ):
                         raise
     return values
+
+
+def _follows(level: Level, moving: Sequence[str], values: dict[str, float], chosen: frozenset[str]) -> bool:
+    """Whether all values follow from one another, equation by equation, once the starts of the model give way, as
+    signals do: through what switches on what was just computed, steps of all at once go to and fro.
+    """
+    place = {n: k for k, n in enumerate(level.leaves)}
+    given = np.array([values[n] for n in level.leaves])
+    found = _propagated(level, given, {place[n] for n in moving if n in place and n not in chosen})
+    f, _ = level.look(found)
+    if not np.all(np.abs(f) <= SOLVED * level.sizes(list(range(len(f))), found)):
+        return False
+    values.update((n, float(found[place[n]])) for n in moving if n in place)
+    return True
 
 
 def _solve_anyhow(level: Level, moving: Sequence[str], values: dict[str, float], started, title: str) -> None:

@@ -16,8 +16,8 @@ from gantrytau_models.leadthrough.peg_figures import (
     plot_peg_orientation,
     plot_peg_torques,
 )
-from gantrytau_models.leadthrough.peg_in_hole import PegInHole
-from gantrytau_models.leadthrough.peg_match import Match, PegDisturbances
+from gantrytau_models.leadthrough.peg_in_hole import PegInHole, peg_disturbances
+from gantrytau_models.leadthrough.peg_match import Match
 from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool
 from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor, LedArm, VelocityServo
 from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
@@ -46,7 +46,6 @@ __all__ = [
     "Operator",
     "OperatorRecord",
     "PegControl",
-    "PegDisturbances",
     "PegHand",
     "PegInHole",
     "PegTool",
@@ -58,6 +57,7 @@ __all__ = [
     "VelocityServo",
     "contact_loop",
     "operators",
+    "peg_disturbances",
     "plot_oscillation",
     "plot_peg_forces",
     "plot_peg_orientation",

@@ -36,12 +36,12 @@ def plot_peg_orientation(
 
 
 def plot_peg_forces(result: Result, file: str | os.PathLike[str] | None = None, name: str = "") -> "Figure":
-    """Forces of the tool on the hole (Figure 8.8), those that its sensor measures, and how deep the match is."""
+    """Forces of the tool on the hole (Figure 8.8), as they are measured and as they are, in its axes, and how deep it is."""
     figure, axes = _panels(3, 7.0)
     t, at = result.time, _within(name)
     for k, letter in enumerate("xyz"):
-        axes[0].plot(t, result[at("control.f")][:, k], lw=0.6, label=letter)
-        axes[1].plot(t, result[at("f")][:, k], lw=0.9, label=letter)
+        axes[0].plot(t, result[at("sensor.f_seen")][:, k], lw=0.6, label=letter)
+        axes[1].plot(t, result[at("sensor.f")][:, k], lw=0.9, label=letter)
     axes[0].set_ylabel("measured [N]")
     axes[1].set_ylabel("force [N]")
     axes[2].plot(t, -1e3 * result[at("tool.r")][:, 2], label="depth of the tip")
@@ -50,12 +50,12 @@ def plot_peg_forces(result: Result, file: str | os.PathLike[str] | None = None, 
 
 
 def plot_peg_torques(result: Result, file: str | os.PathLike[str] | None = None, name: str = "") -> "Figure":
-    """Torques of the tool on the hole about the tool centre point (Figure 8.9), and those that its sensor measures."""
+    """Torques of the tool about the tool centre point, in its axes (Figure 8.9), and those that its sensor measures."""
     figure, axes = _panels(2, 5.0)
     t, at = result.time, _within(name)
     for k, letter in enumerate("xyz"):
-        axes[0].plot(t, 1e3 * result[at("control.t")][:, k], lw=0.6, label=letter)
-        axes[1].plot(t, 1e3 * result[at("t")][:, k], lw=0.9, label=letter)
+        axes[0].plot(t, 1e3 * result[at("sensor.t_seen")][:, k], lw=0.6, label=letter)
+        axes[1].plot(t, 1e3 * result[at("sensor.t")][:, k], lw=0.9, label=letter)
     axes[0].set_ylabel("measured [mN m]")
     axes[1].set_ylabel("torque [mN m]")
     return _finished(figure, axes, file)

@@ -2,22 +2,26 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from gantrytau import Input, Model, Real, Start, atan2, connect, cross
+from gantrytau import Model, Real, Start, atan2, connect, cross, white_noise
+from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.mechanics import multibody
 from gantrytau_models.leadthrough.peg_control import PegControl
 from gantrytau_models.leadthrough.peg_match import WOODEN, Match
-from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool
+from gantrytau_models.leadthrough.peg_tool import EYE_PERIOD, PegHand, PegTool
+from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor
 
 TILT = float(np.radians(6.0))
+ALWAYS = 1e6  # s: noise of this period is one number for a run
 
 
 class PegInHole(Model):
     """A rigid, velocity-controlled tool with a match, which a hand pushes into a hole though it is tilted about y.
 
     match: the match and its hole. normal: the direction in which force is controlled, see `PegControl`. tilt: of the match
-    at the start, rad. What is random comes from `PegDisturbances().inputs()`; without, sensors and eye are perfect.
+    at the start, rad. What is random comes from outside: `inputs=peg_disturbances()`; without, sensors and eye are perfect.
     Pushed from 20 s on, withdrawn from 79 s on: simulate with `stop=85.0`.
     """
 
@@ -26,12 +30,8 @@ class PegInHole(Model):
     contact = multibody.ElasticPegContact()
     hand = PegHand()
     control = PegControl()
-    force_noise = Input(3, unit="N", start=0.0, description="noise of the tool's force")
-    torque_noise = Input(3, unit="N.m", start=0.0, description="noise of the tool's torque")
-    handle_noise = Input(3, unit="N", start=0.0, description="noise of the handle's force")
-    force_bias = Input(3, unit="N", start=0.0, description="bias of the tool's force")
-    torque_bias = Input(3, unit="N.m", start=0.0, description="bias of the tool's torque")
-    handle_bias = Input(3, unit="N", start=0.0, description="bias of the handle's force")
+    sensor = ForceSensor(std_t=3e-3, std_bias_t=5e-4)
+    handle = ForceSensor(std_bias_f=0.05)
     f = Real(3, unit="N", description="force of the tool on the hole")
     t = Real(3, unit="N.m", description="torque of the tool on the hole about the tool centre point")
     alpha = Real(
@@ -59,7 +59,7 @@ class PegInHole(Model):
                     depth=match.depth,
                     mu=match.mu,
                 ),
-                control=PegControl(normal=normal).modifications,
+                control=PegControl(normal).modifications,
             ),
             **modifications,
         )
@@ -70,13 +70,17 @@ class PegInHole(Model):
         yield connect(tool.frame_b, self.contact.frame_b)
         yield self.f == -self.contact.f
         yield self.t == -(self.contact.t - cross(tool.tcp * tool.axis, self.contact.f))
-        yield control.f == self.f + self.force_bias + self.force_noise
-        yield control.t == self.t + self.torque_bias + self.torque_noise
-        yield control.f_h == hand.f + self.handle_bias + self.handle_noise
-        yield control.v == tool.v
-        yield control.axis == tool.axis
-        yield tool.v_ref == control.v_ref
-        yield tool.w_ref == control.w_ref
+        axes = tool.frame_b.R @ ca.diag([1, -1, -1])  # of the tool: z into the hole
+        yield self.sensor.f == axes.T @ self.f
+        yield self.sensor.t == axes.T @ self.t
+        yield self.handle.f == axes.T @ hand.f
+        yield self.handle.t == 0
+        yield control.f_t == self.sensor.f_seen
+        yield control.t_t == self.sensor.t_seen
+        yield control.f_h == self.handle.f_seen
+        yield control.v_tool == axes.T @ tool.v
+        yield tool.v_ref == axes @ control.v
+        yield tool.w_ref == axes @ control.w
         yield hand.r == tool.r
         yield hand.v == tool.v
         # the tool's z points to the hole: half a turn about x from the match, q = (-x, s, z, -y)
@@ -85,3 +89,16 @@ class PegInHole(Model):
         yield self.gamma == atan2(-y, -x) - (self.yaw - np.pi) / 2
         yield self.beta == np.pi - tool.angle
         yield self.yaw == 2 * atan2(z, s)
+
+
+def peg_disturbances(period: float = 0.004) -> dict[str, WhiteNoise]:
+    """What is random in a `PegInHole`, as inputs of a simulation, whose seed, or that of a study, draws them.
+
+    All are of standard deviation 1; what that makes is said by `std_f` and the like of the sensors, and `eye` of the hand.
+    """
+    found = {"hand.white": white_noise([1.0] * 2, EYE_PERIOD)}
+    for sensor in ("sensor", "handle"):
+        for letter in "ft":
+            found[f"{sensor}.white_{letter}"] = white_noise([1.0] * 3, period)
+            found[f"{sensor}.bias_{letter}"] = white_noise([1.0] * 3, ALWAYS)
+    return found

@@ -1,16 +1,10 @@
-"""The match and its hole as a record, and what is random around them."""
+"""The match and its hole as a record."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau import ModelError, white_noise
-from gantrytau.inputs.random_signals import WhiteNoise
-
-PERIOD = 0.004  # s, of the controller (printed)
-EYE_PERIOD = 0.1  # s, that a guess of the eye is held
-EYE_TIME = 0.6  # s, in which the eye changes its mind
-ALWAYS = 1e6  # s, longer than a run
+from gantrytau import ModelError
 
 
 @dataclass(frozen=True)
@@ -55,33 +49,3 @@ class Match:
 
 
 WOODEN = Match()
-
-
-@dataclass(frozen=True)
-class PegDisturbances:
-    """Standard deviations of what is random in a `PegInHole`, all assumed, not printed.
-
-    force, torque: noise of the tool's sensor in each sample, N and N.m, about the tool centre point; handle: of the
-    handle's, N; force_bias, torque_bias, handle_bias: what they are off in a run; eye: misjudged place of the hole, m.
-    """
-
-    force: float = 0.05
-    torque: float = 3e-3
-    handle: float = 0.05
-    force_bias: float = 0.03
-    torque_bias: float = 5e-4
-    handle_bias: float = 0.05
-    eye: float = 3e-4
-
-    def inputs(self) -> dict[str, WhiteNoise]:
-        """As inputs of a simulation, whose seed, or that of a study, draws them."""
-        guess = self.eye * float(np.sqrt(2 * EYE_TIME / EYE_PERIOD))  # which the eye's slowness makes less
-        return {
-            "force_noise": white_noise(self.force, PERIOD),
-            "torque_noise": white_noise(self.torque, PERIOD),
-            "handle_noise": white_noise(self.handle, PERIOD),
-            "force_bias": white_noise(self.force_bias, ALWAYS),
-            "torque_bias": white_noise(self.torque_bias, ALWAYS),
-            "handle_bias": white_noise(self.handle_bias, ALWAYS),
-            "hand.guess": white_noise(guess, EYE_PERIOD),
-        }

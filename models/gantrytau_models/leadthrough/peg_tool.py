@@ -16,12 +16,14 @@ from gantrytau import (
     limit,
     norm_2,
     sampled,
+    sqrt,
     time,
 )
 from gantrytau.language.statements import root
 from gantrytau.mechanics.multibody import Frame
 from gantrytau.mechanics.multibody.orientation import of_quaternion
-from gantrytau_models.leadthrough.peg_match import EYE_TIME
+
+EYE_PERIOD = 0.1  # s, that a guess of the eye is held
 
 
 class PegTool(Model):
@@ -71,7 +73,9 @@ class PegHand(Model):
     period = Parameter(0.004, unit="s", description="period of decisions")
     gain = Parameter(3.0, unit="1/s", min=0.0, description="velocity for a distance")
     delay = Parameter(0.2, unit="s", min=0.0, description="lag of what is seen")
-    mind = Parameter(EYE_TIME, unit="s", min=0.0, description="lag of the error of the eye")
+    mind = Parameter(0.6, unit="s", min=0.0, description="time in which the eye changes its mind")
+    eye = Parameter(3e-4, unit="m", min=0.0, description="standard deviation of the misjudged place")
+    held = Parameter(EYE_PERIOD, unit="s", min=0.0, description="period of `white`")
     arm = Parameter(60.0, unit="N.s/m", min=0.0, description="force for a velocity")
     muscle = Parameter(0.08, unit="s", min=0.0, description="lag of the force")
     speed = Parameter(5e-3, unit="m/s", min=0.0, description="largest wanted speed into the hole")
@@ -81,7 +85,7 @@ class PegHand(Model):
     away = Parameter(0.03, unit="m", description="height to which he withdraws")
     begin = Parameter(20.0, unit="s", description="when he begins to push")
     leave = Parameter(79.0, unit="s", description="when he withdraws")
-    guess = Input(2, unit="m", start=0.0, description="random error of the eye, before its slowness")
+    white = Input(2, unit="1", start=0.0, description="white noise of standard deviation 1")
     r = Input(3, unit="m", description="place of the tip")
     v = Input(3, unit="m/s", description="velocity of the handle")
     seen = Real(3, unit="m", start=[0.0, 0.0, 0.01], fixed=True, description="place of the tip as it is seen")
@@ -94,7 +98,10 @@ class PegHand(Model):
         sideways = self.gain * (self.error - self.seen[:2])
         upwards = limit(self.gain * (goal - self.seen[2]), -self.speed, self.fast)
         yield self.delay * der(self.seen) == self.r - self.seen
-        yield self.mind * der(self.error) == self.guess - self.error
+        guess = (
+            self.eye * sqrt(2 * self.mind / self.held) * self.white
+        )  # of which a lag leaves the deviation `eye`
+        yield self.mind * der(self.error) == guess - self.error
         yield sampled(self.wanted[:2], sideways, period=self.period)
         yield sampled(self.wanted[2], upwards, period=self.period)
         yield self.muscle * der(self.f) == self.arm * (self.wanted - self.v) - self.f
