@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands import fmu
+from gantrytau.commands import controller, fmu
 from gantrytau.commands.calibrate.calibrate_command import calibrate
 from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
@@ -69,3 +69,4 @@ app.command(
 )(equations)
 app.command(epilog="Example: gantrytau library --json")(library)
 app.add_typer(fmu.app, name="fmu")
+app.add_typer(controller.app, name="controller")

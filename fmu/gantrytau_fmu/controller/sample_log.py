@@ -25,10 +25,11 @@ class SampleLog:
         self.period, self.count = period, 0
         self._rows = np.empty((ROWS, self.declaration.size))
         try:
-            self._file = None if file is None else open(file, "w", encoding="utf-8", newline="\n")  # noqa: SIM115
+            self._file = None if file is None else open(file, "w", 1, encoding="utf-8", newline="\n")  # noqa: SIM115
         except OSError as error:
             raise ModelError(
-                f"log: cannot write {file} ({error}), expected a file in a folder that is there"
+                f"log: cannot write {file} ({error.strerror}), expected a file in a folder that is there",
+                argument="log",
             ) from None
         declared = [{"name": c.name, "unit": c.unit, "size": c.size} for c in channels]
         self.tell("declare", period=period, channels=declared)

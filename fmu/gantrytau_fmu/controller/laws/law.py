@@ -1,6 +1,6 @@
 """What the user's controller may be: a Python function, a model or an FMU. From all that is known to references."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -98,7 +98,7 @@ class FunctionLaw:
 class PartLaw:
     """A model, an FMU or a `PythonComponent`: its inputs by the names of what is known, its outputs by those of references.
 
-    wires: input -> name of what is known, and output -> reference, where these differ.
+    wires: input -> name of what is known, and output -> reference, where these differ; elements of vectors one by one, too.
     """
 
     def __init__(self, part: SteppedPart, wires: Mapping[str, str]):
@@ -107,25 +107,22 @@ class PartLaw:
 
     def fit(self, board: Board, references: Declaration) -> None:
         """See `Law.fit`."""
-        own = (*self.part.inputs.names, *self.part.outputs.names)
+        channels = (*self.part.inputs, *self.part.outputs)
+        own = [name for c in channels for name in dict.fromkeys((c.name, *c.elements))]
         for name in self._wires:
             if name not in own:
                 raise ModelError(f"wires: the controller has no '{name}'{did_you_mean(name, own)}")
         self._board = board
-        taken = [self._fitting(channel, board.declaration, "what is known") for channel in self.part.inputs]
-        self._taken = _places(taken)
-        given = [
-            c
-            for c in self.part.outputs
-            if self._wires.get(c.name, c.name) in references or c.name in self._wires
-        ]
+        known, numbers = board.declaration, self.part.outputs.slices
+        self._taken = _places([self._joined(channel, known, "what is known") for channel in self.part.inputs])
+        given = [c for c in self.part.outputs if c.name in references or self._wired(c)]
         if not given:
             raise ModelError(
                 f"controller: found the outputs {', '.join(self.part.outputs.names) or 'none'}, expected one that is a "
                 f"reference, {', '.join(references.names)}; wires={{output: reference}} joins other names"
             )
-        self._to = _places([self._fitting(channel, references, "the references") for channel in given])
-        self._from = _places([self.part.outputs.slices[channel.name] for channel in given])
+        self._to = _places([self._joined(channel, references, "the references") for channel in given])
+        self._from = _places([range(numbers[c.name].start, numbers[c.name].stop) for c in given])
 
     def begin(self, stop: float) -> None:
         """See `Law.begin`."""
@@ -146,23 +143,39 @@ class PartLaw:
         """See `Law.close`."""
         self.part.close()
 
-    def _fitting(self, channel: Channel, there: Declaration, where: str) -> slice:
-        """The place of what a channel is joined with; ModelError where there is none, or of another size or dimension."""
+    def _wired(self, channel: Channel) -> bool:
+        return any(name in self._wires for name in (channel.name, *channel.elements))
+
+    def _joined(self, channel: Channel, there: Declaration, where: str) -> Sequence[int]:
+        """The places of what a channel is joined with, whole or number by number."""
+        if channel.name in self._wires or not self._wired(channel):
+            return self._fitting(channel, there, where)
+        singles = [Channel(element, channel.unit) for element in channel.elements]
+        return [place for single in singles for place in self._fitting(single, there, where)]
+
+    def _fitting(self, channel: Channel, there: Declaration, where: str) -> Sequence[int]:
+        """The places of what has its name; ModelError where there is none, or of another size or dimension."""
         name = self._wires.get(channel.name, channel.name)
-        if name not in there:
+        if name in there:
+            other, place = there[name], there.slices[name]
+            places = range(place.start, place.stop)
+        elif name in there.elements:
+            first = there.elements.index(name)
+            other = next(c for c in there if name in c.elements)
+            places = range(first, first + 1)
+        else:
             words = did_you_mean(name, there.names)
             raise ModelError(
                 f"controller.{channel.name}: found no '{name}' among {where}{words} wires={{'{channel.name}': name}} joins "
                 "it with another"
             )
-        other = there[name]
-        if other.size != channel.size or dimension(other.unit) != dimension(channel.unit):
+        if len(places) != channel.size or dimension(other.unit) != dimension(channel.unit):
             raise ModelError(
-                f"controller.{channel.name}: found {channel.size} in {channel.unit}, expected {other.size} in {other.unit}, "
-                f"as {name} has"
+                f"controller.{channel.name}: found {channel.size} in {channel.unit}, expected {len(places)} in "
+                f"{other.unit}, as {name} has"
             )
-        return there.slices[name]
+        return places
 
 
-def _places(slices: list[slice]) -> np.ndarray:
-    return np.array([k for place in slices for k in range(place.start, place.stop)], dtype=int)
+def _places(parts: Sequence[Sequence[int]]) -> np.ndarray:
+    return np.array([k for part in parts for k in part], dtype=int)
