@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, Real, Start, atan2, connect, cross, white_noise
+from gantrytau import Model, ModelError, Real, Start, atan2, connect, cross, white_noise
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.mechanics import multibody
 from gantrytau_models.leadthrough.peg_control import PegControl
@@ -14,6 +14,7 @@ from gantrytau_models.leadthrough.peg_tool import EYE_PERIOD, PegHand, PegTool
 from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor
 
 TILT = float(np.radians(6.0))
+STEEPEST = float(np.radians(30.0))  # to which a slender peg bends as it is told
 ALWAYS = 1e6  # s: noise of this period is one number for a run
 
 
@@ -22,7 +23,7 @@ class PegInHole(Model):
 
     match: the match and its hole. normal: the direction in which force is controlled, see `PegControl`. tilt: of the match
     at the start, rad. What is random comes from outside: `inputs=peg_disturbances()`; without, sensors and eye are perfect.
-    Pushed from 20 s on, withdrawn from 79 s on: simulate with `stop=85.0`.
+    Pushed from 20 s on, withdrawn from 79 s on: simulate with `stop=85.0`. Raises ModelError for other arguments.
     """
 
     hole = multibody.Fixed()
@@ -47,6 +48,14 @@ class PegInHole(Model):
     def __init__(
         self, match: Match = WOODEN, normal: str = "force", tilt: float = TILT, **modifications: Any
     ):
+        if not isinstance(match, Match):
+            raise ModelError(
+                f"PegInHole: found match={match!r}, expected a record such as Match(clearance=2e-4)"
+            )
+        if not (isinstance(tilt, int | float) and abs(tilt) <= STEEPEST):
+            raise ModelError(
+                f"PegInHole: found tilt={tilt!r}, expected at most {STEEPEST:.2f} rad either way; is it in degrees?"
+            )
         half = tilt / 2
         super().__init__(
             dict(

@@ -6,12 +6,10 @@ from gantrytau import (
     Output,
     Parameter,
     Real,
-    acos,
+    atan2,
     cross,
     der,
     dot,
-    fmax,
-    fmin,
     if_else,
     limit,
     norm_2,
@@ -55,7 +53,9 @@ class PegTool(Model):
         yield root(self.frame_b, R=R, w=w)
         yield self.frame_b.r == self.r
         yield self.axis == R[:, 2]
-        yield self.angle == acos(fmax(-1, fmin(1, self.axis[2])))
+        # a trillionth of a radian too large, so that it has a slope where the peg is upright
+        across = self.q[1] ** 2 + self.q[2] ** 2 + 1e-24
+        yield self.angle == 2 * atan2(sqrt(across), sqrt(s**2 + self.q[3] ** 2))
         yield self.T * der(self.v) == self.v_ref - self.v
         yield self.T * der(w) == self.w_ref - w
         yield der(self.r) == self.v - cross(w, self.tcp * self.axis)

@@ -169,7 +169,7 @@ def test_forces_are_the_slope_of_the_energy(contact):
                 ends.append(strained(contact(r + h * way[:3], turned.as_rotvec())))
             slope = -(ends[1] - ends[0]) / (2 * step)
             wrench = np.concatenate([here["f"], here["t"]])
-            assert way @ wrench == pytest.approx(slope, abs=1e-5 * np.linalg.norm(here["f"]) + 1e-9)
+            assert way @ wrench == pytest.approx(slope, abs=float(1e-5 * np.linalg.norm(here["f"]) + 1e-9))
     assert two >= 6
 
 

@@ -1,5 +1,7 @@
 """A match is led into its hole by hand: alignment by torque, what prevents it, its law and its records."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -108,6 +110,14 @@ def test_steel_and_other_clearances_align_too():
         assert depth > 28.0
 
 
+def test_an_upright_match_goes_in_and_stays_upright():
+    upright = simulate(PegInHole(tilt=0.0), stop=STOP, inputs=peg_disturbances(), seed=0, points=POINTS)
+    angle, depth, _ = figures(upright)
+    assert upright["tool.angle"][0] < 1e-11
+    assert angle < 1.2  # deg, two clearances over the depth
+    assert depth > 28.0
+
+
 def test_the_same_from_all_sides():
     """With the start tilted about x instead of y, in the exact quarter turn, all turns by that."""
     half = np.radians(3.0)
@@ -171,17 +181,25 @@ def test_figures_show_all_of_it(tmp_path):
         assert file.stat().st_size > 5000
 
 
+WRONG: tuple[Any, ...] = (0.0, -1.0, np.nan, np.inf, [1.0, 2.0], "1")
+
+
 def test_records_say_what_is_wrong():
     assert Match().bending == pytest.approx(236.0, abs=1.0)  # N/m
     assert np.degrees(Match().free_tilt) == pytest.approx(1.146, abs=1e-3)
     for name in ("length", "edge", "depth", "modulus", "clearance", "wall"):
-        for value in (0.0, -1.0, np.nan, np.inf, [1.0, 2.0], "1"):
+        for value in WRONG:
             with pytest.raises(
                 ModelError, match=rf"Match: found {name}=.*expected a finite number above zero"
             ):
                 Match(**{name: value})
     with pytest.raises(ModelError, match=r"Match: found mu=-0\.1, expected a finite number, zero or more"):
         Match(mu=-0.1)
+    with pytest.raises(ModelError, match=r"PegInHole: found match=0\.1, expected a record such as Match"):
+        PegInHole(0.1)  # type: ignore[arg-type]
+    for tilt in (6.0, np.nan, -1.0):
+        with pytest.raises(ModelError, match=rf"PegInHole: found tilt={tilt}, .*is it in degrees"):
+            PegInHole(tilt=tilt)
     with pytest.raises(ModelError, match=r"PegControl: found normal='wall', expected 'force' or 'gated'"):
         PegInHole(normal="wall")
     with pytest.raises(ModelError, match=r"hole that is less deep than the peg is long"):
