@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from tests.benchmarks import (
     answers,
     calibration,
+    controller_samples,
     engine,
     fmus,
     growth,
@@ -44,6 +45,7 @@ if __name__ == "__main__":
     timed = (
         fmus.rows(),
         sampling.rows(),
+        controller_samples.rows(),
         studies.rows(),
         identification.rows(),
         rig_runs.rows(),

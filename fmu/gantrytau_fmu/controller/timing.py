@@ -1,8 +1,8 @@
 """What became of the samples of a run: how late they were, and what each client gave."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -87,11 +87,17 @@ class Timing:
 class ControlledResult(Result):
     """A `Result` of a controller, a row for each sample, with `.timing`."""
 
-    def __init__(self, *arguments: Any, timing: Timing | None = None, **options: Any):
+    def __init__(self, *arguments: Any, timing: Any = None, **options: Any):
         super().__init__(*arguments, **options)
         self._timing = timing
 
     @property
-    def timing(self) -> Timing | None:
-        """How late samples were, and what became of answers; None of a part that was selected."""
+    def timing(self) -> Timing:
+        """How late samples were, and what became of answers."""
         return self._timing
+
+    def select(self, names: Sequence[str]) -> Self:
+        """Only the named variables, with the timing of the whole."""
+        found = super().select(names)
+        found._timing = self._timing
+        return found

@@ -81,7 +81,7 @@ def summary(result: "ControlledResult", files: list[str]) -> dict[str, Any]:
     return {
         "time": {"stop": result.time[-1], "samples": result.time.size},
         "ended": result.ended,
-        "timing": None if result.timing is None else result.timing.as_record(),
+        "timing": result.timing.as_record(),
         "final": {name: result.final(name) for name in result.names},
         "files": files,
     }

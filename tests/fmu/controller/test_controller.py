@@ -213,3 +213,4 @@ def test_ten_thousand_samples_are_all_there(plant):
     assert found.timing.samples == 10_001
     assert found.timing.lateness.size == 0
     assert "10001 samples of 0.004 s" in str(found.timing)
+    assert found.select(["q"]).timing is found.timing

@@ -30,7 +30,7 @@ def describe_source(name: str, source: Source, folder: Path, tolerance: float | 
         words = source.name if isinstance(source, Dae) else type(source).__name__
         return read_component(name, words, unpack(file, folder))
     if isinstance(source, (str, os.PathLike)):
-        return read_component(name, source, unpack(source, folder))
+        return read_component(name, os.fspath(source), unpack(source, folder))
     remedy = (
         "; PythonComponent(function, inputs=..., outputs=...) says what a function takes"
         if callable(source)
