@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from gantrytau import Input, Model, ModelError, connect, der, translate
+from gantrytau import Fixed, Input, Model, ModelError, connect, der, simulate, translate
 from gantrytau.language.statements import root
 from gantrytau.mechanics import multibody
 from gantrytau.mechanics.multibody import ElasticPegContact, Frame
@@ -171,6 +171,36 @@ def test_forces_are_the_slope_of_the_energy(contact):
             wrench = np.concatenate([here["f"], here["t"]])
             assert way @ wrench == pytest.approx(slope, abs=float(1e-5 * np.linalg.norm(here["f"]) + 1e-9))
     assert two >= 6
+
+
+class Free(Model):
+    """A body on a peg in its hole."""
+
+    world = multibody.World(g=0.0)
+    hole = multibody.Fixed()
+    body = multibody.Body(m=0.05, r_cm=[0, 0, 0.1], J=np.diag([2e-4, 2e-4, 1e-5]))
+    contact = ElasticPegContact()
+
+    def equations(self):
+        yield connect(self.hole.frame_b, self.contact.frame_a)
+        yield connect(self.contact.frame_b, self.body.frame_a)
+
+
+def test_a_body_on_it_keeps_its_energy():
+    """From flying free to tip and edge bent at once, through the dynamics of a rigid body."""
+    start = dict(r=Fixed([1e-4, 0, -0.02]), v=Fixed([0.03, 0.01, 0]), w=Fixed([0.1, 0.5, 0]))
+    run = simulate(Free(body=start | dict(q=Fixed([1.0, 0, 0, 0]))), stop=0.08, tolerance=1e-9, points=201)
+    turned = Rotation.from_quat(run["body.q"][:, [1, 2, 3, 0]])
+    w = np.array(run["body.w"])
+    v = run["body.v"] + np.cross(w, turned.apply([0, 0, 0.1]))
+    kinetic = 0.05 * (v**2).sum(1) / 2 + turned.inv().apply(w) ** 2 @ [2e-4, 2e-4, 1e-5] / 2
+    names = ("inserted", "f_tip", "f_edge", "f_end")
+    bent = [strained({n: np.atleast_1d(run[f"contact.{n}"][k]) for n in names}) for k in range(len(w))]
+    energy = kinetic + bent
+    assert np.ptp(energy) < 1e-6 * energy[0]  # a thousand times the tolerance
+    assert max(bent) > 0.5 * energy[0]
+    both = np.linalg.norm(run["contact.f_tip"], axis=1) * np.linalg.norm(run["contact.f_edge"], axis=1)
+    assert np.count_nonzero(both > 0) > 20
 
 
 def test_two_points_hold_from_the_angle_of_two_clearances_over_the_depth(contact):
