@@ -38,7 +38,7 @@ class ClientLine:
         if not self.sends.size:
             return self.values
         found = self._ask(lambda: self.client.answer(k))
-        whole = isinstance(found, Sample) and isinstance(found.k, int)
+        whole = isinstance(found, Sample) and isinstance(found.k, (int, np.integer))
         if found is None or (whole and found.k == self.taken_k):
             self.held += 1
         elif not whole or found.k > k - 1 or self.sends.refusal(found.values):

@@ -11,8 +11,7 @@ Blomdell et al. (2005) and chapter 3.2 of Dressler (2012) describe such an inter
 
 import os
 import time
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -27,6 +26,7 @@ from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.laws.law import LawFunction
 from gantrytau_fmu.controller.laws.users_law import users_law
+from gantrytau_fmu.controller.planned_changes import ROUNDING, PlannedChanges
 from gantrytau_fmu.controller.reference_path import AxisLimits, ReferencePath
 from gantrytau_fmu.controller.sample_clock import VirtualClock, WallClock
 from gantrytau_fmu.controller.sample_log import SampleLog
@@ -35,8 +35,6 @@ from gantrytau_fmu.controller.timing import ControlledResult, Timing
 from gantrytau_fmu.systems.drives import Drive, drives_of
 from gantrytau_fmu.systems.slave import RunEnded
 from gantrytau_fmu.systems.sources.component_sources import Source
-
-ROUNDING = 1e-9  # of a period
 
 
 class Controller:
@@ -86,8 +84,7 @@ class Controller:
         self._lines = list[ClientLine]()
         self._state: State = _state(state)
         self._coming: State = self._state
-        self._queue = deque[Callable[[SampleLog], None]]()
-        self._planned = list[tuple[int, Callable[[SampleLog], None]]]()
+        self._changes = PlannedChanges(self.period)
         self._pressed, self._ran, self._wall = 0, False, 0.0
         self.k = -1
         for client in clients:
@@ -157,7 +154,7 @@ class Controller:
                 self._law.set(name, values)
             log.tell("set", k=self.k, name=name, value=values.tolist())
 
-        self._plan(act, at)
+        self._changes.add(act, at)
 
     def idle(self, *, at: float | None = None) -> None:
         """From the next sample on, or from `at`, s: nothing is sent; references are nominal."""
@@ -228,7 +225,7 @@ class Controller:
             if self._pressed:
                 return "interrupted"
             self.k, t = k, k * self.period
-            self._act(k, log)
+            self._changes.act(k, log)
             nominal = np.array([drive(t) for drive in drives])
             for group, values in zip(_GROUPS, (self._tuned, measured, nominal), strict=True):
                 self._board.put(group, values)
@@ -263,24 +260,6 @@ class Controller:
             self._board.put(line.name, line.values)
         self._law.begin(stop + self.period)  # it takes the last sample, too
 
-    def _act(self, k: int, log: SampleLog) -> None:
-        """What was planned for this sample, then what was asked for since the last, in this order."""
-        due = [action for planned, action in self._planned if planned <= k]
-        self._planned = [(planned, action) for planned, action in self._planned if planned > k]
-        for _ in range(len(self._queue)):
-            due.append(self._queue.popleft())
-        for action in due:
-            action(log)
-
-    def _plan(self, action: Callable[[SampleLog], None], at: float | None) -> None:
-        if at is None:
-            self._queue.append(action)
-            return
-        if isinstance(at, bool) or not isinstance(at, (int, float, np.number)) or not 0 <= at < np.inf:
-            raise ModelError(f"controller: found at={at!r}, expected a time in s, 0 or later", argument="at")
-        self._planned.append((int(np.ceil(at / self.period - ROUNDING)), action))
-        self._planned.sort(key=lambda planned: planned[0])
-
     def _switch(self, state: State, at: float | None) -> None:
         def act(log: SampleLog) -> None:
             self._state = state
@@ -288,7 +267,7 @@ class Controller:
                 self._coming = state
             log.tell("state", k=self.k, state=state)
 
-        self._plan(act, at)
+        self._changes.add(act, at)
         if at is None:
             self._coming = state
 
@@ -370,7 +349,11 @@ class Controller:
             value = self._references.get(channel.name)
             if value is None:
                 value = first[self._plant.inputs.slices[channel.name]]
-            found += drives_of(channel.name, value, channel.size, (0.0, stop))
+            try:
+                found += drives_of(channel.name, value, channel.size, (0.0, stop))
+            except ModelError as error:
+                words = str(error).removeprefix("inputs ")
+                raise ModelError(f"references {words}", argument="references") from error
         return found
 
 

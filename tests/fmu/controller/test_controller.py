@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from gantrytau_fmu import Channel
+from gantrytau import Input, Model, ModelError, Output, SolveError, der, terminate, when
+from gantrytau_fmu import Channel, PythonComponent
 from gantrytau_fmu.controller import AxisLimits, Controller, Sample
 from tests.fmu.controller.conftest import FOLLOWS, InProcess, corrected, slide
 
@@ -214,3 +215,93 @@ def test_ten_thousand_samples_are_all_there(plant):
     assert found.timing.lateness.size == 0
     assert "10001 samples of 0.004 s" in str(found.timing)
     assert found.select(["q"]).timing is found.timing
+
+
+class Fuzzed(InProcess):
+    """Answers that are right, late, old, of samples to come, of wrong shapes and sizes, or not finite, as a seed has it."""
+
+    def __init__(self, seed):
+        super().__init__(answers=lambda k: [math.sin(0.1 * k)])
+        self.random = np.random.default_rng(seed)
+
+    def answer(self, k):
+        right = super().answer(k)
+        values = [np.full(1, value) for value in (math.nan, math.inf, -math.inf, 1e300, 1.0000001)]
+        wrong = [
+            Sample(k - 1, 0, value) for value in (*values, np.zeros(0), np.zeros(2), np.zeros((1, 1)), None)
+        ]
+        others = [
+            None,
+            right,
+            right,
+            self.given[int(self.random.integers(k))],
+            Sample(k, 0, np.zeros(1)),
+            "",
+            *wrong,
+        ]
+        return others[int(self.random.integers(len(others)))]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_whatever_clients_answer_the_robot_gets_only_what_was_right(seed):
+    client = Fuzzed(seed)
+    limits = {"q_ref": AxisLimits(-0.9, 0.9, speed=50.0)}
+    found = Controller(slide(), corrected, clients=[client], limits=limits).run(4.0)
+    applied, said = found["applied.q_ref"], found["stream.delta"]
+    assert np.isfinite(applied).all()
+    assert np.abs(applied).max() <= 0.9
+    assert np.abs(np.diff(applied)).max() <= 0.2 * (1 + 1e-12)
+    right = np.array([0.0, *(math.sin(0.1 * k) for k in range(1000))])
+    assert np.isin(said, right).all()  # whatever acts was an answer of its own, ...
+    ages = [np.flatnonzero(right[: k + 1] == said[k])[-1] for k in range(1, 1001)]
+    assert np.all(np.diff(ages) >= 0)  # ... and none comes back
+    counts = found.timing.clients["stream"]
+    assert counts.taken + counts.held + counts.stale + counts.refused >= 1000
+    assert min(counts.taken, counts.held, counts.stale, counts.refused) > 0
+    assert not counts.failure
+
+
+def test_a_plant_that_breaks_is_told_with_its_time():
+    part = PythonComponent(
+        lambda t, v: {"q": math.nan if t > 0.1 else 0.0},
+        inputs=[Channel("q_ref", "m")],
+        outputs=[Channel("q", "m")],
+        sampled=False,
+    )
+    with pytest.raises(
+        SolveError, match=r"plant: found q = nan at t = 0.104 s, expected finite values"
+    ) as error:
+        Controller(part, lambda t, v: {}).run(STOP)
+    assert error.value.result.time.size == 26
+
+
+class Tank(Model):
+    """x' = u, until it is full."""
+
+    u = Input(unit="m/s", start=0.0, description="what flows in")
+    x = Output(unit="m", start=0.0, fixed=True, description="level")
+
+    def equations(self):
+        yield der(self.x) == self.u
+        yield when(self.x > 0.05, terminate("the tank is full"))
+
+
+def test_a_plant_that_ends_ends_the_run_with_its_words():
+    found = Controller(Tank(), lambda t, v: {"u": 1.0}).run(STOP)
+    assert found.ended == "the tank is full"
+    assert found.final("x") == pytest.approx(0.048)  # the last sample before 0.05 m
+    assert np.allclose(found["x"], found.time, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("abc", "references q_ref: found 'abc', expected a number or an array"),
+        ([1.0, 2.0], "references q_ref: found [1.0, 2.0], expected 1 finite number"),
+        (math.nan, "references q_ref: found nan, expected 1 finite number"),
+    ],
+)
+def test_references_that_are_none_are_refused(value, said, plant):
+    with pytest.raises(ModelError) as error:
+        Controller(plant, lambda t, v: {}, references={"q_ref": value}).run(STOP)
+    assert said in str(error.value)
