@@ -133,37 +133,48 @@ for one in axes:
 LIMIT = 0.8 * 1207.0  # N
 
 
-class Fastest(Optimization):
-    """Along the taught path, from rest to rest, in the least time."""
+def fastest(along: Path) -> type[Optimization]:
+    """Along a path, from rest to rest, in the least time."""
 
-    robot = GantryTau(ROBOT)
-    way = Way(path)
-    final_time = Free(1.0, unit="s", min=0.1, max=10.0, description="duration of the motion")
-    given = ("way.a",)
+    class Fastest(Optimization):
+        robot = GantryTau(ROBOT)
+        way = Way(along)
+        final_time = Free(1.0, unit="s", min=0.1, max=10.0, description="duration of the motion")
+        given = ("way.a",)
 
-    def equations(self):
-        yield self.robot.tool.r == self.way.r
+        def equations(self):
+            yield self.robot.tool.r == self.way.r
 
-    def objective(self):
-        return self.final_time
+        def objective(self):
+            return self.final_time
 
-    def constraints(self):
-        for cart in self.robot.carts:
-            yield between(-LIMIT, cart.f, LIMIT)
-        for end, s in ((initial, 0.0), (final, path.length)):
-            yield end(self.way.s) == s
-            yield end(self.way.v) == 0
+        def constraints(self):
+            for cart in self.robot.carts:
+                yield between(-LIMIT, cart.f, LIMIT)
+            for end, s in ((initial, 0.0), (final, along.length)):
+                yield end(self.way.s) == s
+                yield end(self.way.v) == 0
+
+    return Fastest
 
 
-move = optimize(Fastest)
-forces = np.column_stack([move[f"robot.carts[{k}].f"] for k in range(3)])
-print(
-    f"{move.final_time:.3f} s instead of {pauses[-2] - 1.0:.1f} s, with forces up to {np.abs(forces).max():.0f} N"
-)
+move, trembling = (optimize(fastest(one)) for one in (path, follows))
+largest = np.max([np.abs(move[f"robot.carts[{k}].f"]) for k in range(3)], axis=0)
+print(f"{move.final_time:.3f} s instead of {pauses[-2] - 1.0:.1f} s, with forces up to {largest.max():.0f} N")
 assert 0.7 < move.final_time < 0.9
-assert (
-    np.mean(np.abs(forces).max(axis=1) > 0.99 * LIMIT) > 0.9
-)  # bang-bang: one cart is at its limit nearly always
+assert np.mean(largest > 0.99 * LIMIT) > 0.9  # one cart is at its limit nearly always
+
+# %% [markdown]
+# Limits hold at the points of the mesh. Driven by the forces that were found, the model says what happens in between: some
+# newtons, for which there is room. Along the path that keeps every tremor these are hundreds, and the motion takes longer.
+
+# %%
+print(move.playback)
+between_points = [max(v.amount for v in one.playback.violations) for one in (move, trembling)]
+print(f"beyond their limits: {between_points[0]:.0f} N, along the trembling path {between_points[1]:.0f} N")
+print(f"which takes {trembling.final_time:.3f} s")
+assert between_points[0] < 0.05 * LIMIT < between_points[1]
+assert trembling.final_time > 1.03 * move.final_time
 
 # %% [markdown]
 # ## Played back
