@@ -46,9 +46,9 @@ class ClientLine:
         elif found.k < self.taken_k or found.k < k - 1 - OLDEST:
             self.stale += 1
         else:
-            self.held += found.k < k - 1  # the answer to an earlier sample
-            self.taken += found.k == k - 1
-            self.taken_k, self.values = found.k, np.array(found.values, dtype=np.float64)
+            self.held += bool(found.k < k - 1)  # the answer to an earlier sample
+            self.taken += bool(found.k == k - 1)
+            self.taken_k, self.values = int(found.k), np.array(found.values, dtype=np.float64)
         return self.values
 
     def settled(self, k: int) -> bool:

@@ -23,6 +23,7 @@ from gantrytau_fmu.controller.board import ACTIVATE, STATES, Board, State
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
+from gantrytau_fmu.controller.controller_checks import above_zero, check_kinds, state_of
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.laws.law import LawFunction
 from gantrytau_fmu.controller.laws.users_law import users_law
@@ -68,13 +69,14 @@ class Controller:
         state: State = "obtain",
         patience: float = 10.0,
     ):
-        self.period = _above_zero("period", period)
+        self.period = above_zero("period", period)
         if clock not in ("virtual", "wall"):
             raise ModelError(
                 f"controller: found clock={clock!r}, expected 'virtual' or 'wall'", argument="clock"
             )
-        patience = _above_zero("patience", patience)
+        patience = above_zero("patience", patience)
         self._clock = WallClock(self.period) if clock == "wall" else VirtualClock(self.period, patience)
+        check_kinds(dict(limits=limits, references=references, parameters=parameters), kinematics, clients)
         self._plant = SteppedPart("plant", plant, starts)
         self._path = ReferencePath(self._plant, limits or {}, kinematics, self.period)
         self._references = dict(references or {})
@@ -82,7 +84,7 @@ class Controller:
         self._law = users_law(controller, wires or {})
         self.tunables, self._tuned = self._all_tunables(parameters or {})
         self._lines = list[ClientLine]()
-        self._state: State = _state(state)
+        self._state: State = state_of(state)
         self._coming: State = self._state
         self._changes = PlannedChanges(self.period)
         self._pressed, self._ran, self._wall = 0, False, 0.0
@@ -190,7 +192,7 @@ class Controller:
             raise ModelError(
                 "controller: found a second run, expected one; make another Controller, which begins anew"
             )
-        count = int(_above_zero("stop", stop) / self.period + ROUNDING)
+        count = int(above_zero("stop", stop) / self.period + ROUNDING)
         drives, self._ran = self._drives(float(stop)), True
         applied = [Channel(f"applied.{c.name}", c.unit, c.size) for c in self._plant.inputs]
         begin = time.perf_counter()
@@ -352,23 +354,9 @@ class Controller:
             try:
                 found += drives_of(channel.name, value, channel.size, (0.0, stop))
             except ModelError as error:
-                words = str(error).removeprefix("inputs ")
+                words = str(error).removeprefix("inputs ").removeprefix("input ")
                 raise ModelError(f"references {words}", argument="references") from error
         return found
 
 
 _GROUPS = ("the parameters", "the plant", "the references")
-
-
-def _state(state: Any) -> State:
-    if state not in STATES:
-        raise ModelError(f"controller: found state={state!r}, expected {', '.join(STATES)}", argument="state")
-    return state
-
-
-def _above_zero(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
-        raise ModelError(
-            f"controller: found {name}={value!r}, expected a number above zero, in s", argument=name
-        )
-    return float(value)

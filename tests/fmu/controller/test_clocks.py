@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import threading
 import time
 
 import numpy as np
@@ -163,6 +164,23 @@ REFUSED = [
         "controller: found patience=-1, expected a number above zero",
     ),
     (lambda c: Controller(lambda t, v: {}, corrected), "plant: found <function"),
+    (
+        lambda c: Controller(slide(), corrected, limits={"q_ref": (0, 1)}),
+        "limits: found {'q_ref': (0, 1)}, expected {input: AxisL",
+    ),
+    (
+        lambda c: Controller(slide(), corrected, references=[1]),
+        "references: found [1], expected {name: value}",
+    ),
+    (
+        lambda c: Controller(slide(), corrected, parameters={"gain": 1}),
+        "parameters: found {'gain': 1}, expected {Channel(",
+    ),
+    (
+        lambda c: Controller(slide(), corrected, kinematics=abs),
+        "expected ExternalKinematics(function, poses, axes)",
+    ),
+    (lambda c: Controller(slide(), corrected, clients=InProcess()), "expected clients in a list"),
 ]
 
 
@@ -174,6 +192,24 @@ def test_what_cannot_be_asked_for_is_refused_by_name(call, said, plant):
     with pytest.raises(ModelError) as error:
         call(controller)
     assert said in str(error.value)
+
+
+def test_another_thread_may_switch_and_set_while_samples_run(plant):
+    controller, found = Controller(plant, lambda t, v: {}, clock="wall"), []
+    thread = threading.Thread(target=lambda: found.append(controller.run(STOP)))
+    thread.start()
+    while controller.k < 5:
+        time.sleep(0.001)
+    controller.set("f_activate", 1.0)
+    controller.idle()
+    assert controller.latest["q"] == 0.0
+    assert controller.timing.samples > 5
+    thread.join()
+    state, activate = found[0]["state"], found[0]["f_activate"]
+    assert activate[0] == 0
+    assert activate[-1] == 1
+    assert state[0] == 2
+    assert state[-1] == 0
 
 
 def test_names_that_two_have_are_refused():
