@@ -1,0 +1,92 @@
+"""A client of the controller that is somewhere else: what came of it over the network, and the way back to it."""
+
+import time
+from collections import deque
+from threading import Lock
+from typing import Protocol
+
+from gantrytau.errors import ModelError
+from gantrytau_fmu.controller.channels import Declaration
+from gantrytau_fmu.controller.clients import Sample
+from gantrytau_fmu.controller.exchange.messages import NUMBERS, Kind, Message
+
+KEPT = 4  # answers: those that may be asked for
+SILENCE = 1.0  # s without a message, after which a virtual clock does not wait any more
+SEQUENCES = 2**32
+
+
+class Peer(Protocol):
+    """Who is at the other end."""
+
+    def send(self, message: Message) -> bool:
+        """Whether it was sent; it never waits."""
+        ...
+
+
+class RemoteClient:
+    """A place for a client over the network. name, sends: what it has to declare when it comes, names, units and sizes.
+
+    Until it comes, and when it has gone, it answers nothing, and a virtual clock does not wait for it. Raises ModelError for
+    more than 255 numbers.
+    """
+
+    def __init__(self, name: str, sends: Declaration | None = None):
+        self.name, self.sends = name, sends or Declaration()
+        if self.sends.size > NUMBERS:
+            raise ModelError(
+                f"{name}: found {self.sends.size} numbers, expected {NUMBERS} at most in a message; take two clients"
+            )
+        self.dropped = 0
+        self._lock = Lock()
+        self._peer: Peer | None = None
+        self._answers = deque[Sample](maxlen=KEPT)
+        self._newest, self._heard = -1, 0.0
+
+    @property
+    def connected(self) -> bool:
+        """Whether somebody is there."""
+        return self._peer is not None
+
+    def met(self, peer: Peer) -> None:
+        """Somebody has come, who may answer from the first sample on."""
+        with self._lock:
+            self._peer, self._newest, self._heard = peer, -1, time.monotonic()
+            self._answers.clear()
+
+    def left(self, peer: Peer) -> None:
+        """It has gone; what it said stays."""
+        with self._lock:
+            if self._peer is peer:
+                self._peer = None
+
+    def heard(self, message: Message) -> None:
+        """A message of its peer; what is no newer answer is dropped."""
+        with self._lock:
+            self._heard = time.monotonic()
+            if message.sequence <= self._newest or self.sends.refusal(message.values):
+                self.dropped += 1
+                return
+            self._newest = message.sequence
+            self._answers.append(Sample(message.sequence, message.time, message.values))
+
+    def submit(self, sample: Sample, declaration: Declaration) -> None:
+        """Send sample k, if somebody is there and the line is free."""
+        peer = self._peer
+        if peer is not None and not peer.send(Message(Kind.SUBMIT, sample.k, sample.time, sample.values)):
+            self.dropped += 1
+
+    def answer(self, k: int) -> Sample | None:
+        """Its newest answer, of a sample not newer than k - 1."""
+        with self._lock:
+            return next((found for found in reversed(self._answers) if found.k <= k - 1), None)
+
+    def settled(self, k: int) -> bool:
+        """Whether it has answered sample k, has nothing to answer, or has gone."""
+        silent = time.monotonic() - self._heard > SILENCE
+        return self._peer is None or not self.sends.size or self._newest >= k or silent
+
+    def close(self) -> None:
+        """Say that the run has ended."""
+        peer = self._peer
+        if peer is not None:
+            peer.send(Message(Kind.BYE, text="the run has ended"))

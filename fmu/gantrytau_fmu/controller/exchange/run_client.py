@@ -1,0 +1,164 @@
+"""The client's side of the exchange: a client of this process at a controller somewhere else."""
+
+import socket
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from gantrytau.errors import ModelError
+from gantrytau_fmu.controller.channels import Declaration
+from gantrytau_fmu.controller.clients import Client, Sample
+from gantrytau_fmu.controller.exchange.messages import (
+    LARGEST,
+    LENGTH,
+    Frames,
+    Introduction,
+    Kind,
+    Message,
+    WrongMessage,
+    as_text,
+    decoded,
+    encoded,
+    framed,
+    from_text,
+)
+
+AGAIN = 0.2  # s after which a declaration is sent anew, as datagrams may be lost
+LOOK = 0.1  # s between looks at the clock
+
+
+@dataclass
+class Attended:
+    """What a client took part in: samples that came, answers that were sent, and why it ended."""
+
+    samples: int = 0
+    answers: int = 0
+    ended: str = ""
+
+
+def run_client(
+    client: Client,
+    address: tuple[str, int],
+    *,
+    transport: Literal["udp", "tcp"] = "udp",
+    token: str = "",
+    duration: float | None = None,
+    patience: float = 10.0,
+) -> Attended:
+    """Let a client take part in the exchange of a controller at (host, port) until the run there ends.
+
+    duration: s after which it leaves; patience: s for which the controller may keep silent, at first and later on. Raises
+    ModelError where nobody is there, and where the controller refuses this client, in its words.
+    """
+    if transport not in ("udp", "tcp"):
+        raise ModelError(f"run_client: found transport={transport!r}, expected 'udp' or 'tcp'")
+    end = None if duration is None else time.monotonic() + duration
+    said, place = Introduction(client.name, token, client.sends), f"{address[0]}:{address[1]}"
+    own = _opened(address, transport, patience)
+    try:
+        return _attend(client, own, said, place, end, patience)
+    finally:
+        own.send(Message(Kind.BYE, text="the client ends"))
+        own.socket.close()
+        client.close()
+
+
+def _attend(
+    client: Client, own: "_Line", said: Introduction, place: str, end: float | None, patience: float
+) -> Attended:
+    found, declaration = Attended(), None
+    heard = asked = time.monotonic()
+    own.send(Message(Kind.DECLARE, text=as_text(said)))
+    while True:
+        now = time.monotonic()
+        if end is not None and now > end:
+            found.ended = "its duration is over"
+            return found
+        if now - heard > patience:
+            raise ModelError(
+                f"{said.name}: found nobody who answers at {place} within {patience:g} s, expected a controller; start it "
+                "first, or name its port"
+            )
+        if declaration is None and now - asked > AGAIN:
+            asked = now
+            own.send(Message(Kind.DECLARE, text=as_text(said)))
+        for message in own.messages():
+            heard = time.monotonic()
+            if message.kind == Kind.DECLARE:
+                declaration = from_text(message.text).sends
+            elif message.kind == Kind.BYE:
+                if declaration is None:
+                    raise ModelError(f"{said.name}: the controller at {place} refuses it: {message.text}")
+                found.ended = message.text or "the controller ended"
+                return found
+            elif message.kind == Kind.SUBMIT and declaration is not None:
+                _answer(client, own, message, declaration, found)
+        if own.ended:
+            found.ended = "the connection ended"
+            return found
+
+
+def _answer(
+    client: Client, own: "_Line", message: Message, declaration: Declaration, found: Attended
+) -> None:
+    """Sample k to the client, and what it says to it."""
+    if message.values.size != declaration.size:
+        return
+    found.samples += 1
+    client.submit(Sample(message.sequence, message.time, message.values), declaration)
+    answer = client.answer(message.sequence + 1)
+    if answer is not None and client.sends.size:
+        own.send(Message(Kind.OBTAIN, answer.k, answer.time, answer.values))
+        found.answers += 1
+
+
+class _Line:
+    """A socket of either kind."""
+
+    def __init__(self, own: socket.socket, frames: Frames | None):
+        self.socket, self.frames, self.ended = own, frames, False
+
+    def send(self, message: Message) -> None:
+        data = encoded(message)
+        try:
+            self.socket.sendall(data if self.frames is None else framed(data))
+        except OSError:
+            self.ended = True
+
+    def messages(self) -> Iterator[Message]:
+        """What has come; waits a while for something."""
+        try:
+            data = self.socket.recv(LARGEST + LENGTH.size)
+        except TimeoutError:
+            return
+        except OSError:  # a datagram to a port that nobody has opened yet, or a connection that broke
+            self.ended = self.frames is not None
+            time.sleep(0 if self.ended else LOOK)
+            return
+        if not data and self.frames is not None:
+            self.ended = True
+            return
+        try:
+            for each in [data] if self.frames is None else self.frames.add(data):
+                yield decoded(each)
+        except WrongMessage:
+            self.ended = self.frames is not None
+
+
+def _opened(address: tuple[str, int], transport: str, patience: float) -> _Line:
+    host, port = address
+    try:
+        if transport == "tcp":
+            own = socket.create_connection((host, port), timeout=patience)
+            own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        else:
+            own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            own.connect((host, port))
+    except OSError as error:
+        raise ModelError(
+            f"{host}:{port}: found nobody there ({error.strerror or error}), expected a controller; start it first, or name "
+            "its port"
+        ) from None
+    own.settimeout(LOOK)
+    return _Line(own, Frames() if transport == "tcp" else None)

@@ -1,0 +1,256 @@
+"""Clients that stream: a file row by row, a sensor, and a function of what was measured, as a hand that is pushed back."""
+
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau.inputs.samples import Samples
+from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau_fmu.controller.board import ACTIVATE
+from gantrytau_fmu.controller.channels import Channel, Declaration, Values
+from gantrytau_fmu.controller.clients import Sample
+
+TIMES = ("time", "t")
+HEADED = re.compile(r"\s*(.*?)\s*(?:\[([^\[\]]*[a-zA-Z%1][^\[\]]*)\])?\s*$")  # name [unit]; [0] is an index
+SAME = 1e-6  # of a period, by which times may differ
+
+
+class _Answering:
+    """Base of clients that answer every sample at once."""
+
+    def __init__(self, name: str, sends: Declaration):
+        self.name, self.sends = name, sends
+        self._answer: Sample | None = None
+        self._before: Sample | None = None
+        self._seen = -1
+
+    def submit(self, sample: Sample, declaration: Declaration) -> None:
+        """Take sample k and make the answer to it."""
+        self._seen = sample.k
+        values = self._values(sample, declaration)
+        if values is not None:
+            self._before, self._answer = self._answer, Sample(sample.k, sample.time, values)
+
+    def answer(self, k: int) -> Sample | None:
+        """Its newest answer, of a sample not newer than k - 1."""
+        return next((a for a in (self._answer, self._before) if a is not None and a.k <= k - 1), None)
+
+    def settled(self, k: int) -> bool:
+        """Whether it has seen sample k."""
+        return self._seen >= k
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _values(self, sample: Sample, declaration: Declaration) -> Values | None:
+        raise NotImplementedError
+
+
+class FileStream(_Answering):
+    """See `stream_file`."""
+
+    def __init__(self, path: Path, name: str, at_end: Literal["hold", "stop"]):
+        self.path, self.at_end, self.row = path, at_end, -1
+        self.columns, units = _header(path)
+        super().__init__(name, Declaration([Channel(c, u) for c, u in zip(self.columns, units, strict=True)]))
+        self._rows = np.zeros((0, len(self.columns)))
+        self._times = np.zeros(0)
+
+    @property
+    def state(self) -> str:
+        """Where it is, in words."""
+        if self.row < 0:
+            return "waits for f_activate"
+        if self.row < len(self._rows):
+            return f"row {self.row + 1} of {len(self._rows)}"
+        return f"at the end of {len(self._rows)} rows: " + (
+            "holds the last" if self.at_end == "hold" else "stops"
+        )
+
+    def _values(self, sample: Sample, declaration: Declaration) -> Values | None:
+        if ACTIVATE.name not in declaration:
+            raise ModelError(
+                f"{self.name}: found no {ACTIVATE.name} among what the controller publishes, expected it"
+            )
+        active = sample.values[declaration.slices[ACTIVATE.name]][0] >= 0.5
+        if not active:
+            self.row = -1
+            return np.zeros(self.sends.size)
+        if self.row < 0:
+            self._times, self._rows = _table(self.path, self.columns)
+            self._first = sample.time
+        self.row += 1
+        if self.row < len(self._rows):
+            self._check_time(sample)
+            return self._rows[self.row]
+        self.row = len(self._rows)
+        return self._rows[-1] if self.at_end == "hold" else None
+
+    def _check_time(self, sample: Sample) -> None:
+        """One row is one sample, so their times have to go on alike."""
+        if self.row != 1 or not self._times.size:
+            return
+        found, expected = self._times[1] - self._times[0], 1e-9 * (sample.time - self._first)
+        if abs(found - expected) > SAME * expected:
+            raise ModelError(
+                f"{self.path}: found rows {found:g} s apart for samples every {expected:g} s, expected one for each sample; "
+                "resample the file"
+            )
+
+
+class FunctionClient(_Answering):
+    """A client that answers with a function of what the controller publishes: function(t, values) -> {name: value}.
+
+    t: s; values: floats and vectors by name. What it returns has a value for each of `sends`. See also `stream_sensor`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        sends: Sequence[Channel],
+        function: Callable[[float, dict[str, Any]], Mapping[str, Any]],
+    ):
+        super().__init__(name, Declaration(sends))
+        if not callable(function):
+            raise ModelError(f"{name}: found {function!r}, expected a function of t and values")
+        self.function = function
+
+    def _values(self, sample: Sample, declaration: Declaration) -> Values | None:
+        known = {
+            c.name: float(sample.values[place.start]) if c.size == 1 else sample.values[place].copy()
+            for c, place in zip(declaration, declaration.slices.values(), strict=True)
+        }
+        found = self.function(1e-9 * sample.time, known)
+        if not isinstance(found, Mapping):
+            raise ModelError(f"{self.name}: found {type(found).__name__}, expected values by name")
+        return self.sends.vector(dict(found))
+
+
+def stream_file(
+    path: str | os.PathLike[str], *, name: str = "stream", at_end: Literal["hold", "stop"] = "hold"
+) -> FileStream:
+    """A client that streams a CSV file, a row for each sample, as corrections of learning control are written.
+
+    Its columns, `name [unit]` ("1" without a unit), are what it sends; a first column `time` is not sent, and has to go on
+    as samples do. The file is opened each time f_activate goes from 0 to 1, and read from its first row; while it is 0,
+    zeros are sent. at_end: "hold" goes on with the last row, "stop" sends nothing more; `.state` says where it is. Raises
+    ModelError for files that are no table of numbers.
+    """
+    if at_end not in ("hold", "stop"):
+        raise ModelError(
+            f"stream_file: found at_end={at_end!r}, expected 'hold' or 'stop'", argument="at_end"
+        )
+    return FileStream(Path(path), name, at_end)
+
+
+def stream_sensor(
+    source: Callable[[float], float] | Samples,
+    *,
+    name: str = "sensor",
+    channel: Channel | None = None,
+) -> FunctionClient:
+    """A client that sends what a sensor reads, one number a sample: a length gauge in m unless `channel` says otherwise.
+
+    source: a function of time in s, or `Samples`. Raises ModelError for another.
+    """
+    sent = channel or Channel("length", "m")
+    if isinstance(source, Samples):
+        if source.shape != ():
+            raise ModelError(
+                f"{name}: found samples of shape {source.shape}, expected one number at each time"
+            )
+        times, values = source.times, source.values[:, 0]
+        held = source.kind == "constant"
+
+        def read(t: float) -> float:
+            if held:
+                return float(values[max(int(np.searchsorted(times, t, side="right")) - 1, 0)])
+            return float(np.interp(t, times, values))
+
+        return FunctionClient(name, [sent], lambda t, _: {sent.name: read(t)})
+    if not callable(source):
+        raise ModelError(f"{name}: found {source!r}, expected a function of time, or Samples")
+    function = source
+    return FunctionClient(name, [sent], lambda t, _: {sent.name: function(t)})
+
+
+def haptic_client(
+    hand: Callable[[float, Values], Any],
+    *,
+    feels: str = "f_t",
+    size: int = 3,
+    name: str = "haptic",
+) -> FunctionClient:
+    """A haptic device: it feels a published force, and sends the force of the hand that holds it, both (size,) in N.
+
+    hand(t, felt) -> force: what the hand does against the felt force; feels: name of the published force.
+    """
+
+    def push(t: float, values: dict[str, Any]) -> Mapping[str, Any]:
+        if feels not in values:
+            raise ModelError(
+                f"{name}: found no '{feels}' among what the controller publishes, expected the force to feel"
+            )
+        return {"f": hand(t, np.atleast_1d(values[feels]))}
+
+    return FunctionClient(name, [Channel("f", "N", size)], push)
+
+
+def _header(path: Path) -> tuple[list[str], list[str]]:
+    """Names and units of the columns that are sent."""
+    rows, _ = read_cells(path)
+    if len(rows) < 2:
+        raise ModelError(
+            f"{path}: found {len(rows)} lines, expected a header, `name [unit]`, and rows of numbers"
+        )
+    columns, units = [], []
+    for k, cell in enumerate(rows[0][1]):
+        found = HEADED.match(cell)
+        name, unit = (found[1], found[2]) if found else (cell.strip(), None)
+        if k == 0 and name in TIMES:
+            continue
+        if _is_number(name):
+            raise ModelError(
+                f"{path}: found the number {name} in the first line, expected a header, `name [unit]`"
+            )
+        columns.append(name)
+        units.append(unit or "1")
+    if not columns:
+        raise ModelError(f"{path}: found no column beside the time, expected what is to be sent")
+    return columns, units
+
+
+def _table(path: Path, columns: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Times (N,), none without such a column, and rows (N, n) of a file."""
+    rows, separator = read_cells(path)
+    head, body = rows[0][1], rows[1:]
+    found, _ = _header(path)
+    if found != list(columns):
+        raise ModelError(
+            f"{path}: found the columns {', '.join(found)}, expected {', '.join(columns)} as at first"
+        )
+    numbers = []
+    for line, row in body:
+        check_cells(path, line, row, len(head), separator)
+        numbers.append([number_of(path, line, head[k], cell, separator) for k, cell in enumerate(row)])
+    table = np.array(numbers, dtype=float)
+    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if bad.size:
+        raise ModelError(
+            f"{path}: line {body[bad[0]][0]}: found an empty cell or a number that is not finite"
+        )
+    timed = len(head) > len(columns)
+    return (table[:, 0] if timed else np.zeros(0)), table[:, int(timed) :]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
