@@ -3,6 +3,16 @@
 from gantrytau_fmu.controller.channels import Channel, Declaration
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.controller import Controller
+from gantrytau_fmu.controller.exchange import (
+    FileStream,
+    FunctionClient,
+    RemoteClient,
+    Server,
+    haptic_client,
+    run_client,
+    stream_file,
+    stream_sensor,
+)
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.reference_path import AxisLimits
 from gantrytau_fmu.controller.timing import ClientCounts, ControlledResult, Timing
@@ -16,6 +26,14 @@ __all__ = [
     "Controller",
     "Declaration",
     "ExternalKinematics",
+    "FileStream",
+    "FunctionClient",
+    "RemoteClient",
     "Sample",
+    "Server",
     "Timing",
+    "haptic_client",
+    "run_client",
+    "stream_file",
+    "stream_sensor",
 ]

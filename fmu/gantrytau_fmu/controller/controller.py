@@ -24,6 +24,7 @@ from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.controller_checks import above_zero, check_kinds, state_of
+from gantrytau_fmu.controller.exchange.server import Server
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.laws.law import LawFunction
 from gantrytau_fmu.controller.laws.users_law import users_law
@@ -138,6 +139,12 @@ class Controller:
         except ModelError:
             self._lines = lines
             raise
+
+    def serve(self, port: int = 0, *, host: str = "127.0.0.1", token: str | None = None) -> Server:
+        """Let clients come over the network, each `RemoteClient` to its place, others to look; see `Server`."""
+        server = Server(self, [line.client for line in self._lines], port=port, host=host, token=token)
+        self.attach(server)
+        return server
 
     def set(self, name: str, value: ArrayLike, *, at: float | None = None) -> None:
         """Set a tunable parameter at the next sample, or from `at`, s. ModelError for a value that is none."""

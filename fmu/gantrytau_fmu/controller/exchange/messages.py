@@ -25,7 +25,7 @@ LARGEST = HEADER.size + TEXT
 SEQUENCES = 2**32
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     """What a message is."""
 
     SUBMIT = 1  # controller -> client: sample `sequence`
@@ -36,7 +36,7 @@ class Kind(IntEnum):
     BYE = 6  # both ways: nothing more comes, and why
 
 
-TEXTS = (Kind.DECLARE, Kind.BYE)
+TEXTS = (MessageKind.DECLARE, MessageKind.BYE)
 
 
 class WrongMessage(ValueError):
@@ -47,7 +47,7 @@ class WrongMessage(ValueError):
 class Message:
     """A message: sequence, the number of a sample; time in ns; values (n,), or a text."""
 
-    kind: Kind
+    kind: MessageKind
     sequence: int = 0
     time: int = 0
     values: Values = field(default_factory=lambda: np.zeros(0))
@@ -79,14 +79,14 @@ def decoded(data: bytes | memoryview) -> Message:
     magic, kind, count, sequence, time = HEADER.unpack_from(data)
     if magic != MAGIC:
         raise WrongMessage(f"magic {magic:#06x}, not {MAGIC:#06x}")
-    if kind not in Kind.__members__.values():
+    if kind not in MessageKind.__members__.values():
         raise WrongMessage(f"unknown kind {kind}")
     body = bytes(data[HEADER.size :])
     if kind in TEXTS:
         if count or len(body) > TEXT:
             raise WrongMessage(f"a text of {len(body)} bytes and {count} numbers")
         try:
-            return Message(Kind(kind), sequence, time, text=body.decode())
+            return Message(MessageKind(kind), sequence, time, text=body.decode())
         except UnicodeDecodeError:
             raise WrongMessage("a text that is none") from None
     if len(body) != 8 * count:
@@ -94,7 +94,7 @@ def decoded(data: bytes | memoryview) -> Message:
     values = np.frombuffer(body, dtype="<f8").astype(np.float64)
     if not np.isfinite(values).all():
         raise WrongMessage("numbers that are not finite")
-    return Message(Kind(kind), sequence, time, values)
+    return Message(MessageKind(kind), sequence, time, values)
 
 
 def framed(data: bytes) -> bytes:

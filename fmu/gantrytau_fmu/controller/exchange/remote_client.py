@@ -8,7 +8,7 @@ from typing import Protocol
 from gantrytau.errors import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Sample
-from gantrytau_fmu.controller.exchange.messages import NUMBERS, Kind, Message
+from gantrytau_fmu.controller.exchange.messages import NUMBERS, Message, MessageKind
 
 KEPT = 4  # answers: those that may be asked for
 SILENCE = 1.0  # s without a message, after which a virtual clock does not wait any more
@@ -72,7 +72,9 @@ class RemoteClient:
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Send sample k, if somebody is there and the line is free."""
         peer = self._peer
-        if peer is not None and not peer.send(Message(Kind.SUBMIT, sample.k, sample.time, sample.values)):
+        if peer is not None and not peer.send(
+            Message(MessageKind.SUBMIT, sample.k, sample.time, sample.values)
+        ):
             self.dropped += 1
 
     def answer(self, k: int) -> Sample | None:
@@ -89,4 +91,4 @@ class RemoteClient:
         """Say that the run has ended."""
         peer = self._peer
         if peer is not None:
-            peer.send(Message(Kind.BYE, text="the run has ended"))
+            peer.send(Message(MessageKind.BYE, text="the run has ended"))

@@ -14,8 +14,8 @@ from gantrytau_fmu.controller.exchange.messages import (
     LENGTH,
     Frames,
     Introduction,
-    Kind,
     Message,
+    MessageKind,
     WrongMessage,
     as_text,
     decoded,
@@ -59,17 +59,17 @@ def run_client(
     try:
         return _attend(client, own, said, place, end, patience)
     finally:
-        own.send(Message(Kind.BYE, text="the client ends"))
+        own.send(Message(MessageKind.BYE, text="the client ends"))
         own.socket.close()
         client.close()
 
 
 def _attend(
-    client: Client, own: "_Line", said: Introduction, place: str, end: float | None, patience: float
+    client: Client, own: "_ClientSocket", said: Introduction, place: str, end: float | None, patience: float
 ) -> Attended:
     found, declaration = Attended(), None
     heard = asked = time.monotonic()
-    own.send(Message(Kind.DECLARE, text=as_text(said)))
+    own.send(Message(MessageKind.DECLARE, text=as_text(said)))
     while True:
         now = time.monotonic()
         if end is not None and now > end:
@@ -82,17 +82,17 @@ def _attend(
             )
         if declaration is None and now - asked > AGAIN:
             asked = now
-            own.send(Message(Kind.DECLARE, text=as_text(said)))
+            own.send(Message(MessageKind.DECLARE, text=as_text(said)))
         for message in own.messages():
             heard = time.monotonic()
-            if message.kind == Kind.DECLARE:
+            if message.kind == MessageKind.DECLARE:
                 declaration = from_text(message.text).sends
-            elif message.kind == Kind.BYE:
+            elif message.kind == MessageKind.BYE:
                 if declaration is None:
                     raise ModelError(f"{said.name}: the controller at {place} refuses it: {message.text}")
                 found.ended = message.text or "the controller ended"
                 return found
-            elif message.kind == Kind.SUBMIT and declaration is not None:
+            elif message.kind == MessageKind.SUBMIT and declaration is not None:
                 _answer(client, own, message, declaration, found)
         if own.ended:
             found.ended = "the connection ended"
@@ -100,7 +100,7 @@ def _attend(
 
 
 def _answer(
-    client: Client, own: "_Line", message: Message, declaration: Declaration, found: Attended
+    client: Client, own: "_ClientSocket", message: Message, declaration: Declaration, found: Attended
 ) -> None:
     """Sample k to the client, and what it says to it."""
     if message.values.size != declaration.size:
@@ -109,11 +109,11 @@ def _answer(
     client.submit(Sample(message.sequence, message.time, message.values), declaration)
     answer = client.answer(message.sequence + 1)
     if answer is not None and client.sends.size:
-        own.send(Message(Kind.OBTAIN, answer.k, answer.time, answer.values))
+        own.send(Message(MessageKind.OBTAIN, answer.k, answer.time, answer.values))
         found.answers += 1
 
 
-class _Line:
+class _ClientSocket:
     """A socket of either kind."""
 
     def __init__(self, own: socket.socket, frames: Frames | None):
@@ -146,7 +146,7 @@ class _Line:
             self.ended = self.frames is not None
 
 
-def _opened(address: tuple[str, int], transport: str, patience: float) -> _Line:
+def _opened(address: tuple[str, int], transport: str, patience: float) -> _ClientSocket:
     host, port = address
     try:
         if transport == "tcp":
@@ -161,4 +161,4 @@ def _opened(address: tuple[str, int], transport: str, patience: float) -> _Line:
             "its port"
         ) from None
     own.settimeout(LOOK)
-    return _Line(own, Frames() if transport == "tcp" else None)
+    return _ClientSocket(own, Frames() if transport == "tcp" else None)

@@ -20,8 +20,8 @@ from gantrytau_fmu.controller.exchange.messages import (
     LARGEST,
     NUMBERS,
     Introduction,
-    Kind,
     Message,
+    MessageKind,
     WrongMessage,
     as_text,
     decoded,
@@ -100,7 +100,7 @@ class Server:
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Sample k to those who only look."""
-        message = Message(Kind.SUBMIT, sample.k, sample.time, sample.values)
+        message = Message(MessageKind.SUBMIT, sample.k, sample.time, sample.values)
         with self._lock:
             lookers = [peer for peer, place in self._slots.items() if place is None]
         for peer in lookers:
@@ -123,7 +123,7 @@ class Server:
         with self._lock:
             peers = list(self._slots)
         for peer in peers:
-            peer.send(Message(Kind.BYE, text="the run has ended"))
+            peer.send(Message(MessageKind.BYE, text="the run has ended"))
             peer.close()
         for own in (self._datagrams, self._listener):
             own.close()
@@ -181,7 +181,7 @@ class Server:
             return
         peer = StreamPeer(own, address)
         if sum(isinstance(key.data, StreamPeer) for key in self._selector.get_map().values()) >= PEERS:
-            peer.send(Message(Kind.BYE, text=f"{PEERS} are connected already"))
+            peer.send(Message(MessageKind.BYE, text=f"{PEERS} are connected already"))
             peer.close()
             return
         self._selector.register(own, selectors.EVENT_READ, peer)
@@ -201,7 +201,7 @@ class Server:
     def _take(self, peer: Any, data: bytes) -> None:
         try:
             message = decoded(data)
-            if message.kind == Kind.DECLARE:
+            if message.kind == MessageKind.DECLARE:
                 self._meet(peer, from_text(message.text))
             elif peer not in self._slots:
                 raise WrongMessage("values before a declaration")
@@ -220,7 +220,7 @@ class Server:
         place = self.places.get(said.name)
         if refusal := self._refusal(said, place, writes, peer):
             self.refused += 1
-            peer.send(Message(Kind.BYE, text=refusal))
+            peer.send(Message(MessageKind.BYE, text=refusal))
             return
         with self._lock:
             if isinstance(peer, DatagramPeer):
@@ -230,7 +230,7 @@ class Server:
                 self._writers.add(peer)
         parameters = Declaration([*self.controller.tunables, STATE])
         own = Introduction("controller", "", self.controller.published, parameters)
-        peer.send(Message(Kind.DECLARE, text=as_text(own)))
+        peer.send(Message(MessageKind.DECLARE, text=as_text(own)))
         if place is not None:
             place.met(peer)
 
@@ -258,13 +258,13 @@ class Server:
 
     def _hear(self, peer: Any, message: Message) -> None:
         place = self._slots[peer]
-        if message.kind == Kind.BYE:
+        if message.kind == MessageKind.BYE:
             self._forget(peer)
-        elif message.kind in (Kind.OBTAIN, Kind.SENSOR):
+        elif message.kind in (MessageKind.OBTAIN, MessageKind.SENSOR):
             if place is None:
                 raise WrongMessage("values of one who declared none")
             place.heard(message)
-        elif message.kind == Kind.PARAMETER:
+        elif message.kind == MessageKind.PARAMETER:
             self._set(peer, message)
         else:
             raise WrongMessage(f"{message.kind.name} of a client")
@@ -274,7 +274,10 @@ class Server:
         if peer not in self._writers:
             self.refused += 1
             peer.send(
-                Message(Kind.BYE, text="parameters and states are set with the token of this controller only")
+                Message(
+                    MessageKind.BYE,
+                    text="parameters and states are set with the token of this controller only",
+                )
             )
             self._forget(peer)
             return
@@ -347,4 +350,4 @@ def _words(sends: Declaration) -> str:
 
 def hello(said: Introduction) -> bytes:
     """The declaration of a client as a message."""
-    return encoded(Message(Kind.DECLARE, text=as_text(said)))
+    return encoded(Message(MessageKind.DECLARE, text=as_text(said)))

@@ -160,7 +160,7 @@ def stream_sensor(
     """
     sent = channel or Channel("length", "m")
     if isinstance(source, Samples):
-        if source.shape != ():
+        if source.shape not in ((), (1,)):
             raise ModelError(
                 f"{name}: found samples of shape {source.shape}, expected one number at each time"
             )

@@ -14,8 +14,8 @@ from gantrytau_fmu.controller.exchange.messages import (
     TEXTS,
     Frames,
     Introduction,
-    Kind,
     Message,
+    MessageKind,
     WrongMessage,
     as_text,
     decoded,
@@ -26,7 +26,7 @@ from gantrytau_fmu.controller.exchange.messages import (
 
 
 def test_bytes_are_those_of_the_page():
-    message = Message(Kind.OBTAIN, sequence=7, time=28_000_000, values=np.array([1.0, -0.5]))
+    message = Message(MessageKind.OBTAIN, sequence=7, time=28_000_000, values=np.array([1.0, -0.5]))
     assert encoded(message).hex(" ") == (
         "47 54 02 02 07 00 00 00 00 3f ab 01 00 00 00 00 00 00 00 00 00 00 f0 3f 00 00 00 00 00 00 e0 bf"
     )
@@ -36,7 +36,7 @@ NUMBERS = some.lists(some.floats(allow_nan=False, allow_infinity=False), max_siz
 
 
 @given(
-    some.sampled_from([k for k in Kind if k not in TEXTS]),
+    some.sampled_from([k for k in MessageKind if k not in TEXTS]),
     some.integers(0, 2**32 - 1),
     some.integers(-(2**63), 2**63 - 1),
     NUMBERS,
@@ -69,21 +69,21 @@ def test_any_bytes_are_a_message_or_refused(data):
     ],
 )
 def test_what_is_no_message_is_refused_by_name(change, words):
-    whole = encoded(Message(Kind.OBTAIN, 1, 0, np.array([1.0, 2.0])))
+    whole = encoded(Message(MessageKind.OBTAIN, 1, 0, np.array([1.0, 2.0])))
     with pytest.raises(WrongMessage, match=words):
         decoded(change(whole))
 
 
 def test_too_many_numbers_are_refused_before_they_are_sent():
     with pytest.raises(ModelError, match=r"found 256 numbers, expected 255 at most"):
-        encoded(Message(Kind.SUBMIT, values=np.zeros(256)))
+        encoded(Message(MessageKind.SUBMIT, values=np.zeros(256)))
     with pytest.raises(ModelError, match=r"bytes of names and units, expected 16384 at most"):
-        encoded(Message(Kind.DECLARE, text="x" * 16_385))
+        encoded(Message(MessageKind.DECLARE, text="x" * 16_385))
 
 
 @given(some.lists(some.integers(1, 9), max_size=40))
 def test_frames_come_in_pieces_of_any_size(sizes):
-    messages = [encoded(Message(Kind.SENSOR, k, 0, np.arange(k, dtype=float))) for k in range(5)]
+    messages = [encoded(Message(MessageKind.SENSOR, k, 0, np.arange(k, dtype=float))) for k in range(5)]
     stream, frames, found = b"".join(map(framed, messages)), Frames(), []
     for size in [*sizes, len(stream)]:
         found += frames.add(stream[:size])

@@ -12,8 +12,8 @@ from gantrytau_fmu.controller import Channel, Controller, Declaration
 from gantrytau_fmu.controller.exchange import FunctionClient, RemoteClient, Server, run_client
 from gantrytau_fmu.controller.exchange.messages import (
     Introduction,
-    Kind,
     Message,
+    MessageKind,
     as_text,
     decoded,
     encoded,
@@ -35,8 +35,7 @@ class Run:
     def __init__(self, **settings):
         self.place = RemoteClient("stream", Declaration([DELTA]))
         self.controller = Controller(slide(), corrected, clients=[self.place], **settings)
-        self.server = Server(self.controller, [self.place])
-        self.controller.attach(self.server)
+        self.server = self.controller.serve()
         self.ends, self.threads = [], []
 
     def start(self, client=None, **options):
@@ -113,7 +112,7 @@ def raw(server, said, transport="udp"):
     own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM if transport == "udp" else socket.SOCK_STREAM)
     own.settimeout(2.0)
     own.connect(("127.0.0.1", server.port))
-    own.send(encoded(Message(Kind.DECLARE, text=as_text(said))))
+    own.send(encoded(Message(MessageKind.DECLARE, text=as_text(said))))
     return own, decoded(own.recv(65536))
 
 
@@ -123,23 +122,23 @@ STREAM = Introduction("stream", sends=Declaration([DELTA]))
 def test_wrong_duplicate_and_old_messages_only_count():
     rig = Run()
     own, reply = raw(rig.server, STREAM)
-    assert reply.kind == Kind.DECLARE
-    good = encoded(Message(Kind.OBTAIN, 5, 0, np.array([0.5])))
+    assert reply.kind == MessageKind.DECLARE
+    good = encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5])))
     wrong = [
         b"",
         b"no message at all",
         good[:-1],
         good + b"\x00",
-        encoded(Message(Kind.OBTAIN, 6, 0, np.array([0.1, 0.2]))),  # two numbers for one
-        encoded(Message(Kind.OBTAIN, 6, 0, np.array([7.0]))),  # beyond its limits
+        encoded(Message(MessageKind.OBTAIN, 6, 0, np.array([0.1, 0.2]))),  # two numbers for one
+        encoded(Message(MessageKind.OBTAIN, 6, 0, np.array([7.0]))),  # beyond its limits
         good.replace(good[-8:], np.array([np.nan]).tobytes()),
-        encoded(Message(Kind.SUBMIT, 6, 0, np.array([0.1]))),
+        encoded(Message(MessageKind.SUBMIT, 6, 0, np.array([0.1]))),
     ]
     own.send(good)
     for each in wrong:
         own.send(each)
     own.send(good)  # once more
-    own.send(encoded(Message(Kind.OBTAIN, 4, 0, np.array([0.4]))))  # older
+    own.send(encoded(Message(MessageKind.OBTAIN, 4, 0, np.array([0.4]))))  # older
     for _ in range(100):
         if rig.place.dropped >= len(wrong) + 2:
             break
@@ -171,7 +170,7 @@ def test_wrong_duplicate_and_old_messages_only_count():
 def test_strangers_are_refused_in_words(said, words):
     rig = Run()
     _, reply = raw(rig.server, said)
-    assert reply.kind == Kind.BYE
+    assert reply.kind == MessageKind.BYE
     assert words in reply.text
     rig.start(FunctionClient(said.name, list(said.sends), lambda t, v: {}), token=said.token)
     rig.threads[0].join()
@@ -182,7 +181,7 @@ def test_strangers_are_refused_in_words(said, words):
 def test_parameters_and_states_are_set_with_the_token_only():
     rig = Run()
     own, reply = raw(rig.server, Introduction("panel"))
-    own.send(encoded(Message(Kind.PARAMETER, values=np.array([0.0, 1.0]))))
+    own.send(encoded(Message(MessageKind.PARAMETER, values=np.array([0.0, 1.0]))))
     assert "with the token of this controller only" in decoded(own.recv(65536)).text
     own, reply = raw(rig.server, Introduction("panel", rig.server.token))
     names = [line.split("\t")[1] for line in reply.text.splitlines() if line.startswith("parameter")]
@@ -196,9 +195,9 @@ def test_parameters_and_states_are_set_with_the_token_only():
         [],
         [1.0, 1.5],
     ):  # none of them a parameter
-        own.send(encoded(Message(Kind.PARAMETER, values=np.array(values))))
-    own.send(encoded(Message(Kind.PARAMETER, values=np.array([0.0, 1.0]))))
-    own.send(encoded(Message(Kind.PARAMETER, values=np.array([1.0, 1.0]))))
+        own.send(encoded(Message(MessageKind.PARAMETER, values=np.array(values))))
+    own.send(encoded(Message(MessageKind.PARAMETER, values=np.array([0.0, 1.0]))))
+    own.send(encoded(Message(MessageKind.PARAMETER, values=np.array([1.0, 1.0]))))
     time.sleep(0.3)
     found = rig.run(wait=False)
     assert found["f_activate"][-1] == 1.0
@@ -211,12 +210,12 @@ def test_whoever_looks_is_given_samples():
     own, _ = raw(rig.server, Introduction("looker"))
     found = rig.run(wait=False)
     samples = []
-    while (message := decoded(own.recv(65536))).kind == Kind.SUBMIT:
+    while (message := decoded(own.recv(65536))).kind == MessageKind.SUBMIT:
         samples.append(message)
     assert [m.sequence for m in samples] == list(range(N + 1))
     place = rig.controller.published.slices["q"]
     assert np.array_equal([m.values[place][0] for m in samples], found["q"])
-    assert message.kind == Kind.BYE
+    assert message.kind == MessageKind.BYE
 
 
 def test_a_stream_out_of_step_is_closed():
@@ -225,8 +224,8 @@ def test_a_stream_out_of_step_is_closed():
     own.sendall(b"\xff" * 64)
     assert own.recv(100) == b""
     own = socket.create_connection(("127.0.0.1", rig.server.port), timeout=2.0)
-    own.sendall(framed(encoded(Message(Kind.OBTAIN, 1, 0, np.array([1.0])))))  # before a declaration
-    own.sendall(framed(encoded(Message(Kind.DECLARE, text=as_text(STREAM)))))
+    own.sendall(framed(encoded(Message(MessageKind.OBTAIN, 1, 0, np.array([1.0])))))  # before a declaration
+    own.sendall(framed(encoded(Message(MessageKind.DECLARE, text=as_text(STREAM)))))
     assert own.recv(100)[4:6] == b"GT"
     assert rig.server.dropped == 2
     rig.server.close()
@@ -235,7 +234,7 @@ def test_a_stream_out_of_step_is_closed():
 def test_a_slow_reader_holds_nobody():
     rig = Run()
     own = socket.create_connection(("127.0.0.1", rig.server.port), timeout=2.0)
-    own.sendall(framed(encoded(Message(Kind.DECLARE, text=as_text(Introduction("sleeper"))))))
+    own.sendall(framed(encoded(Message(MessageKind.DECLARE, text=as_text(Introduction("sleeper"))))))
     begin = time.monotonic()
     found = rig.run(stop=4.0, wait=False)
     assert found.timing.samples == 1001
