@@ -14,7 +14,7 @@ from gantrytau.commands.printing.reporting import CommandError, refusing
 if TYPE_CHECKING:
     from gantrytau_fmu.controller import Controller
 
-PLAIN = ("plant", "law", "period", "state", "clock", "patience", "clients")
+PLAIN = ("plant", "law", "period", "state", "clock", "patience", "clients", "kinematics")
 TABLES = ("references", "limits", "parameters", "wires", "starts")
 LIMITS, EVENT = ("minimum", "maximum", "speed"), ("at", "state", "set", "value")
 PARAMETER = ("value", "unit", "minimum", "maximum")
@@ -27,6 +27,7 @@ period = 0.004                     # s
 clock = "virtual"                  # as fast as it goes; "wall" waits for every period
 state = "obtain"                   # at first; "idle" sends nothing, "submit" overwrites nothing
 # clients = ["cell.py:probe"]      # clients, or functions that make them
+# kinematics = "cell.py:kinematics"  # an ExternalKinematics: references are poses then
 
 # [references]                     # of the plant where nobody overwrites them: numbers, vectors, "motion.csv:q", signals
 # "carts[0].f" = 0.0
@@ -68,6 +69,8 @@ def read_controller(file: Path, clock: str | None = None) -> "Controller":
     keywords |= {key: table[key] for key in ("wires", "starts") if table.get(key)}
     with refusing(f"{file}: "):
         keywords["limits"], keywords["parameters"] = _limits(file, table), _parameters(file, table)
+        if "kinematics" in table:
+            keywords["kinematics"] = _named(file, str(table["kinematics"]))
         clients = [_client(file, name) for name in table.get("clients", [])]
         parts = (_part(file, table["plant"]), _part(file, table["law"]))
         controller = Controller(*parts, clients=clients, **keywords)

@@ -16,7 +16,8 @@ from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 
 CELL = """\
-from gantrytau_fmu import Channel, PythonComponent
+from gantrytau_fmu import Channel
+from gantrytau_fmu.controller import ExternalKinematics
 from tests.fmu.controller.conftest import InProcess, slide
 
 plant = slide()
@@ -25,6 +26,13 @@ three = 3
 
 def law(t, values):
     return {"q_ref": values["gain"] * values["q_ref"] + values["stream.delta"]}
+
+
+def posed(t, values):
+    return {"height": values["height"] + values["stream.delta"]}
+
+
+kinematics = ExternalKinematics(lambda pose: 2 * pose, [Channel("height", "m")], ["q_ref"])
 
 
 def late(t, values):
@@ -91,6 +99,13 @@ def test_a_table_is_written_and_counters_are_told(cell, tmp_path):
     assert (tmp_path / "run.csv").read_text().count("\n") == 52
 
 
+def test_poses_go_through_kinematics_of_the_file(cell):
+    posed = FILE.replace("cell.py:law", "cell.py:posed").replace("q_ref = 0.1", "height = 0.05")
+    cell.write_text('kinematics = "cell.py:kinematics"\n' + posed)
+    found = run(cell, "--stop", "0.2", "--json")
+    assert json.loads(found.stdout)["final"]["applied.q_ref"] == 0.1
+
+
 def test_the_clock_of_the_wall_can_be_asked_for(cell):
     found = run(cell, "--stop", "0.1", "--clock", "wall", "--json")
     assert json.loads(found.stdout)["timing"]["clock"] == "wall"
@@ -120,7 +135,7 @@ def test_an_interrupt_leaves_a_whole_log(cell, tmp_path):
     ]
     process = subprocess.Popen([*command, "--output", str(log)], stdout=subprocess.PIPE, env=os.environ)
     end = time.monotonic() + 60
-    while (not log.exists() or log.stat().st_size == 0) and time.monotonic() < end:
+    while (not log.exists() or log.stat().st_size == 0) and process.poll() is None and time.monotonic() < end:
         time.sleep(0.05)
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
@@ -142,6 +157,11 @@ WRONG = [
     ("cell.py:plant", "cell.py:three", "cell.toml: plant: found 3, expected an FMU file, a model instance"),
     ("cell.py:plant", "no.fmu", "no.fmu"),
     ("cell.py:law", "law.so", "law.so, expected a shared library"),
+    (
+        'law = "',
+        'kinematics = "cell.py:three"\nlaw = "',
+        "cell.toml: kinematics: found 3, expected ExternalKinematics(",
+    ),
     ("clients", "client", "cell.toml: there is no key 'client'; did you mean 'clients'?"),
     ('["cell.py:probe"]', "[3]", "cell.toml: clients: found 3, expected names in quotes"),
     ('["cell.py:probe"]', '["cell.py:three"]', "cell.toml: clients: found 3, expected name, sends, submit"),

@@ -1,11 +1,15 @@
 """Declarations: names, units and limits before values, and what is refused of these."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from gantrytau import ModelError
 from gantrytau_fmu.controller.channels import Channel, Declaration
 
+NOTHING: Any = None
+TEXTS: Any = ["q"]
 MOTION = Declaration([Channel("q", "m", 3, -1.0, 2.0), Channel("speed", "m/s")])
 
 
@@ -61,7 +65,7 @@ def test_nothing_is_a_declaration_too():
         (lambda: Channel("", "m"), "channel: found the name '', expected a text that is not empty"),
         (lambda: Channel("q\n", "m"), "expected a text that is not empty"),
         (lambda: Channel("q", "metre"), "metre"),
-        (lambda: Channel("q", None), "q: found unit=None, expected a text, as 'm/s', or '1'"),
+        (lambda: Channel("q", NOTHING), "q: found unit=None, expected a text, as 'm/s', or '1'"),
         (lambda: Channel("q", "m", 0), "q: found size=0, expected a whole number of at least 1"),
         (lambda: Channel("q", "m", True), "q: found size=True, expected a whole number"),
         (
@@ -69,7 +73,7 @@ def test_nothing_is_a_declaration_too():
             "q: found minimum=nan, expected a number, or None for none",
         ),
         (lambda: Channel("q", "m", 1, 2.0, 1.0), "q: found minimum=2 above maximum=1, expected it below"),
-        (lambda: Declaration(["q"]), "declaration: found 'q', expected Channel(name, unit)"),
+        (lambda: Declaration(TEXTS), "declaration: found 'q', expected Channel(name, unit)"),
         (
             lambda: Declaration([Channel("q", "m")] * 2),
             "declaration: found 'q' twice, expected each name once",

@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,6 +118,10 @@ def test_an_interrupt_pressed_twice_leaves_what_does_not_come_back(plant):
     assert found.time.size == 20
 
 
+def made(*parts: Any, **options: Any) -> Controller:
+    return Controller(*parts, **options)
+
+
 REFUSED = [
     (lambda c: c.run(0.0), "controller: found stop=0.0, expected a number above zero, in s"),
     (lambda c: c.run(float("nan")), "controller: found stop=nan, expected a number above zero, in s"),
@@ -148,39 +153,39 @@ REFUSED = [
     ),
     (lambda c: c.run(STOP, log="/nowhere/log.jsonl"), "log: cannot write /nowhere/log.jsonl"),
     (
-        lambda c: Controller(slide(), corrected, clock="real"),
+        lambda c: made(slide(), corrected, clock="real"),
         "controller: found clock='real', expected 'virtual' or 'wall'",
     ),
     (
-        lambda c: Controller(slide(), corrected, period=0),
+        lambda c: made(slide(), corrected, period=0),
         "controller: found period=0, expected a number above zero, in s",
     ),
     (
-        lambda c: Controller(slide(), corrected, state="on"),
+        lambda c: made(slide(), corrected, state="on"),
         "controller: found state='on', expected idle, submit, obtain",
     ),
     (
-        lambda c: Controller(slide(), corrected, patience=-1),
+        lambda c: made(slide(), corrected, patience=-1),
         "controller: found patience=-1, expected a number above zero",
     ),
-    (lambda c: Controller(lambda t, v: {}, corrected), "plant: found <function"),
+    (lambda c: made(lambda t, v: {}, corrected), "plant: found <function"),
     (
-        lambda c: Controller(slide(), corrected, limits={"q_ref": (0, 1)}),
+        lambda c: made(slide(), corrected, limits={"q_ref": (0, 1)}),
         "limits: found {'q_ref': (0, 1)}, expected {input: AxisL",
     ),
     (
-        lambda c: Controller(slide(), corrected, references=[1]),
+        lambda c: made(slide(), corrected, references=[1]),
         "references: found [1], expected {name: value}",
     ),
     (
-        lambda c: Controller(slide(), corrected, parameters={"gain": 1}),
+        lambda c: made(slide(), corrected, parameters={"gain": 1}),
         "parameters: found {'gain': 1}, expected {Channel(",
     ),
     (
-        lambda c: Controller(slide(), corrected, kinematics=abs),
+        lambda c: made(slide(), corrected, kinematics=abs),
         "expected ExternalKinematics(function, poses, axes)",
     ),
-    (lambda c: Controller(slide(), corrected, clients=InProcess()), "expected clients in a list"),
+    (lambda c: made(slide(), corrected, clients=InProcess()), "expected clients in a list"),
 ]
 
 

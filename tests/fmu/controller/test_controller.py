@@ -2,6 +2,7 @@
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,17 +120,22 @@ class Old(InProcess):
         return self.given[5] if k == 20 else super().answer(k)
 
 
+def sample(k: Any, values: Any) -> Sample:
+    """Whatever its values are."""
+    return Sample(k, 0, values)
+
+
 class Strange(InProcess):
     """Answers that are none, of samples to come, of other shapes and kinds, and as text."""
 
     def answer(self, k):
         wrong = [
             "text",
-            Sample(k, 0, np.array([9.0])),
-            Sample(k - 1, 0, np.zeros(2)),
-            Sample("k", 0, np.array([9.0])),
-            Sample(k - 1, 0, [9.0]),
-            Sample(k - 1, 0, np.array([1.0 + 1e-15 * 1000])),
+            sample(k, np.array([9.0])),
+            sample(k - 1, np.zeros(2)),
+            sample("k", np.array([9.0])),
+            sample(k - 1, [9.0]),
+            sample(k - 1, np.array([1.0 + 1e-15 * 1000])),
         ]
         return wrong[k - 20] if 20 <= k < 26 else super().answer(k)
 
@@ -228,14 +234,14 @@ class Fuzzed(InProcess):
         right = super().answer(k)
         values = [np.full(1, value) for value in (math.nan, math.inf, -math.inf, 1e300, 1.0000001)]
         wrong = [
-            Sample(k - 1, 0, value) for value in (*values, np.zeros(0), np.zeros(2), np.zeros((1, 1)), None)
+            sample(k - 1, value) for value in (*values, np.zeros(0), np.zeros(2), np.zeros((1, 1)), None)
         ]
         others = [
             None,
             right,
             right,
             self.given[int(self.random.integers(k))],
-            Sample(k, 0, np.zeros(1)),
+            sample(k, np.zeros(1)),
             "",
             *wrong,
         ]

@@ -1,18 +1,21 @@
 """Kinematics from outside, with their status, and the limits behind them."""
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gantrytau import ModelError, SolveError
 from gantrytau.kinematics import Kinematics
-from gantrytau_fmu import Channel
+from gantrytau_fmu import Channel, PythonComponent
 from gantrytau_fmu.controller import AxisLimits, Controller, ExternalKinematics
 from gantrytau_models import GantryTau, prototypes
 from tests.fmu.controller.conftest import slide
 
 STOP = 0.2
+THREE: Any = 3
 POSE = (Channel("r_ref", "m", 2),)
 
 
@@ -164,4 +167,28 @@ def test_kinematics_without_poses_are_none():
     with pytest.raises(ModelError, match=r"kinematics: found poses=\(\) and axes=\['q'\], expected channels"):
         ExternalKinematics(np.array, (), ["q"])
     with pytest.raises(ModelError, match="kinematics: found 3, expected a function of a pose"):
-        ExternalKinematics(3, POSE, ["q"])
+        ExternalKinematics(THREE, POSE, ["q"])
+
+
+@dataclass(frozen=True)
+class Millimetres:
+    name: str = "q_ref"
+    unit: str = "mm"
+    size: int = 1
+    minimum: float | None = None
+    maximum: float | None = None
+    elements: tuple[str, ...] = ("q_ref",)
+
+
+def test_inputs_in_units_that_are_not_si_are_refused_by_name():
+    part = PythonComponent(
+        lambda t, v: {"q": 0.0}, inputs=[Millimetres()], outputs=[Channel("q", "m")], sampled=False
+    )
+    with pytest.raises(ModelError, match=r"plant\.q_ref: .*mm"):
+        Controller(part, lambda t, v: {})
+
+
+def test_a_plant_without_inputs_is_refused():
+    part = PythonComponent(lambda t, v: {"q": 0.0}, inputs=[], outputs=[Channel("q", "m")], sampled=False)
+    with pytest.raises(ModelError, match="plant: found no inputs, expected those that take references"):
+        Controller(part, lambda t, v: {})

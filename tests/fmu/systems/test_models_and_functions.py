@@ -1,6 +1,7 @@
 """Models and Python functions as components of a system."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def law(t, values):
 
 
 def sampled_law(function=law, **changed):
-    given = dict(inputs=[Channel("y", "m")], outputs=[Channel("u", "m/s")])
+    given: dict[str, Any] = dict(inputs=[Channel("y", "m")], outputs=[Channel("u", "m/s")])
     return PythonComponent(function, **(given | changed))
 
 
@@ -49,7 +50,7 @@ def test_a_model_under_a_sampled_function_follows_its_difference_equation(tank):
 
 
 def test_a_model_is_the_fmu_that_it_becomes(tank):
-    options = dict(stop=0.5, step=STEP, tolerance=1e-10)
+    options: dict[str, Any] = dict(stop=0.5, step=STEP, tolerance=1e-10)
     of_model = cosimulate({"tank": Tank(), "law": sampled_law()}, WIRES, **options)
     of_file = cosimulate({"tank": tank, "law": sampled_law()}, WIRES, **options)
     assert np.array_equal(of_model["tank.y"], of_file["tank.y"])
@@ -126,10 +127,11 @@ def test_what_a_function_cannot_do_is_refused_by_name(tank, options, said):
 
 
 def test_a_bare_function_is_told_how_to_become_a_component(tank):
+    parts: Any = {"tank": tank, "law": law}
     with pytest.raises(
         ModelError, match=r"law: found <function law.*PythonComponent\(function, inputs="
     ) as error:
-        cosimulate({"tank": tank, "law": law}, WIRES, stop=1.0, step=STEP)
+        cosimulate(parts, WIRES, stop=1.0, step=STEP)
     assert "expected an FMU file, a model instance or a PythonComponent" in str(error.value)
 
 
