@@ -12,7 +12,6 @@ from gantrytau_fmu.controller.exchange.messages import NUMBERS, Message, Message
 
 KEPT = 4  # answers: those that may be asked for
 SILENCE = 1.0  # s without a message, after which a virtual clock does not wait any more
-SEQUENCES = 2**32
 
 
 class Peer(Protocol):
@@ -40,7 +39,7 @@ class RemoteClient:
         self._lock = Lock()
         self._peer: Peer | None = None
         self._answers = deque[Sample](maxlen=KEPT)
-        self._newest, self._heard = -1, 0.0
+        self._newest, self._given, self._heard = -1, -1, 0.0
 
     @property
     def connected(self) -> bool:
@@ -60,10 +59,11 @@ class RemoteClient:
                 self._peer = None
 
     def heard(self, message: Message) -> None:
-        """A message of its peer; what is no newer answer is dropped."""
+        """A message of its peer; what is no newer answer to a sample that it was given is dropped."""
         with self._lock:
             self._heard = time.monotonic()
-            if message.sequence <= self._newest or self.sends.refusal(message.values):
+            answers = self._newest < message.sequence <= self._given
+            if not answers or self.sends.refusal(message.values):
                 self.dropped += 1
                 return
             self._newest = message.sequence
@@ -71,7 +71,7 @@ class RemoteClient:
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Send sample k, if somebody is there and the line is free."""
-        peer = self._peer
+        peer, self._given = self._peer, sample.k
         if peer is not None and not peer.send(
             Message(MessageKind.SUBMIT, sample.k, sample.time, sample.values)
         ):

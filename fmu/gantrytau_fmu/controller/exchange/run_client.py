@@ -1,31 +1,16 @@
 """The client's side of the exchange: a client of this process at a controller somewhere else."""
 
-import socket
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from gantrytau.errors import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Client, Sample
-from gantrytau_fmu.controller.exchange.messages import (
-    LARGEST,
-    LENGTH,
-    Frames,
-    Introduction,
-    Message,
-    MessageKind,
-    WrongMessage,
-    as_text,
-    decoded,
-    encoded,
-    framed,
-    from_text,
-)
+from gantrytau_fmu.controller.exchange.client_socket import ClientSocket, opened
+from gantrytau_fmu.controller.exchange.messages import Introduction, Message, MessageKind, as_text, from_text
 
 AGAIN = 0.2  # s after which a declaration is sent anew, as datagrams may be lost
-LOOK = 0.1  # s between looks at the clock
 
 
 @dataclass
@@ -55,7 +40,7 @@ def run_client(
         raise ModelError(f"run_client: found transport={transport!r}, expected 'udp' or 'tcp'")
     end = None if duration is None else time.monotonic() + duration
     said, place = Introduction(client.name, token, client.sends), f"{address[0]}:{address[1]}"
-    own = _opened(address, transport, patience)
+    own = opened(address, transport, patience)
     try:
         return _attend(client, own, said, place, end, patience)
     finally:
@@ -65,7 +50,7 @@ def run_client(
 
 
 def _attend(
-    client: Client, own: "_ClientSocket", said: Introduction, place: str, end: float | None, patience: float
+    client: Client, own: ClientSocket, said: Introduction, place: str, end: float | None, patience: float
 ) -> Attended:
     found, declaration = Attended(), None
     heard = asked = time.monotonic()
@@ -100,7 +85,7 @@ def _attend(
 
 
 def _answer(
-    client: Client, own: "_ClientSocket", message: Message, declaration: Declaration, found: Attended
+    client: Client, own: ClientSocket, message: Message, declaration: Declaration, found: Attended
 ) -> None:
     """Sample k to the client, and what it says to it."""
     if message.values.size != declaration.size:
@@ -111,54 +96,3 @@ def _answer(
     if answer is not None and client.sends.size:
         own.send(Message(MessageKind.OBTAIN, answer.k, answer.time, answer.values))
         found.answers += 1
-
-
-class _ClientSocket:
-    """A socket of either kind."""
-
-    def __init__(self, own: socket.socket, frames: Frames | None):
-        self.socket, self.frames, self.ended = own, frames, False
-
-    def send(self, message: Message) -> None:
-        data = encoded(message)
-        try:
-            self.socket.sendall(data if self.frames is None else framed(data))
-        except OSError:
-            self.ended = True
-
-    def messages(self) -> Iterator[Message]:
-        """What has come; waits a while for something."""
-        try:
-            data = self.socket.recv(LARGEST + LENGTH.size)
-        except TimeoutError:
-            return
-        except OSError:  # a datagram to a port that nobody has opened yet, or a connection that broke
-            self.ended = self.frames is not None
-            time.sleep(0 if self.ended else LOOK)
-            return
-        if not data and self.frames is not None:
-            self.ended = True
-            return
-        try:
-            for each in [data] if self.frames is None else self.frames.add(data):
-                yield decoded(each)
-        except WrongMessage:
-            self.ended = self.frames is not None
-
-
-def _opened(address: tuple[str, int], transport: str, patience: float) -> _ClientSocket:
-    host, port = address
-    try:
-        if transport == "tcp":
-            own = socket.create_connection((host, port), timeout=patience)
-            own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        else:
-            own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            own.connect((host, port))
-    except OSError as error:
-        raise ModelError(
-            f"{host}:{port}: found nobody there ({error.strerror or error}), expected a controller; start it first, or name "
-            "its port"
-        ) from None
-    own.settimeout(LOOK)
-    return _ClientSocket(own, Frames() if transport == "tcp" else None)

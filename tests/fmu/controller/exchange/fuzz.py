@@ -18,7 +18,9 @@ from gantrytau_fmu.controller.exchange.messages import (
     Introduction,
     Message,
     MessageKind,
+    WrongMessage,
     as_text,
+    decoded,
     encoded,
     framed,
 )
@@ -78,22 +80,23 @@ def _fire(name: str, port: int, random: np.random.Generator, end: threading.Even
     while not end.is_set():
         with contextlib.suppress(OSError), _opened(kind, port) as own:
             own.send(hello if kind == "udp" else framed(hello))
-            for shot in range(int(random.integers(20, 2000))):
+            shot = 0
+            for _ in range(int(random.integers(20, 2000))):
                 if end.is_set():
                     return
                 data = _shot(random, hello, shot)
                 if kind == "tcp":
                     data = framed(data) if random.random() < 0.999 else data
                 own.sendall(data)
-                if random.random() < 0.02:
-                    with contextlib.suppress(TimeoutError):
-                        own.recv(65_536)
-                time.sleep(random.choice([0.0, 0.0005, 0.004, 0.01], p=[0.3, 0.4, 0.29, 0.01]))
+                with contextlib.suppress(TimeoutError, WrongMessage, IndexError):
+                    seen = decoded(own.recv(65_536)[0 if kind == "udp" else 4 :])
+                    shot = seen.sequence if seen.kind == MessageKind.SUBMIT else shot
+                time.sleep(random.choice([0.0, 0.0005, 0.004], p=[0.3, 0.4, 0.3]))
 
 
 def _opened(kind: str, port: int) -> socket.socket:
     own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM)
-    own.settimeout(0.01)
+    own.settimeout(0.002)
     own.connect(("127.0.0.1", port))
     return own
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_fmu.controller import Channel, Controller, Declaration
+from gantrytau_fmu.controller import Channel, Controller, Declaration, Sample
 from gantrytau_fmu.controller.exchange import FunctionClient, RemoteClient, Server, run_client
 from gantrytau_fmu.controller.exchange.messages import (
     Introduction,
@@ -123,6 +123,8 @@ def test_wrong_duplicate_and_old_messages_only_count():
     rig = Run()
     own, reply = raw(rig.server, STREAM)
     assert reply.kind == MessageKind.DECLARE
+    rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
+    own.recv(65536)
     good = encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5])))
     wrong = [
         b"",
@@ -132,6 +134,7 @@ def test_wrong_duplicate_and_old_messages_only_count():
         encoded(Message(MessageKind.OBTAIN, 6, 0, np.array([0.1, 0.2]))),  # two numbers for one
         encoded(Message(MessageKind.OBTAIN, 6, 0, np.array([7.0]))),  # beyond its limits
         good.replace(good[-8:], np.array([np.nan]).tobytes()),
+        encoded(Message(MessageKind.OBTAIN, 7, 0, np.array([0.1]))),  # to a sample to come
         encoded(Message(MessageKind.SUBMIT, 6, 0, np.array([0.1]))),
     ]
     own.send(good)
