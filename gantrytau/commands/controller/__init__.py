@@ -2,7 +2,9 @@
 
 import typer
 
+from gantrytau.commands.controller.controller_panel import panel
 from gantrytau.commands.controller.controller_run import run
+from gantrytau.commands.controller.controller_stream import stream
 
 app = typer.Typer(
     help="A robot controller whose references clients and a controller of yours overwrite every 4 ms.",
@@ -12,3 +14,5 @@ app = typer.Typer(
 app.command(
     epilog="Example: gantrytau controller run --example > cell.toml && gantrytau controller run cell.toml --stop 0.5"
 )(run)
+app.command(epilog="Example: gantrytau controller stream corrections.csv --port 5000")(stream)
+app.command(epilog="Example: gantrytau controller panel --port 5000 --token TOKEN --web 0")(panel)

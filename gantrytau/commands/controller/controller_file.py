@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from gantrytau_fmu.controller import Controller
 
 PLAIN = ("plant", "law", "period", "state", "clock", "patience", "clients", "kinematics")
-TABLES = ("references", "limits", "parameters", "wires", "starts")
+TABLES = ("references", "limits", "parameters", "wires", "starts", "places")
 LIMITS, EVENT = ("minimum", "maximum", "speed"), ("at", "state", "set", "value")
 PARAMETER = ("value", "unit", "minimum", "maximum")
+CHANNEL = ("unit", "size", "minimum", "maximum")
 FILES = (".fmu", ".so", ".dylib", ".dll")
 EXAMPLE = """\
 # A robot under a controller, every 4 ms. Make this file your own, then: gantrytau controller run cell.toml --stop 0.5
@@ -44,6 +45,9 @@ value = [1.0, 3.0, -0.35]
 "f[0]" = "carts[0].f"
 "f[1]" = "carts[1].f"
 "f[2]" = "carts[2].f"
+
+# [places.stream]                  # who may come over the network, with --port, and what it sends
+# delta = { unit = "m", size = 3, minimum = -0.01, maximum = 0.01 }
 
 [[event]]                          # as many as there are: a parameter that is set, or a state
 at = 0.1                           # s
@@ -72,6 +76,7 @@ def read_controller(file: Path, clock: str | None = None) -> "Controller":
         if "kinematics" in table:
             keywords["kinematics"] = _named(file, str(table["kinematics"]))
         clients = [_client(file, name) for name in table.get("clients", [])]
+        clients += [_place(file, name, own) for name, own in table.get("places", {}).items()]
         parts = (_part(file, table["plant"]), _part(file, table["law"]))
         controller = Controller(*parts, clients=clients, **keywords)
         for k, event in enumerate(table.get("event", [])):
@@ -121,6 +126,21 @@ def _client(file: Path, text: Any) -> Any:
     return (
         found() if callable(found) and (isinstance(found, type) or not isinstance(found, Client)) else found
     )
+
+
+def _place(file: Path, name: str, sends: Any) -> Any:
+    """A place for a client over the network, and what it sends."""
+    from gantrytau_fmu.controller import Channel, Declaration, RemoteClient
+
+    if not isinstance(sends, dict):
+        raise CommandError(
+            f"{file}: places.{name}: found {sends!r}, expected what it sends, as delta = {{ unit = 'm' }}"
+        )
+    channels = []
+    for channel, own in sends.items():
+        keys = _keys(f"{file}: places.{name}.{channel}", own, CHANNEL)
+        channels.append(Channel(channel, keys.pop("unit", "1"), **keys))
+    return RemoteClient(name, Declaration(channels))
 
 
 def _named(file: Path, text: str) -> Any:

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from gantrytau_fmu.controller import ControlledResult
 
 LINES = ".jsonl"
-SPELLING = Spelling(("controller",), {"stop": "--stop", "clock": "--clock", "log": "--output"})
+SPELLING = Spelling(
+    ("controller",), {"stop": "--stop", "clock": "--clock", "log": "--output", "port": "--port"}
+)
 
 
 def run(
@@ -40,6 +42,15 @@ def run(
             show_default=False,
         ),
     ] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            help="Let clients and panels come over the network; 0 takes a free port.", show_default=False
+        ),
+    ] = None,
+    wait: Annotated[
+        float, typer.Option(help="Time in s to wait for the clients that have places in the file.")
+    ] = 30.0,
     example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
     json: Json = False,
 ) -> None:
@@ -62,6 +73,12 @@ def run(
         saved = None if lines else output
         result_output.rehearse(saved)
         controller = read_controller(file, clock)
+        if port is not None:
+            server = controller.serve(port)
+            typer.echo(
+                f"Serving at {server.host}:{server.port}; to set something: --token {server.token}", err=True
+            )
+            server.wait(timeout=wait)
         try:
             result = controller.run(stop, log=output if lines else None)
         except SolveError as error:

@@ -25,7 +25,9 @@ class WebPanel:
     def __init__(self, link: PanelLink, *, port: int = 0):
         self.link = link
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), _handler(link))
+            self._server = ThreadingHTTPServer(
+                ("127.0.0.1", port), type("Handler", (PanelHandler,), {"link": link})
+            )
         except (OSError, OverflowError) as error:
             raise ModelError(
                 f"panel: 127.0.0.1:{port} cannot be opened ({error}), expected a free port; take another one, or 0 for any",
@@ -70,66 +72,70 @@ def snapshot(link: PanelLink) -> dict[str, Any]:
     }
 
 
-def _handler(link: PanelLink) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        timeout = 10.0
+class PanelHandler(BaseHTTPRequestHandler):
+    """Answers the page; link: of the panel that serves it."""
 
-        def do_GET(self) -> None:
-            if not self._here():
-                return
-            if self.path == "/":
-                self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
-            elif self.path == "/values":
-                self._json(HTTPStatus.OK, snapshot(link))
+    link: PanelLink
+    timeout = 10.0
+
+    def do_GET(self) -> None:
+        """The page, and its values."""
+        if not self._here():
+            return
+        if self.path == "/":
+            self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
+        elif self.path == "/values":
+            self._json(HTTPStatus.OK, snapshot(self.link))
+        else:
+            self._json(HTTPStatus.NOT_FOUND, {"error": f"there is no {self.path[:80]}"})
+
+    def do_POST(self) -> None:
+        """What the operator sets, with the token."""
+        if not self._here():
+            return
+        given = self.headers.get("X-Token", "")
+        if not self.link.token or not hmac.compare_digest(given.encode(), self.link.token.encode()):
+            self._json(HTTPStatus.FORBIDDEN, {"error": "this needs the token of the controller"})
+            return
+        try:
+            length = int(self.headers.get("Content-Length", ""))
+            if self.path != "/set" or not 0 <= length <= LARGEST:
+                raise ValueError
+            asked = json.loads(self.rfile.read(length))
+            if asked["name"] == "state":
+                self.link.switch(str(asked["value"]))
             else:
-                self._json(HTTPStatus.NOT_FOUND, {"error": f"there is no {self.path[:80]}"})
+                self.link.set(str(asked["name"]), [float(value) for value in asked["value"]])
+        except ModelError as error:
+            self._json(HTTPStatus.BAD_REQUEST, {"error": str(error)})
+        except (ValueError, KeyError, TypeError, RecursionError):
+            self._json(HTTPStatus.BAD_REQUEST, {"error": "expected a name and its values, as JSON"})
+        else:
+            self._json(HTTPStatus.OK, {})
 
-        def do_POST(self) -> None:
-            if not self._here():
-                return
-            given = self.headers.get("X-Token", "")
-            if not link.token or not hmac.compare_digest(given.encode(), link.token.encode()):
-                self._json(HTTPStatus.FORBIDDEN, {"error": "this needs the token of the controller"})
-                return
-            try:
-                length = int(self.headers.get("Content-Length", ""))
-                if self.path != "/set" or not 0 <= length <= LARGEST:
-                    raise ValueError
-                asked = json.loads(self.rfile.read(length))
-                if asked["name"] == "state":
-                    link.switch(str(asked["value"]))
-                else:
-                    link.set(str(asked["name"]), [float(value) for value in asked["value"]])
-            except ModelError as error:
-                self._json(HTTPStatus.BAD_REQUEST, {"error": str(error)})
-            except (ValueError, KeyError, TypeError, RecursionError):
-                self._json(HTTPStatus.BAD_REQUEST, {"error": "expected a name and its values, as JSON"})
-            else:
-                self._json(HTTPStatus.OK, {})
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: values are asked for many times a second."""
 
-        def log_message(self, format: str, *args: Any) -> None:
-            """Nothing: values are asked for many times a second."""
+    def _here(self) -> bool:
+        """Whether the request names this machine; the browser may have been led here by a page elsewhere."""
+        host = self.headers.get("Host", "").rpartition(":")[0]
+        if host in HOSTS:
+            return True
+        self._json(HTTPStatus.FORBIDDEN, {"error": "this page answers to 127.0.0.1 only"})
+        return False
 
-        def _here(self) -> bool:
-            """Whether the request names this machine; the browser may have been led here by a page elsewhere."""
-            host = self.headers.get("Host", "").rpartition(":")[0]
-            if host in HOSTS:
-                return True
-            self._json(HTTPStatus.FORBIDDEN, {"error": "this page answers to 127.0.0.1 only"})
-            return False
+    def _json(self, status: HTTPStatus, told: dict[str, Any]) -> None:
+        self._answer(status, json.dumps(told).encode(), "application/json")
 
-        def _json(self, status: HTTPStatus, told: dict[str, Any]) -> None:
-            self._answer(status, json.dumps(told).encode(), "application/json")
-
-        def _answer(self, status: HTTPStatus, body: bytes, kind: str) -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("Cache-Control", "no-store")
-            self.send_header("X-Content-Type-Options", "nosniff")
-            policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
-            self.send_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
-            self.end_headers()
-            self.wfile.write(body)
-
-    return Handler
+    def _answer(self, status: HTTPStatus, body: bytes, kind: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        policy = (
+            "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
+        )
+        self.send_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
+        self.end_headers()
+        self.wfile.write(body)

@@ -1,0 +1,134 @@
+"""`gantrytau controller run --port`, `stream` and `panel`: three programs beside each other."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+from gantrytau.commands.app import app
+
+CELL = """\
+from tests.fmu.controller.conftest import slide
+
+plant = slide()
+
+
+def law(t, values):
+    return {"q_ref": values["stream.delta"]}
+"""
+FILE = """\
+plant = "cell.py:plant"
+law = "cell.py:law"
+clock = "wall"
+[places.stream]
+delta = { unit = "m", minimum = -1.0, maximum = 1.0 }
+"""
+GANTRYTAU = [sys.executable, "-m", "gantrytau.cli"]
+
+
+@pytest.fixture
+def cell(tmp_path):
+    (tmp_path / "cell.py").write_text(CELL)
+    (tmp_path / "cell.toml").write_text(FILE)
+    (tmp_path / "u.csv").write_text(
+        "time [s],delta [m]\n" + "".join(f"{0.004 * k},{0.01 * (k + 1)}\n" for k in range(5))
+    )
+    return tmp_path
+
+
+def asked(*arguments):
+    return CliRunner().invoke(app, ["controller", *map(str, arguments)])
+
+
+def test_a_file_streams_to_a_running_controller_and_a_panel_activates_it(cell):
+    run = subprocess.Popen(
+        [
+            *GANTRYTAU,
+            "controller",
+            "run",
+            cell / "cell.toml",
+            "--stop",
+            "4",
+            "--port",
+            "0",
+            "--json",
+            "--output",
+            cell / "log.csv",
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        serving = re.match(
+            r"Serving at 127\.0\.0\.1:(\d+); to set something: --token (\S+)", run.stderr.readline()
+        )
+        port, token = serving[1], serving[2]
+        stream = subprocess.Popen(
+            [*GANTRYTAU, "controller", "stream", cell / "u.csv", "--port", port, "--json"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        panel = subprocess.Popen(
+            [*GANTRYTAU, "controller", "panel", "--port", port, "--token", token],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(1.5)
+        panel.stdin.write("set f_activate 1\n")
+        panel.stdin.flush()
+        told, _ = run.communicate(timeout=60)
+        streamed = json.loads(stream.communicate(timeout=10)[0])
+        shown, _ = panel.communicate(timeout=10)
+    finally:
+        for program in (run, stream, panel):
+            program.kill()
+    assert run.returncode == 0
+    final = json.loads(told)["final"]
+    assert final["f_activate"] == 1.0
+    assert final["stream.delta"] == 0.05
+    assert streamed["state"] == "at the end of 5 rows: holds the last"
+    assert streamed["ended"] == "the run has ended"
+    assert "The controller ended: the run has ended" in shown
+
+
+def test_what_is_wrong_is_told_in_options(cell):
+    (cell / "none.csv").write_text("delta [furlong]\n1\n")
+    for arguments, words in (
+        (
+            ["stream", cell / "u.csv", "--port", 9, "--at-end", "dance"],
+            "--at-end dance: expected hold or stop",
+        ),
+        (["stream", cell / "missing.csv", "--port", 9], "found no file to read"),
+        (["stream", cell / "none.csv", "--port", 9], "furlong"),
+        (["stream", cell / "u.csv", "--port", 9, "--tcp"], "found nobody there"),
+        (["run", cell / "cell.toml", "--stop", 1, "--port", 70000], "found --port 70000"),
+        (
+            ["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", 0.1],
+            "stream did not come within 0.1 s",
+        ),
+    ):
+        answer = asked(*arguments)
+        assert answer.exit_code != 0
+        assert words in " ".join(answer.output.split()), answer.output
+
+
+@pytest.mark.parametrize(
+    ("places", "words"),
+    [
+        ("[places]\nstream = 3\n", "places.stream: found 3, expected what it sends"),
+        ("[places.stream]\ndelta = 1.0\n", "places.stream.delta: found 1.0, expected a table"),
+        ("[places.stream]\ndelta = { unut = 'm' }\n", "there is no key 'unut'"),
+        ("[places.stream]\ndelta = { unit = 'mm' }\n", "'mm' is not a coherent SI unit"),
+    ],
+)
+def test_wrong_places_are_told_with_their_key(cell, places, words):
+    (cell / "cell.toml").write_text(FILE[: FILE.index("[places")] + places)
+    answer = asked("run", cell / "cell.toml", "--stop", 1)
+    assert answer.exit_code != 0
+    assert words in " ".join(answer.output.split()), answer.output
