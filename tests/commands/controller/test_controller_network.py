@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import time
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -44,49 +45,34 @@ def asked(*arguments):
     return CliRunner().invoke(app, ["controller", *map(str, arguments)])
 
 
+def started(*arguments):
+    """A program beside this one, its input and outputs as pipes of text."""
+    pipes: Any = dict(stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen([*GANTRYTAU, "controller", *map(str, arguments)], **pipes)
+
+
 def test_a_file_streams_to_a_running_controller_and_a_panel_activates_it(cell):
-    run = subprocess.Popen(
-        [
-            *GANTRYTAU,
-            "controller",
-            "run",
-            cell / "cell.toml",
-            "--stop",
-            "4",
-            "--port",
-            "0",
-            "--json",
-            "--output",
-            cell / "log.csv",
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    run = started("run", cell / "cell.toml", "--stop", 4, "--port", 0, "--json", "--output", cell / "log.csv")
+    programs = [run]
     try:
+        assert run.stderr is not None
         serving = re.match(
             r"Serving at 127\.0\.0\.1:(\d+); to set something: --token (\S+)", run.stderr.readline()
         )
-        port, token = serving[1], serving[2]
-        stream = subprocess.Popen(
-            [*GANTRYTAU, "controller", "stream", cell / "u.csv", "--port", port, "--json"],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        panel = subprocess.Popen(
-            [*GANTRYTAU, "controller", "panel", "--port", port, "--token", token],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        assert serving is not None
+        port, token = serving.groups()
+        stream = started("stream", cell / "u.csv", "--port", port, "--json")
+        panel = started("panel", "--port", port, "--token", token)
+        programs += [stream, panel]
         time.sleep(1.5)
+        assert panel.stdin is not None
         panel.stdin.write("set f_activate 1\n")
         panel.stdin.flush()
         told, _ = run.communicate(timeout=60)
         streamed = json.loads(stream.communicate(timeout=10)[0])
         shown, _ = panel.communicate(timeout=10)
     finally:
-        for program in (run, stream, panel):
+        for program in programs:
             program.kill()
     assert run.returncode == 0
     final = json.loads(told)["final"]

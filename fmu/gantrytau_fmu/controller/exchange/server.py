@@ -6,6 +6,7 @@ import secrets
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Iterable
 from typing import Any, Protocol
 
@@ -143,15 +144,14 @@ class Server:
                 raise ModelError(
                     f"wait: there is no place for '{name}', expected one of {', '.join(self.places) or 'none'}"
                 )
-        pause = threading.Event()
-        for _ in range(int(timeout / 0.01) + 1):
-            missing = [name for name in wanted if not self.places[name].connected]
-            if not missing:
-                return
+        pause, end = threading.Event(), time.monotonic() + timeout
+        while missing := [name for name in wanted if not self.places[name].connected]:
+            if time.monotonic() > end:
+                raise ModelError(
+                    f"wait: {', '.join(missing)} did not come within {timeout:g} s, expected at {self.host}:{self.port}; "
+                    "start them"
+                )
             pause.wait(0.01)
-        raise ModelError(
-            f"wait: {', '.join(missing)} did not come within {timeout:g} s, expected at {self.host}:{self.port}; start them"
-        )
 
     def _serve(self) -> None:
         while not self._end.is_set():

@@ -94,7 +94,7 @@ class ContactLoop:
 
     def response(self, frequencies: np.ndarray) -> np.ndarray:
         """The open loop over frequencies (K,) in Hz, complex."""
-        return self.gain * self.plant.response(frequencies)[:, 0, 0]
+        return self.gain * self.plant.response(frequencies)[0, 0]
 
     @cached_property
     def _edge(self) -> tuple[float, float]:
@@ -152,8 +152,8 @@ class ContactLoop:
         values, marked = self.response(hertz), self.response(np.array([self.crossover]))[0]
         figure = Figure(figsize=(6, 5), layout="constrained")
         axes = figure.subplots()
-        axes.plot(values.real, values.imag, label=f"gain {self.gain:.4g} 1/s")
-        axes.plot(values.real, -values.imag, ":", color="C0", linewidth=1)
+        axes.plot(np.real(values), np.imag(values), color="C0", label=f"gain {self.gain:.4g} 1/s")
+        axes.plot(np.real(values), -np.imag(values), ":", color="C0", linewidth=1)
         axes.plot(-1, 0, "+", color="C3", markersize=12, label="critical point")
         axes.plot(marked.real, marked.imag, "o", color="C0", label=f"{self.crossover:.1f} Hz")
         angles = np.linspace(0, 2 * np.pi, 200)

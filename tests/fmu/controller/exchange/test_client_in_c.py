@@ -21,11 +21,11 @@ def test_a_client_in_sixty_lines_of_c_does_what_one_in_python_does(tmp_path):
     assert len(SOURCE.read_text().splitlines()) <= 60
     program = tmp_path / "client"
     subprocess.run([compiler, "-std=c11", "-Wall", "-D_DEFAULT_SOURCE", "-o", program, SOURCE], check=True)
-    references = dict(references={"q_ref": 1.0})
+    references = {"q_ref": 1.0}
     inside = FunctionClient("stream", [DELTA], lambda t, values: {"delta": -0.1 * values["q"]})
-    expected = Controller(slide(), corrected, clients=[inside], **references).run(STOP)
+    expected = Controller(slide(), corrected, clients=[inside], references=references).run(STOP)
     controller = Controller(
-        slide(), corrected, clients=[RemoteClient("stream", Declaration([DELTA]))], **references
+        slide(), corrected, clients=[RemoteClient("stream", Declaration([DELTA]))], references=references
     )
     with controller.serve() as server:
         running = subprocess.Popen([program, str(server.port)], stdout=subprocess.PIPE, text=True)

@@ -3,6 +3,7 @@
 import socket
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,7 +148,9 @@ def test_wrong_duplicate_and_old_messages_only_count():
             break
         time.sleep(0.02)
     assert rig.place.dropped == len(wrong) + 2
-    assert rig.place.answer(10).values.tolist() == [0.5]
+    newest = rig.place.answer(10)
+    assert newest is not None
+    assert newest.values.tolist() == [0.5]
     assert rig.place.answer(5) is None
     rig.server.close()
 
@@ -271,5 +274,6 @@ def test_nobody_there_is_told():
         run_client(answers(), ("127.0.0.1", port), transport="tcp", patience=0.3)
     with pytest.raises(ModelError, match=r"found nobody who answers .* within 0\.3 s"):
         run_client(answers(), ("127.0.0.1", port), patience=0.3)
+    wrong: Any = "pigeon"
     with pytest.raises(ModelError, match="found transport='pigeon'"):
-        run_client(answers(), ("127.0.0.1", port), transport="pigeon")
+        run_client(answers(), ("127.0.0.1", port), transport=wrong)

@@ -1,5 +1,7 @@
 """Files, sensors and hands as clients of a controller."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,8 @@ def test_a_file_may_stop_at_its_end_and_is_read_anew(tmp_path):
 
 
 def test_where_a_stream_ends_is_said(tmp_path):
-    for at_end, words in (("hold", "holds the last"), ("stop", "stops")):
+    ends: Any = {"hold": "holds the last", "stop": "stops"}
+    for at_end, words in ends.items():
         stream = stream_file(corrections(tmp_path / "u.csv"), at_end=at_end)
         controller = Controller(slide(), follow("stream.dq"), clients=[stream], references={"q_ref": 0.0})
         controller.set("f_activate", 1.0)
@@ -111,8 +114,9 @@ def test_rows_that_are_none_end_the_stream_alone(tmp_path, rows, words):
 def test_a_file_that_is_gone_and_other_wishes_are_told(tmp_path):
     with pytest.raises(ModelError, match="found no file to read"):
         stream_file(tmp_path / "none.csv")
+    wrong: Any = "repeat"
     with pytest.raises(ModelError, match="found at_end='repeat', expected 'hold' or 'stop'"):
-        stream_file(corrections(tmp_path / "u.csv"), at_end="repeat")
+        stream_file(corrections(tmp_path / "u.csv"), at_end=wrong)
 
 
 @pytest.mark.parametrize("kind", ["constant", "linear"])
@@ -154,9 +158,10 @@ def test_functions_that_answer_nonsense_stand_alone(answer, words):
 
 
 def test_what_is_no_function_is_refused():
+    seven: Any = 7
     with pytest.raises(ModelError, match="expected a function of t and values"):
-        FunctionClient("odd", [Channel("f", "N")], 7)
+        FunctionClient("odd", [Channel("f", "N")], seven)
     with pytest.raises(ModelError, match="expected a function of time, or Samples"):
-        stream_sensor(7)
+        stream_sensor(seven)
     with pytest.raises(ModelError, match="expected one number at each time"):
         stream_sensor(Samples([0.0, 1.0], [[1.0, 2.0], [3.0, 4.0]]))

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from gantrytau import ModelError
-from gantrytau_fmu.controller import Channel, Controller
+from gantrytau_fmu.controller import Channel, ControlledResult, Controller
 from gantrytau_fmu.controller.panel import PanelLink, WebPanel, terminal_panel
 from gantrytau_fmu.controller.panel.terminal_panel import obey, panel_table
 from tests.fmu.controller.conftest import slide
@@ -31,7 +31,7 @@ class Served:
         )
         self.server = self.controller.serve()
         self.thread = threading.Thread(target=self._run, args=(stop,))
-        self.found = None
+        self.found: ControlledResult | None = None
 
     def _run(self, stop):
         self.found = self.controller.run(stop)
@@ -68,6 +68,7 @@ def test_values_come_and_parameters_go():
         until(lambda: not link.live)
         link.switch("submit")
         until(lambda: link.live and link.state == "submit")
+    assert served.found is not None
     assert served.found.ended == "interrupted"
 
 
@@ -155,7 +156,8 @@ def test_the_page_refuses_whoever_is_not_the_operator():
 def test_the_terminal_shows_and_obeys():
     with Served() as served, served.link() as link:
         until(lambda: link.k > 0)
-        console = Console(file=io.StringIO(), width=100, force_terminal=False)
+        screen = io.StringIO()
+        console = Console(file=screen, width=100, force_terminal=False)
         waiting = threading.Event()
 
         def lines():
@@ -167,7 +169,7 @@ def test_the_terminal_shows_and_obeys():
             yield "quit\n"
 
         terminal_panel(link, console, lines())
-        text = console.file.getvalue()
+        text = screen.getvalue()
         assert "0.75" in text
         assert "sample" in text
 

@@ -77,6 +77,22 @@ def test_rivals_are_named_and_the_curve_is_drawn(tmp_path):
     assert (tmp_path / "nyquist.png").stat().st_size > 5000
 
 
+def test_the_open_loop_is_that_of_the_transfer_function_at_each_frequency():
+    T_v, T, a, hertz = 2.303e-3, 0.004, np.exp(-0.004 / 2.303e-3), np.array([2.0, 30.0, 68.0, 125.0])
+    z = np.exp(2j * np.pi * hertz * T)
+    expected = 500 * ((T - T_v * (1 - a)) * z + T_v * (1 - a) - T * a) / ((z - 1) * (z - a))
+    assert np.allclose(ContactLoop(500.0, T_v=T_v).response(hertz), expected, rtol=1e-10)
+
+
+def test_the_curve_passes_as_near_to_the_critical_point_as_the_margin_says():
+    curve = ContactLoop(0.95 * 690.5).plot_nyquist().axes[0].lines[0]
+    points = np.asarray(curve.get_xdata()) + 1j * np.asarray(curve.get_ydata())
+    assert points.size > 100
+    # it crosses the real axis at -0.95; the frequencies drawn lie within 1 % of one another
+    crossing = points[np.argmin(np.abs(points.imag) + (points.real > -0.5))]
+    assert abs(crossing + 0.95) < 0.02
+
+
 @pytest.mark.parametrize(
     "wrong",
     [dict(gain=0.0), dict(gain=-1.0), dict(gain=np.nan), dict(gain=1.0, T_v=-1.0), dict(gain=1.0, period=0)],

@@ -12,8 +12,14 @@ OUTPUTS = ["f_n", "arm.r", "arm.v", "face.f"]
 
 def led(arm, more=(), **settings):
     model = SurfaceTracking(surfaces.METAL, arm=arm, **settings)
-    given = dict(stop=4.0, points=1001, seed=0, inputs=surface_disturbances())
-    return simulate(translate(model, events=True), outputs=[*OUTPUTS, *more], **given)
+    return simulate(
+        translate(model, events=True),
+        stop=4.0,
+        points=1001,
+        seed=0,
+        inputs=surface_disturbances(),
+        outputs=[*OUTPUTS, *more],
+    )
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """A tool led along a surface, against what section 8.4 of Dressler (2012) prints: 2 N held, 68 Hz, 7 N without control."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
@@ -146,8 +148,8 @@ def test_wrong_records_are_refused():
     with pytest.raises(
         ModelError, match=r"SurfaceTracking: found str, expected a record such as surfaces.METAL"
     ):
-        SurfaceTracking("metal")
+        SurfaceTracking(cast(Any, "metal"))
     with pytest.raises(
         ModelError, match=r"Operator: found SurfaceRecord, expected a record such as operators.SKILLED"
     ):
-        SurfaceTracking(surfaces.METAL, operator=surfaces.METAL)
+        SurfaceTracking(surfaces.METAL, operator=cast(Any, surfaces.METAL))
