@@ -1,5 +1,7 @@
 """`gantrytau controller run`: a plant, a controller and clients, sample by sample, as a file describes them."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +15,7 @@ from gantrytau.commands.printing.reporting import INTERRUPTED, CommandError, as_
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
-    from gantrytau_fmu.controller import ControlledResult
+    from gantrytau_fmu.controller import ControlledResult, Controller
 
 LINES = ".jsonl"
 SPELLING = Spelling(
@@ -73,16 +75,11 @@ def run(
         saved = None if lines else output
         result_output.rehearse(saved)
         controller = read_controller(file, clock)
-        if port is not None:
-            server = controller.serve(port)
-            typer.echo(
-                f"Serving at {server.host}:{server.port}; to set something: --token {server.token}", err=True
-            )
-            server.wait(timeout=wait)
-        try:
-            result = controller.run(stop, log=output if lines else None)
-        except SolveError as error:
-            result_output.stop(error, SPELLING, saved, json)
+        with _served(controller, port, wait):
+            try:
+                result = controller.run(stop, log=output if lines else None)
+            except SolveError as error:
+                result_output.stop(error, SPELLING, saved, json)
         files = [str(output)] if lines else result_output.save(result, saved)
         told = summary(result, files)
         if json:
@@ -91,6 +88,20 @@ def run(
             _show(result, files)
         if result.ended == "interrupted":
             raise typer.Exit(INTERRUPTED)
+
+
+@contextmanager
+def _served(controller: "Controller", port: int | None, wait: float) -> Iterator[None]:
+    """A controller that serves at a port, if it is to; closed again whatever happens."""
+    if port is None:
+        yield
+        return
+    with controller.serve(port) as server:
+        typer.echo(
+            f"Serving at {server.host}:{server.port}; to set something: --token {server.token}", err=True
+        )
+        server.wait(timeout=wait)
+        yield
 
 
 def summary(result: "ControlledResult", files: list[str]) -> dict[str, Any]:

@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from typing import Any
 
 import pytest
@@ -52,7 +51,7 @@ def started(*arguments):
 
 
 def test_a_file_streams_to_a_running_controller_and_a_panel_activates_it(cell):
-    run = started("run", cell / "cell.toml", "--stop", 4, "--port", 0, "--json", "--output", cell / "log.csv")
+    run = started("run", cell / "cell.toml", "--stop", 8, "--port", 0, "--json", "--output", cell / "log.csv")
     programs = [run]
     try:
         assert run.stderr is not None
@@ -64,7 +63,6 @@ def test_a_file_streams_to_a_running_controller_and_a_panel_activates_it(cell):
         stream = started("stream", cell / "u.csv", "--port", port, "--json")
         panel = started("panel", "--port", port, "--token", token)
         programs += [stream, panel]
-        time.sleep(1.5)
         assert panel.stdin is not None
         panel.stdin.write("set f_activate 1\n")
         panel.stdin.flush()

@@ -124,6 +124,7 @@ def test_wrong_duplicate_and_old_messages_only_count():
     rig = Run()
     own, reply = raw(rig.server, STREAM)
     assert reply.kind == MessageKind.DECLARE
+    rig.server.wait()
     rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
     own.recv(65536)
     good = encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5])))
