@@ -41,7 +41,7 @@ class OperatorRecord:
     depth: float = field(metadata=quantity("m", "intended depth below the surface"))
     arm: float = field(metadata=quantity("N.s/m", "force for an error of the velocity", least=0.0))
     muscle_time: float = field(metadata=quantity("s", "time constant of the force", positive=True))
-    tremor: float = field(metadata=quantity("N", "amplitude of the tremor", least=0.0))
+    tremor: float = field(metadata=quantity("N", "standard deviation of the tremor", least=0.0))
     tremor_frequency: float = field(metadata=quantity("Hz", "frequency of the tremor", positive=True))
     force_noise: float = field(
         metadata=quantity("1", "standard deviation of the force over itself", least=0.0)

@@ -8,6 +8,7 @@ import casadi as ca
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
+TREMOR_TIME = 0.5  # s, in which a tremor comes and goes
 DELAY = 50  # samples, 0.2 s, between what is seen and what is done about it
 
 
@@ -30,7 +31,7 @@ class Operator(Model):
     depth = Parameter(unit="m", description="intended depth below the surface")
     arm = Parameter(unit="N.s/m", min=0.0, description="force for an error of the velocity")
     muscle_time = Parameter(unit="s", min=0.0, description="time constant of the force")
-    tremor = Parameter(unit="N", min=0.0, description="amplitude of the tremor")
+    tremor = Parameter(unit="N", min=0.0, description="standard deviation of the tremor")
     tremor_frequency = Parameter(unit="Hz", min=0.0, description="frequency of the tremor")
     force_noise = Parameter(unit="1", min=0.0, description="standard deviation of the force over itself")
     press = Parameter(unit="N", min=0.0, description="force by which contact is helped")
@@ -40,6 +41,7 @@ class Operator(Model):
     height = Input(unit="m", start=0.0, description="of the tool above the surface")
     v = Input(3, unit="m/s", start=0.0, description="velocity of the handle")
     white = Input(unit="1", start=0.0, description="white noise of standard deviation 1, of the judgement")
+    white_tremor = Input(2, unit="1", start=0.0, description="white noise of standard deviation 1, of the tremor")
     white_force = Input(unit="1", start=0.0, description="white noise of standard deviation 1, of the force")
     draw = Input(3, unit="1", start=0.0, description="numbers of standard deviation 1 for a run")
     judged = Real(unit="m", start=0.0, nominal=1e-3, description="misjudgement of the height")
@@ -47,6 +49,7 @@ class Operator(Model):
     wanted = Real(3, unit="m/s", start=0.0, description="velocity that is wanted")
     intended = Real(3, unit="N", start=0.0, description="force that is intended beside")
     noisy = Real(unit="1", start=1.0, description="force over the intended one")
+    swing = Real(2, unit="1", start=0.0, description="the tremor's sine and cosine, which come and go")
     muscle = Real(3, unit="N", start=0.0, description="force of the muscles")
     f = Output(3, unit="N", description="force on the handle")
 
@@ -81,9 +84,12 @@ class Operator(Model):
             yield sampled(self.wanted[k], wanted[k], period=period)
             yield sampled(self.intended[k], beside if k == 2 else 0.0, period=period)
         yield sampled(self.noisy, 1 + self.force_noise * self.white_force, period=period)
-        arm = self.arm * self._spread(2)
-        yield (
-            self.muscle_time * der(self.muscle) == arm * (self.wanted - self.v) + self.intended - self.muscle
-        )
-        swing = self.tremor * ca.sin(2 * math.pi * self.tremor_frequency * time)
-        yield self.f == self.noisy * self.muscle + swing * ca.vertcat(0.6, 0.0, 0.8)
+        keep = ca.exp(-period / TREMOR_TIME)
+        for k in range(2):
+            swing = keep * self.swing[k] + ca.sqrt(1 - keep**2) * self.white_tremor[k]
+            yield sampled(self.swing[k], swing, period=period)
+        meant = self.arm * self._spread(2) * (self.wanted - self.v) + self.intended
+        yield self.muscle_time * der(self.muscle) == self.noisy * meant - self.muscle
+        angle = 2 * math.pi * self.tremor_frequency * time
+        tremor = self.tremor * (self.swing[0] * ca.sin(angle) + self.swing[1] * ca.cos(angle))
+        yield self.f == self.muscle + tremor * ca.vertcat(0.6, 0.0, 1.0)

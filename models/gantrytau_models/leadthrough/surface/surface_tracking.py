@@ -159,5 +159,6 @@ def surface_disturbances(period: float = 0.004) -> dict[str, WhiteNoise]:
         found[f"{sensor}.white_f"] = white_noise([1.0] * 3, period)
         found[f"{sensor}.bias_f"] = white_noise([1.0] * 3, LONG)
     found["hand.white"] = found["hand.white_force"] = white_noise(1.0, period)
+    found["hand.white_tremor"] = white_noise([1.0] * 2, period)
     found["hand.draw"] = white_noise([1.0] * 3, LONG)
     return found
