@@ -8,7 +8,6 @@ import casadi as ca
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
-TREMOR_TIME = 0.5  # s, in which a tremor comes and goes
 DELAY = 50  # samples, 0.2 s, between what is seen and what is done about it
 
 
@@ -33,6 +32,7 @@ class Operator(Model):
     muscle_time = Parameter(unit="s", min=0.0, description="time constant of the force")
     tremor = Parameter(unit="N", min=0.0, description="standard deviation of the tremor")
     tremor_frequency = Parameter(unit="Hz", min=0.0, description="frequency of the tremor")
+    tremor_time = Parameter(0.5, unit="s", min=0.0, description="in which the tremor comes and goes")
     force_noise = Parameter(unit="1", min=0.0, description="standard deviation of the force over itself")
     press = Parameter(unit="N", min=0.0, description="force by which contact is helped")
     pull = Parameter(unit="N", min=0.0, description="force that ends the contact")
@@ -41,7 +41,9 @@ class Operator(Model):
     height = Input(unit="m", start=0.0, description="of the tool above the surface")
     v = Input(3, unit="m/s", start=0.0, description="velocity of the handle")
     white = Input(unit="1", start=0.0, description="white noise of standard deviation 1, of the judgement")
-    white_tremor = Input(2, unit="1", start=0.0, description="white noise of standard deviation 1, of the tremor")
+    white_tremor = Input(
+        2, unit="1", start=0.0, description="white noise of standard deviation 1, of the tremor"
+    )
     white_force = Input(unit="1", start=0.0, description="white noise of standard deviation 1, of the force")
     draw = Input(3, unit="1", start=0.0, description="numbers of standard deviation 1 for a run")
     judged = Real(unit="m", start=0.0, nominal=1e-3, description="misjudgement of the height")
@@ -84,7 +86,7 @@ class Operator(Model):
             yield sampled(self.wanted[k], wanted[k], period=period)
             yield sampled(self.intended[k], beside if k == 2 else 0.0, period=period)
         yield sampled(self.noisy, 1 + self.force_noise * self.white_force, period=period)
-        keep = ca.exp(-period / TREMOR_TIME)
+        keep = ca.exp(-period / self.tremor_time)
         for k in range(2):
             swing = keep * self.swing[k] + ca.sqrt(1 - keep**2) * self.white_tremor[k]
             yield sampled(self.swing[k], swing, period=period)

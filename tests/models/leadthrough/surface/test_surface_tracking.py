@@ -75,6 +75,26 @@ def test_released_tools_come_off_and_without_the_rearm_rule_they_do_not():
     assert np.mean(rows["control.contact"][:, (times > PULL + 0.1) & (times < PULL + 0.5)]) > 0.2
 
 
+@pytest.mark.parametrize(
+    ("operator", "limit", "mistakes", "released"),
+    [
+        (operators.SKILLED, 4.0, (0, 0), True),
+        (operators.SKILLED, 12.0, (0, 0), True),
+        (operators.SKILLED, 20.0, (0, 0), False),  # more than it pulls with
+        (operators.ROUGH, 2.0, (3, 4), True),  # a tremor is enough
+        (operators.ROUGH, 8.0, (0, 0), True),
+    ],
+)
+def test_a_release_needs_a_limit_between_the_tremor_and_the_pull(operator, limit, mistakes, released):
+    rows, times = runs(
+        4, ["control.contact", "f_n"], operator=operator, control=dict(state=dict(release=limit))
+    )
+    lost = [np.any(c[(times > times[np.argmax(c)]) & (times < PULL)] < 0.5) for c in rows["control.contact"]]
+    assert mistakes[0] <= np.count_nonzero(lost) <= mistakes[1]
+    if not any(lost):
+        assert np.all((rows["f_n"][:, -1] == 0) == released)
+
+
 def test_a_gain_of_the_wrong_sign_is_refused():
     """It would lift the tool off: forces are those of the tool on the workpiece, so that positive gains hold them."""
     with pytest.raises(ModelError, match=r"control.tool.K"):
