@@ -8,7 +8,8 @@ import casadi as ca
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
-DELAY = 50  # samples, 0.2 s, between what is seen and what is done about it
+EYE = 5  # samples, 20 ms, in which the eye sees once
+DELAY = 10  # looks, 0.2 s, between what is seen and what is done about it
 
 
 class Operator(Model):
@@ -72,9 +73,9 @@ class Operator(Model):
         keep = ca.exp(-period / self.misjudgement_time)
         judged = keep * self.judged + self.misjudgement * ca.sqrt(1 - keep**2) * self.white
         yield sampled(self.judged, judged, period=period)
-        yield sampled(self.seen[0], self.height, period=period)
+        yield sampled(self.seen[0], self.height, period=EYE * period)
         for k in range(1, DELAY):
-            yield sampled(self.seen[k], self.seen[k - 1], period=period)
+            yield sampled(self.seen[k], self.seen[k - 1], period=EYE * period)
         # z points into the surface
         down = self.eye_gain * (self.seen[DELAY - 1] + self.judged + self.depth * self._spread(1))
         down = ca.fmax(-self.approach, ca.fmin(down, self.approach))
