@@ -7,7 +7,21 @@ so a positive gain is stable. The thesis prints neither signs nor gains.
 
 import casadi as ca
 
-from gantrytau import Input, Model, Output, Parameter, Real, dot, fabs, if_else, norm_2, require, sampled
+from gantrytau import (
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Real,
+    dot,
+    fabs,
+    fmax,
+    fmin,
+    if_else,
+    norm_2,
+    require,
+    sampled,
+)
 
 TINY = 1e-12  # N, below which a force has no direction
 
@@ -62,7 +76,9 @@ class ContactState(Model):
     """Whether the tool is in contact: it begins above the force `on`, and ends when the hand pulls with more than `release`.
 
     After a release a new contact begins only once the force has been below `rearm`: without this the force that is still
-    there would begin it in the very next sample, and the tool would never come off. The rule is not printed.
+    there would begin it in the very next sample, and the tool would never come off. Contact whose force is gone ends, too,
+    after `patience`: until then the tool seeks the surface with K f_ref, beyond it the robot would go on into the void.
+    Samples without force count up, those with force down, so that noise does not hide a loss. Both rules are not printed.
     """
 
     period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
@@ -71,14 +87,23 @@ class ContactState(Model):
     rearm = Parameter(
         0.2, unit="N", min=0.0, description="force of the tool below which contact may begin anew"
     )
+    patience = Parameter(
+        0.25, unit="s", min=0.0, description="time without force after which contact is lost"
+    )
     f_n = Input(unit="N", start=0.0, description="force of the tool along n")
     pull = Input(unit="N", start=0.0, description="force of the hand against n")
     touched = Real(unit="1", start=0.0, description="1 where there was contact at the last instant")
     armed = Real(unit="1", start=1.0, description="1 where contact may begin")
+    missing = Real(
+        unit="s", start=0.0, description="time of contact without force, less that with force since"
+    )
     contact = Output(unit="1", description="1 in contact, else 0")
 
     def equations(self):
-        kept = if_else(self.pull > self.release, 0.0, 1.0)
+        nothing = fabs(self.f_n) < fmin(self.rearm, self.on)
+        missing = fmax(0.0, self.missing + if_else(nothing, self.period, -self.period))
+        lost = missing > self.patience + 0.5 * self.period
+        kept = if_else(self.pull > self.release, 0.0, if_else(lost, 0.0, 1.0))
         ready = if_else(fabs(self.f_n) < self.rearm, 1.0, self.armed)
         begun = ready * if_else(self.f_n > self.on, 1.0, 0.0)
         yield self.contact == if_else(self.touched > 0.5, kept, begun)
@@ -86,6 +111,7 @@ class ContactState(Model):
         armed = if_else(self.touched > 0.5, 0.0, ready)
         yield sampled(self.touched, self.contact, period=self.period)
         yield sampled(self.armed, armed, period=self.period)
+        yield sampled(self.missing, if_else(self.touched > 0.5, missing, 0.0), period=self.period)
 
 
 class NormalEstimate(Model):

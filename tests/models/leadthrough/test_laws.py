@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import Model, Samples, simulate
+from gantrytau import Input, Model, Samples, simulate
 from gantrytau_models.leadthrough.laws import (
     ContactState,
     Impedance,
@@ -93,6 +93,44 @@ def test_contact_begins_ends_and_is_armed_again():
 
 def test_without_being_armed_contact_comes_back_at_once():
     assert contacts(rearm=1e9)[6] == 1
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.15])
+def test_contact_is_lost_after_a_while_without_force(noise):
+    begin, gone = 2, 30
+    force = np.where(np.arange(200) < gone, 2.0, 0.1)
+    force[gone:] += noise * np.random.default_rng(1).standard_normal(200 - gone)
+    force[:begin] = 0.0
+    run = after(ContactState(patience=0.1), 200, f_n=held(force), pull=0.0)
+    state = [round(behind(run, "touched", k)) for k in range(200)]
+    assert state[begin : gone + 25] == [1] * (gone + 25 - begin)  # 25 samples are 0.1 s
+    end = state.index(0, begin)
+    assert end == gone + 25 if not noise else gone + 25 < end < gone + 75
+    assert not any(state[end : end + 5])
+
+
+def test_short_losses_end_no_contact():
+    force = np.tile([2.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0], 40)  # bouncing on a plate
+    run = after(ContactState(patience=0.02), len(force), f_n=held(force), pull=0.0)
+    assert all(round(behind(run, "touched", k)) for k in range(2, len(force)))
+
+
+def test_a_tool_that_lost_the_surface_does_not_go_on_into_the_void():
+    class OverTheEdge(Model):
+        control = LeadThrough()
+        f = Input(3, unit="N")
+
+        def equations(self):
+            yield self.control.f_h == 0
+            yield self.control.f_t == self.f
+            yield self.control.t_t == 0
+            yield self.control.v_tool == 0
+
+    force = np.zeros((200, 3))
+    force[1:50, 2] = 2.0
+    run = after(OverTheEdge(), 200, f=held(force))
+    assert np.isclose(behind(run, "control.v[2]", 60), 0.03 * 2.0)  # K f_ref, it seeks
+    assert np.all([behind(run, "control.v", k) == 0 for k in range(50 + 64, 200)])
 
 
 @pytest.mark.parametrize(
