@@ -6,6 +6,7 @@ from scipy.linalg import block_diag
 
 from gantrytau import ModelError, StateSpace
 from gantrytau_optimica import Gradient, Learning, ZeroPhase, design_q, plot_q, uncertain
+from gantrytau_optimica.learning.laws.lifted import pulses
 
 PERIOD = 0.004
 
@@ -114,6 +115,18 @@ def test_families_move_resonances_and_keep_the_static_gain():
     assert same.response(hz) == pytest.approx(system.response(hz), abs=1e-9)
 
 
+def test_moved_resonances_begin_no_earlier():
+    late = pulses(one(), 200)[:, 0, 0]
+    first = np.argmax(np.abs(late) > 1e-12)
+    assert first == 6  # five samples of delay and one of the servo; C sees the tool at once
+    for member in uncertain(one()):
+        moved = pulses(member, 200)[:, 0, 0]
+        assert np.all(moved[:first] == 0)
+        assert abs(moved[first]) > 0.1 * abs(late[first])
+    for unmoved in uncertain(one(), (1.0,), (1.0,)):
+        assert pulses(unmoved, 200)[:, 0, 0] == pytest.approx(late, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -134,6 +147,8 @@ def test_families_move_resonances_and_keep_the_static_gain():
             "the law Gradient, expected a gain",
         ),
         (lambda: uncertain(one(), frequencies=(0.0,)), r"frequencies=\(0.0,\), expected numbers above zero"),
+        (lambda: uncertain(one(), frequencies="8 Hz"), "frequencies='8 Hz', expected numbers above zero"),
+        (lambda: uncertain("a robot"), "found the response 'a robot', expected a sampled linear system"),
         (lambda: uncertain(one(), damping=(50.0,)), "damping ratio 2, expected one below half"),
         (lambda: uncertain(one(), frequencies=(20.0,)), "becomes 160 Hz"),
         (lambda: uncertain(StateSpace(-1, 1, 1)), "found a continuous system, expected one that is sampled"),
