@@ -86,8 +86,8 @@ def _moved(response: Uncertain, frequency: float, damping: float) -> Uncertain:
         [_moved_pole(pole, response.period, frequency, damping) for pole in poles], dtype=complex
     )
     scale = (1 - moved) / (1 - poles)  # so that each mode gives the same at rest
-    A = prompt.A + ((V * (moved - poles)) @ W).real
-    B = prompt.B + ((V * (scale - 1)) @ (W @ prompt.B)).real
+    A = prompt.A + np.real((V * (moved - poles)) @ W)
+    B = prompt.B + np.real((V * (scale - 1)) @ (W @ prompt.B))
     return _delayed(StateSpace(A, B, prompt.C, prompt.D, period=response.period), *late)
 
 
@@ -159,7 +159,7 @@ def _delayed(system: StateSpace, of_inputs: np.ndarray, of_outputs: np.ndarray) 
     return StateSpace(A, B, C, D_y @ system.D @ D_u, period=system.period)
 
 
-def _shifts(samples: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _shifts(samples: np.ndarray) -> tuple[Any, Any, Any, Any]:
     """A, B, C, D of signals that each come so many samples later."""
     from scipy.linalg import block_diag
 
