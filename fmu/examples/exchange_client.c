@@ -33,22 +33,26 @@ static int place_of(const char *text, const char *wanted) {
 
 int main(int argc, char **argv) {
     struct sockaddr_in there = {.sin_family = AF_INET, .sin_port = htons(argc > 1 ? atoi(argv[1]) : 5000)};
-    struct timeval patience = {.tv_sec = 5};
-    static struct message in, out;
+    struct timeval patience = {.tv_sec = 1};
+    static struct message in, out, hello = {.magic = MAGIC, .kind = DECLARE};
     int own = socket(AF_INET, SOCK_DGRAM, 0), q = -1, answers = 0;
     inet_pton(AF_INET, "127.0.0.1", &there.sin_addr);
     setsockopt(own, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     if (connect(own, (struct sockaddr *)&there, sizeof there)) return perror("connect"), 1;
-    out.magic = MAGIC, out.kind = DECLARE;
-    strcpy(out.u.text, "name\tstream\ntoken\t\nsends\tdelta\tm\t1\t-1.0\t1.0\n");
-    send(own, &out, HEADER + strlen(out.u.text), 0);
-    for (ssize_t length; (length = recv(own, &in, sizeof in - 1, 0)) >= HEADER && in.magic == MAGIC;) {
-        ((char *)&in)[length] = 0; /* the end of a text */
+    strcpy(hello.u.text, "name\tstream\ntoken\t\nsends\tdelta\tm\t1\t-1.0\t1.0\n");
+    send(own, &hello, HEADER + strlen(hello.u.text), 0);
+    for (int silent = 0; silent < 10; silent++) {
+        ssize_t length = recv(own, &in, sizeof in - 1, 0);
+        if (length < HEADER || in.magic != MAGIC) { /* the controller is not there yet, or idle */
+            sleep(1), send(own, &hello, HEADER + strlen(hello.u.text), 0);
+            continue;
+        }
+        silent = -1, ((char *)&in)[length] = 0; /* the end of a text */
         if (in.kind == BYE) return printf("%d answers; %s\n", answers, in.u.text), 0;
         if (in.kind == DECLARE) q = place_of(in.u.text, "q");
         if (in.kind != SUBMIT || q < 0 || q >= in.count) continue;
         double measured = in.u.values[q];
-        out.kind = OBTAIN, out.count = 1, out.sequence = in.sequence, out.time = in.time;
+        out.magic = MAGIC, out.kind = OBTAIN, out.count = 1, out.sequence = in.sequence, out.time = in.time;
         out.u.values[0] = -0.1 * measured;
         answers += send(own, &out, HEADER + 8, 0) > 0;
     }

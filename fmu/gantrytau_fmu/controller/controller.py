@@ -24,6 +24,7 @@ from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.controller_checks import above_zero, check_kinds, state_of
+from gantrytau_fmu.controller.exchange.remote_client import RemoteClient
 from gantrytau_fmu.controller.exchange.server import Server
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.laws.law import LawFunction
@@ -139,9 +140,21 @@ class Controller:
         except ModelError:
             self._lines = lines
             raise
+        for line in self._lines:
+            if isinstance(client, RemoteClient) and isinstance(line.client, Server):
+                line.client.keep(client)
 
     def serve(self, port: int = 0, *, host: str = "127.0.0.1", token: str | None = None) -> Server:
         """Let clients come over the network, each `RemoteClient` to its place, others to look; see `Server`."""
+        if self._ran:
+            raise ModelError(
+                "serve: found a controller that has run, expected it before; serve first, then run"
+            )
+        if Server.name in [line.name for line in self._lines]:
+            raise ModelError(
+                f"serve: found a client named '{Server.name}', expected none, as a controller serves at one port under this "
+                "name"
+            )
         server = Server(self, [line.client for line in self._lines], port=port, host=host, token=token)
         self.attach(server)
         return server

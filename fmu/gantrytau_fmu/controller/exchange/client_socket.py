@@ -17,17 +17,22 @@ from gantrytau_fmu.controller.exchange.messages import (
 )
 
 LOOK = 0.1  # s that `messages` waits for something
+AGAIN = 0.2  # s after which a declaration is sent anew until it is answered, as datagrams may be lost
+ALIVE = 1.0  # s after which it is by one who has sent nothing since: so that each side knows that the other is there
 
 
 class ClientSocket:
-    """A socket of either kind; frames: of a connection. `ended` where nothing more comes."""
+    """A socket of either kind; frames: of a connection. `ended` where nothing more comes; `sent`: s on the monotonic clock
+    at which something was sent last.
+    """
 
     def __init__(self, own: socket.socket, frames: Frames | None):
         self.socket, self.frames, self.ended = own, frames, False
+        self.sent = time.monotonic()
 
     def send(self, message: Message) -> None:
         """Send a message; `ended` tells where nobody takes it."""
-        data = encoded(message)
+        data, self.sent = encoded(message), time.monotonic()
         try:
             self.socket.sendall(data if self.frames is None else framed(data))
         except OSError:

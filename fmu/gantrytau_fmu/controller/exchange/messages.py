@@ -135,7 +135,13 @@ class Introduction:
 
 
 def as_text(introduction: Introduction) -> str:
-    """Lines `name`, `token`, and one for each channel: sends or parameter, name, unit, size, minimum, maximum."""
+    """Lines `name`, `token`, and one for each channel: sends or parameter, name, unit, size, minimum, maximum.
+
+    ModelError for a name or a token that is not printable, as tabs and line ends are not: it would break the lines.
+    """
+    for role, text in (("name", introduction.name), ("token", introduction.token)):
+        if not isinstance(text, str) or not text.isprintable():
+            raise ModelError(f"declaration: found the {role} {text!r}, expected a text that can be printed")
     lines = [f"name\t{introduction.name}", f"token\t{introduction.token}"]
     for role, channels in (("sends", introduction.sends), ("parameter", introduction.parameters)):
         for c in channels:
@@ -148,7 +154,7 @@ def from_text(text: str) -> Introduction:
     """What a declaration says. WrongMessage for what says nothing of the kind."""
     said: dict[str, str] = {}
     channels: dict[str, list[Channel]] = {"sends": [], "parameter": []}
-    for line in text.splitlines():
+    for line in text.removesuffix("\n").split("\n"):
         role, *rest = line.split("\t")
         if role in ("name", "token") and len(rest) == 1 and role not in said:
             said[role] = rest[0]
@@ -156,8 +162,8 @@ def from_text(text: str) -> Introduction:
             channels[role].append(_channel(*rest))
         else:
             raise WrongMessage(f"the line {line[:80]!r}")
-    if not said.get("name", "").strip():
-        raise WrongMessage("a declaration without a name")
+    if not said.get("name", "").strip() or not said["name"].isprintable():
+        raise WrongMessage("a declaration without a name that can be printed")
     try:
         sends, parameters = (Declaration(channels[role]) for role in ("sends", "parameter"))
     except ModelError as error:

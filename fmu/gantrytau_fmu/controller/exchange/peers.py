@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+import time
 from threading import Lock
 
 from gantrytau.errors import ModelError
@@ -19,10 +20,11 @@ Address = tuple[str, int]
 
 
 class DatagramPeer:
-    """Somebody at an address who sends datagrams."""
+    """Somebody at an address who sends datagrams. heard: s on the monotonic clock at which something came last."""
 
     def __init__(self, own: socket.socket, address: Address):
         self.socket, self.address = own, address
+        self.heard = time.monotonic()
 
     def send(self, message: Message) -> bool:
         """Whether the system took it."""
@@ -36,13 +38,13 @@ class DatagramPeer:
 
 
 class StreamPeer:
-    """A connection. `waiting` bytes are sent when it takes them; frames are whole or not at all."""
+    """A connection. `waiting` bytes are sent when it takes them; frames are whole or not at all. heard: as of datagrams."""
 
     def __init__(self, own: socket.socket, address: Address):
         self.socket, self.address = own, address
         own.setblocking(False)
         own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.frames = Frames()
+        self.frames, self.heard = Frames(), time.monotonic()
         self._lock, self._out = Lock(), bytearray()
 
     def send(self, message: Message) -> bool:

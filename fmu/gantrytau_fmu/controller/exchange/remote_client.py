@@ -42,13 +42,20 @@ class RemoteClient:
         self._newest, self._given, self._heard = -1, -1, 0.0
 
     @property
+    def peer(self) -> Peer | None:
+        """Who is there, if anybody."""
+        return self._peer
+
+    @property
     def connected(self) -> bool:
         """Whether somebody is there."""
         return self._peer is not None
 
     def met(self, peer: Peer) -> None:
-        """Somebody has come, who may answer from the first sample on."""
+        """Somebody has come, who may answer from the first sample on; nothing changes for one who is there."""
         with self._lock:
+            if self._peer is peer:
+                return
             self._peer, self._newest, self._heard = peer, -1, time.monotonic()
             self._answers.clear()
 

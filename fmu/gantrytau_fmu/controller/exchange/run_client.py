@@ -1,5 +1,6 @@
 """The client's side of the exchange: a client of this process at a controller somewhere else."""
 
+import contextlib
 import time
 from dataclasses import dataclass
 from typing import Literal
@@ -7,10 +8,15 @@ from typing import Literal
 from gantrytau.errors import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Client, Sample
-from gantrytau_fmu.controller.exchange.client_socket import ClientSocket, opened
-from gantrytau_fmu.controller.exchange.messages import Introduction, Message, MessageKind, as_text, from_text
-
-AGAIN = 0.2  # s after which a declaration is sent anew, as datagrams may be lost
+from gantrytau_fmu.controller.exchange.client_socket import AGAIN, ALIVE, ClientSocket, opened
+from gantrytau_fmu.controller.exchange.messages import (
+    Introduction,
+    Message,
+    MessageKind,
+    WrongMessage,
+    as_text,
+    from_text,
+)
 
 
 @dataclass
@@ -53,7 +59,7 @@ def _attend(
     client: Client, own: ClientSocket, said: Introduction, place: str, end: float | None, patience: float
 ) -> Attended:
     found, declaration = Attended(), None
-    heard = asked = time.monotonic()
+    heard = time.monotonic()
     own.send(Message(MessageKind.DECLARE, text=as_text(said)))
     while True:
         now = time.monotonic()
@@ -65,13 +71,13 @@ def _attend(
                 f"{said.name}: found nobody who answers at {place} within {patience:g} s, expected a controller; start it "
                 "first, or name its port"
             )
-        if declaration is None and now - asked > AGAIN:
-            asked = now
+        if now - own.sent > (AGAIN if declaration is None else ALIVE):
             own.send(Message(MessageKind.DECLARE, text=as_text(said)))
         for message in own.messages():
             heard = time.monotonic()
             if message.kind == MessageKind.DECLARE:
-                declaration = from_text(message.text).sends
+                with contextlib.suppress(WrongMessage):
+                    declaration = from_text(message.text).sends
             elif message.kind == MessageKind.BYE:
                 if declaration is None:
                     raise ModelError(f"{said.name}: the controller at {place} refuses it: {message.text}")

@@ -2,6 +2,7 @@
 
 import contextlib
 import hmac
+import re
 import secrets
 import selectors
 import socket
@@ -33,8 +34,11 @@ from gantrytau_fmu.controller.exchange.peers import Address, DatagramPeer, Strea
 from gantrytau_fmu.controller.exchange.remote_client import RemoteClient
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
-PEERS = 16  # at a time, of each kind of socket
+PEERS = 16  # at a time: connections, and senders of datagrams who only look
+ABSENT = 3.0  # s without a message, after which another may have the place of somebody
+WORDS = 1000  # characters of a refusal
 LOOK = 0.05  # s between looks whether it is to end
+TOKEN = re.compile(r"[!-~]+")  # what a line of a declaration, a header of a page and a command line all carry
 STATE = Channel("state", "1", minimum=0.0, maximum=len(STATES) - 1.0)
 
 
@@ -57,8 +61,8 @@ class Server:
     places: the clients that may come, by their names; others may look, if they send nothing. port: 0 takes a free one, which
     `port` tells. host: this machine alone unless told otherwise; beyond it everybody who sends values needs the token, and
     everywhere whoever sets parameters and states does. token: text; made up where none is given, `token` tells it.
-    Raises ModelError for a port in use, a host that is none, more than 255 published numbers, and a token of less than 16
-    characters beyond this machine.
+    Raises ModelError for a port in use, a host that is none, more than 255 published numbers or 16 kB of names, a token
+    that is not of printable ASCII without spaces, and one of less than 16 characters beyond this machine.
     """
 
     name = "server"
@@ -76,6 +80,12 @@ class Server:
         self.controller, self.dropped, self.refused = controller, 0, 0
         self.places = {place.name: place for place in places if isinstance(place, RemoteClient)}
         self._beyond = host not in LOOPBACK
+        if token is not None and not (isinstance(token, str) and TOKEN.fullmatch(token)):
+            raise ModelError(
+                "serve: found a token with spaces, signs that are not ASCII, or nothing in it, expected letters, digits and "
+                "signs; leave it out, and one is made",
+                argument="token",
+            )
         if self._beyond and token is not None and len(token) < 16:
             raise ModelError(
                 f"serve: found a token of {len(token)} characters for host {host}, expected 16 and more, as others can "
@@ -87,6 +97,12 @@ class Server:
                 f"serve: found {controller.published.size} published numbers, expected {NUMBERS} at most in a message; "
                 "give the plant fewer outputs"
             )
+        parameters = Declaration([*controller.tunables, STATE])
+        self._own = Message(
+            MessageKind.DECLARE,
+            text=as_text(Introduction("controller", "", controller.published, parameters)),
+        )
+        encoded(self._own)  # raises for more names than a message holds
         self._datagrams, self._listener = _sockets(host, port)
         self.host, self.port = host, int(self._listener.getsockname()[1])
         self._known: dict[Address, DatagramPeer] = {}
@@ -98,6 +114,10 @@ class Server:
         self._selector.register(self._listener, selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._serve, name="exchange", daemon=True)
         self._thread.start()
+
+    def keep(self, place: RemoteClient) -> None:
+        """One more place, for a client who may come from now on."""
+        self.places[place.name] = place
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Sample k to those who only look."""
@@ -180,7 +200,8 @@ class Server:
         except OSError:
             return
         peer = StreamPeer(own, address)
-        if sum(isinstance(key.data, StreamPeer) for key in self._selector.get_map().values()) >= PEERS:
+        there = [key.data for key in self._selector.get_map().values() if isinstance(key.data, StreamPeer)]
+        if not self._room(there):
             peer.send(Message(MessageKind.BYE, text=f"{PEERS} are connected already"))
             peer.close()
             return
@@ -201,6 +222,7 @@ class Server:
     def _take(self, peer: Any, data: bytes) -> None:
         try:
             message = decoded(data)
+            peer.heard = time.monotonic()
             if message.kind == MessageKind.DECLARE:
                 self._meet(peer, from_text(message.text))
             elif peer not in self._slots:
@@ -220,19 +242,35 @@ class Server:
         place = self.places.get(said.name)
         if refusal := self._refusal(said, place, writes, peer):
             self.refused += 1
-            peer.send(Message(MessageKind.BYE, text=refusal))
+            peer.send(Message(MessageKind.BYE, text=refusal[:WORDS]))
             return
+        if place is not None and place.peer not in (None, peer):
+            self._dismiss(place.peer, f"another '{place.name}' has come, as this one was silent")
+        before = self._slots.get(peer)
         with self._lock:
             if isinstance(peer, DatagramPeer):
                 self._known[peer.address] = peer
             self._slots[peer] = place
-            if writes:
-                self._writers.add(peer)
-        parameters = Declaration([*self.controller.tunables, STATE])
-        own = Introduction("controller", "", self.controller.published, parameters)
-        peer.send(Message(MessageKind.DECLARE, text=as_text(own)))
+            (self._writers.add if writes else self._writers.discard)(peer)
+        if before is not None and before is not place:
+            before.left(peer)
+        peer.send(self._own)
         if place is not None:
             place.met(peer)
+
+    def _room(self, there: list[Any]) -> bool:
+        """Whether one more may come beside these, of whom the one who was silent for longest goes if need be."""
+        if len(there) < PEERS:
+            return True
+        silent = min((peer for peer in there if self._slots.get(peer) is None), key=_heard, default=None)
+        if silent is None or not _absent(silent):
+            return False
+        self._dismiss(silent, "others have come, and this one was silent")
+        return True
+
+    def _dismiss(self, peer: Any, words: str) -> None:
+        peer.send(Message(MessageKind.BYE, text=words))
+        self._forget(peer)
 
     def _refusal(self, said: Introduction, place: RemoteClient | None, writes: bool, peer: Any) -> str:
         if said.token and not writes:
@@ -244,16 +282,11 @@ class Server:
             return f"'{said.name}' declared {_words(said.sends)}, expected {_words(place.sends)}"
         if place is not None and self._beyond and not writes:
             return f"'{said.name}' sends values from elsewhere, expected the token of this controller"
-        if (
-            place is not None
-            and place.connected
-            and self._slots.get(peer) is not place
-            and not place.settled(2**62)
-        ):
-            return f"'{said.name}' is there already; expected another name"
-        new = isinstance(peer, DatagramPeer) and peer.address not in self._known
-        if new and len(self._known) >= PEERS:
-            return f"{PEERS} are there already"
+        if place is not None and place.peer not in (None, peer) and not _absent(place.peer):
+            return f"'{said.name}' is there already; expected another name, or that it is silent for {ABSENT:g} s"
+        if place is None and isinstance(peer, DatagramPeer) and peer.address not in self._known:
+            looking = [known for known in self._known.values() if self._slots.get(known) is None]
+            return "" if self._room(looking) else f"{PEERS} are there already"
         return ""
 
     def _hear(self, peer: Any, message: Message) -> None:
@@ -348,6 +381,10 @@ def _words(sends: Declaration) -> str:
     )
 
 
-def hello(said: Introduction) -> bytes:
-    """The declaration of a client as a message."""
-    return encoded(Message(MessageKind.DECLARE, text=as_text(said)))
+def _heard(peer: Any) -> float:
+    return peer.heard
+
+
+def _absent(peer: Any) -> bool:
+    """Whether nothing has come of somebody for long."""
+    return time.monotonic() - peer.heard > ABSENT

@@ -1,5 +1,6 @@
 """A panel's line to a controller: what it publishes, as it comes, and what the operator asks for."""
 
+import contextlib
 import threading
 import time
 from collections.abc import Sequence
@@ -9,16 +10,16 @@ import numpy as np
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.controller.board import STATES
 from gantrytau_fmu.controller.channels import Declaration
-from gantrytau_fmu.controller.exchange.client_socket import opened
+from gantrytau_fmu.controller.exchange.client_socket import AGAIN, ALIVE, opened
 from gantrytau_fmu.controller.exchange.messages import (
     Introduction,
     Message,
     MessageKind,
+    WrongMessage,
     as_text,
     from_text,
 )
 
-AGAIN = 0.2  # s after which a declaration is sent anew
 STALE = 1.0  # s without a sample, after which values are not of now
 
 
@@ -34,6 +35,7 @@ class PanelLink:
         self.k, self.time, self.ended = -1, 0.0, ""
         self._values = np.zeros(0)
         self._heard = 0.0
+        self._hello = Message(MessageKind.DECLARE, text=as_text(Introduction("panel", self.token)))
         self._socket = opened(address, "udp", patience)
         self._end = threading.Event()
         self._lock = threading.Lock()
@@ -70,9 +72,7 @@ class PanelLink:
         if name not in self.parameters:
             raise ModelError(f"there is no parameter '{name}'{did_you_mean(name, self.parameters.names)}")
         channel = self.parameters[name]
-        wanted = Declaration([channel]).vector(
-            {name: list(values) if channel.size > 1 else values[0] if values else []}
-        )
+        wanted = Declaration([channel]).vector({name: list(values)})
         if refusal := Declaration([channel]).refusal(wanted):
             raise ModelError(refusal)
         number = self.parameters.names.index(name)
@@ -98,20 +98,20 @@ class PanelLink:
         self.close()
 
     def _meet(self, patience: float) -> None:
-        hello = Message(MessageKind.DECLARE, text=as_text(Introduction("panel", self.token)))
         end, asked = time.monotonic() + patience, -AGAIN
         while time.monotonic() < end:
             if time.monotonic() - asked > AGAIN:
                 asked = time.monotonic()
-                self._socket.send(hello)
+                self._socket.send(self._hello)
             for message in self._socket.messages():
                 if message.kind == MessageKind.BYE:
                     self._socket.socket.close()
                     raise ModelError(f"panel: the controller at {self.place} refuses it: {message.text}")
                 if message.kind == MessageKind.DECLARE:
-                    said = from_text(message.text)
-                    self.published, self.parameters = said.sends, said.parameters
-                    return
+                    with contextlib.suppress(WrongMessage):
+                        said = from_text(message.text)
+                        self.published, self.parameters = said.sends, said.parameters
+                        return
         self._socket.socket.close()
         raise ModelError(
             f"panel: found nobody who answers at {self.place} within {patience:g} s, expected a controller that serves; "
@@ -120,6 +120,8 @@ class PanelLink:
 
     def _read(self) -> None:
         while not self._end.is_set():
+            if time.monotonic() - self._socket.sent > ALIVE:
+                self._socket.send(self._hello)
             for message in self._socket.messages():
                 if message.kind == MessageKind.BYE:
                     self.ended = message.text or "the controller ended"

@@ -19,15 +19,16 @@ RATE = 5.0  # Hz, of the table
 def panel_table(link: PanelLink) -> "Table":
     """All values of a controller, and where it is."""
     from rich.table import Table
+    from rich.text import Text
 
     where = f"sample {link.k}, {link.time:.3f} s" if link.k >= 0 else "no sample yet"
     if link.ended:
         where += f"; ended: {link.ended}"
     elif link.k >= 0 and not link.live:
         where += "; no samples come"
-    table = Table(
-        title=f"Controller {link.place}: {where}", title_justify="left", caption=HELP if link.token else ""
-    )
+    # texts as they are: brackets in names are no styles
+    title, caption = Text(f"Controller {link.place}: {where}"), Text(HELP if link.token else "")
+    table = Table(title=title, title_justify="left", caption=caption)
     table.add_column("name")
     table.add_column("value", justify="right")
     table.add_column("unit")
@@ -38,7 +39,8 @@ def panel_table(link: PanelLink) -> "Table":
         if channel.name == "state":
             text = link.state
         style = "bold" if channel.name in link.parameters else ""
-        table.add_row(channel.name, text, "" if channel.unit == "1" else channel.unit, style=style)
+        unit = "" if channel.unit == "1" else channel.unit
+        table.add_row(Text(channel.name), Text(text), Text(unit), style=style)
     return table
 
 
@@ -54,9 +56,9 @@ def obey(link: PanelLink, line: str) -> bool:
         link.switch(verb)
     elif verb == "set" and len(rest) >= 2:
         try:
-            values = [float(word.replace(",", "")) for word in rest[1:]]
+            values = [float(word.removesuffix(",")) for word in rest[1:]]
         except ValueError:
-            raise ModelError(f"found {' '.join(rest[1:])!r}, expected numbers") from None
+            raise ModelError(f"found {' '.join(rest[1:])!r}, expected numbers, as 1.5 or 1e-3") from None
         link.set(rest[0], values)
     else:
         raise ModelError(f"found {line.strip()!r}, expected {HELP}")
@@ -66,6 +68,7 @@ def obey(link: PanelLink, line: str) -> bool:
 def terminal_panel(link: PanelLink, console: "Console", lines: Iterable[str]) -> None:
     """Show a controller until it ends or a line says quit; lines: what the operator enters, in a thread of its own."""
     from rich.live import Live
+    from rich.text import Text
 
     end, said = threading.Event(), [""]
 
@@ -85,7 +88,7 @@ def terminal_panel(link: PanelLink, console: "Console", lines: Iterable[str]) ->
         while not end.wait(1 / RATE):
             table = panel_table(link)
             if said[0]:
-                table.caption = f"{said[0]}\n{HELP}"
+                table.caption = Text(f"{said[0]}\n{HELP}")
             live.update(table)
             if link.ended:
                 return

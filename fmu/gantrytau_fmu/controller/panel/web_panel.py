@@ -1,7 +1,9 @@
 """The panel as a page in a browser of this machine: values to look at; what is set needs the token."""
 
+import contextlib
 import hmac
 import json
+import re
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -13,7 +15,9 @@ from gantrytau_fmu.controller.panel.panel_link import PanelLink
 
 PAGE = Path(__file__).with_name("panel.html")
 LARGEST = 4096  # bytes of a request
-HOSTS = ("127.0.0.1", "localhost", "[::1]")  # a page elsewhere that points here is not answered
+HOST = re.compile(
+    r"(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"
+)  # a page elsewhere that points here is not answered
 
 
 class WebPanel:
@@ -108,7 +112,7 @@ class PanelHandler(BaseHTTPRequestHandler):
                 self.link.set(str(asked["name"]), [float(value) for value in asked["value"]])
         except ModelError as error:
             self._json(HTTPStatus.BAD_REQUEST, {"error": str(error)})
-        except (ValueError, KeyError, TypeError, RecursionError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             self._json(HTTPStatus.BAD_REQUEST, {"error": "expected a name and its values, as JSON"})
         else:
             self._json(HTTPStatus.OK, {})
@@ -118,8 +122,7 @@ class PanelHandler(BaseHTTPRequestHandler):
 
     def _here(self) -> bool:
         """Whether the request names this machine; the browser may have been led here by a page elsewhere."""
-        host = self.headers.get("Host", "").rpartition(":")[0]
-        if host in HOSTS:
+        if HOST.fullmatch(self.headers.get("Host", "")):
             return True
         self._json(HTTPStatus.FORBIDDEN, {"error": "this page answers to 127.0.0.1 only"})
         return False
@@ -137,5 +140,6 @@ class PanelHandler(BaseHTTPRequestHandler):
             "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
         )
         self.send_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
-        self.end_headers()
-        self.wfile.write(body)
+        with contextlib.suppress(ConnectionError):  # the browser has left
+            self.end_headers()
+            self.wfile.write(body)

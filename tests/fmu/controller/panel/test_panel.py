@@ -27,7 +27,7 @@ class Served:
             slide(),
             lambda t, values: {"q_ref": values["gain"]},
             clock="wall",
-            parameters={gain: 0.5, pair: [0.0, 0.0]},
+            parameters={gain: 0.5, pair: [0.0, 0.0], Channel("force[/b]", "N"): 0.0},
         )
         self.server = self.controller.serve()
         self.thread = threading.Thread(target=self._run, args=(stop,))
@@ -78,6 +78,7 @@ def test_values_come_and_parameters_go():
         ("gein", [1.0], r"there is no parameter 'gein'; did you mean 'gain'\?"),
         ("gain", [3.0], r"found gain = 3 1, expected a number in \[0, 2\]"),
         ("gain", [], "gain: found"),
+        ("gain", [1.0, 2.0], r"gain: found \[1.0, 2.0\], expected one number"),
         ("pair", [1.0], "pair: found"),
         ("gain", [float("nan")], "found gain = nan"),
     ],
@@ -145,6 +146,10 @@ def test_the_page_refuses_whoever_is_not_the_operator():
         assert asked(page.url + "etc/passwd")[0] == 404
         assert asked(page.url + "set", token=token, told=b"no json")[0] == 400
         assert asked(page.url + "set", token=token, told=b"x" * 5000)[0] == 400
+        huge = b'{"name": "gain", "value": [1' + b"0" * 400 + b"]}"
+        assert asked(page.url + "set", token=token, told=huge)[0] == 400
+        assert asked(page.url + "values", host="127.0.0.1")[0] == 200  # as browsers name port 80
+        assert asked(page.url + "values", host="127.0.0.1.evil.example")[0] == 403
         status, text, _ = asked(page.url + "set", token=token, told={"name": "gain", "value": [9.0]})
         assert status == 400
         assert b"expected a number in [0, 2]" in text
@@ -164,6 +169,9 @@ def test_the_terminal_shows_and_obeys():
             yield "set gain 0.75\n"
             until(lambda: link.values["gain"] == [0.75])
             yield "set gain much\n"
+            waiting.wait(0.3)
+            yield "set [/x] 1\n"
+            waiting.wait(0.3)
             yield "\n"
             waiting.wait(0.5)
             yield "quit\n"
@@ -171,6 +179,7 @@ def test_the_terminal_shows_and_obeys():
         terminal_panel(link, console, lines())
         text = screen.getvalue()
         assert "0.75" in text
+        assert "force[/b]" in text  # a name is no markup
         assert "sample" in text
 
 
@@ -179,7 +188,10 @@ def test_lines_that_say_nothing_are_told():
         for line in ("dance", "set gain", "idle now"):
             with pytest.raises(ModelError, match=r"expected idle \| submit \| obtain"):
                 obey(link, line)
-        with pytest.raises(ModelError, match="found 'x', expected numbers"):
-            obey(link, "set gain x")
+        for number in ("x", "0,5", "1e"):
+            with pytest.raises(ModelError, match=f"found '{number}', expected numbers, as 1.5"):
+                obey(link, f"set gain {number}")
+        obey(link, "set pair 0.1, 0.2")
+        until(lambda: link.values.get("pair") == [0.1, 0.2])
         assert not obey(link, "quit")
         assert panel_table(link).row_count == len(link.published.channels)

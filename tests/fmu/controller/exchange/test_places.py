@@ -1,0 +1,174 @@
+"""Who comes, stays, is silent, and has a place at the port of a controller: nobody is locked out, none speaks twice."""
+
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError
+from gantrytau_fmu import PythonComponent
+from gantrytau_fmu.controller import Channel, Controller, Declaration, RemoteClient, Sample
+from gantrytau_fmu.controller.exchange import server as serving
+from gantrytau_fmu.controller.exchange.messages import (
+    Introduction,
+    Message,
+    MessageKind,
+    as_text,
+    encoded,
+    framed,
+)
+from tests.fmu.controller.conftest import DELTA, Q_REF, slide
+from tests.fmu.controller.exchange.test_over_the_network import STREAM, Run, raw
+
+SOON = 0.3  # s, in place of the 3 s after which somebody is absent
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(serving, "ABSENT", SOON)
+
+
+def until(holds, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.01)
+
+
+def test_clients_stay_while_the_controller_is_idle():
+    rig = Run(clock="wall")
+    rig.start(patience=1.5)
+    rig.controller.idle(at=0.1)
+    rig.controller.obtain(at=2.3)
+    found = rig.run(stop=2.5)
+    assert rig.ends[0].ended == "the run has ended"
+    assert (
+        found.timing.clients["stream"].taken > 40
+    )  # of 75 samples that were not idle; a wall clock promises nothing
+
+
+def test_those_who_died_lock_nobody_out(impatient):
+    rig = Run()
+    dead = [raw(rig.server, Introduction(f"looker {k}"))[0] for k in range(16)]
+    assert raw(rig.server, STREAM)[1].kind == MessageKind.DECLARE  # a place is no matter of those who look
+    assert "16 are there already" in raw(rig.server, Introduction("one more"))[1].text
+    time.sleep(2 * SOON)
+    assert raw(rig.server, Introduction("one more"))[1].kind == MessageKind.DECLARE
+    dead[0].settimeout(2.0)
+    assert b"others have come, and this one was silent" in dead[0].recv(65536)
+    rig.server.close()
+
+
+def test_connections_that_never_declare_make_room(impatient):
+    rig = Run()
+    address = ("127.0.0.1", rig.server.port)
+    mute = [socket.create_connection(address, timeout=2.0) for _ in range(16)]
+    time.sleep(2 * SOON)
+    own = socket.create_connection(address, timeout=2.0)
+    own.sendall(framed(encoded(Message(MessageKind.DECLARE, text=as_text(STREAM)))))
+    assert own.recv(100)[6] == MessageKind.DECLARE
+    for each in (*mute, own):
+        each.close()
+    rig.server.close()
+
+
+def test_who_comes_back_from_silence_does_not_speak_for_the_one_who_took_its_place(impatient):
+    rig = Run()
+    first, _ = raw(rig.server, STREAM)
+    assert "'stream' is there already" in raw(rig.server, STREAM)[1].text
+    time.sleep(2 * SOON)
+    second, reply = raw(rig.server, STREAM)
+    assert reply.kind == MessageKind.DECLARE
+    assert b"another 'stream' has come" in first.recv(65536)
+    rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
+    first.send(encoded(Message(MessageKind.OBTAIN, 6, 0, np.array([0.7]))))
+    second.send(encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.2]))))
+    until(lambda: rig.place.answer(10) is not None and rig.server.dropped == 1)
+    newest = rig.place.answer(10)
+    assert newest is not None
+    assert newest.values.tolist() == [0.2]
+    rig.server.close()
+
+
+def test_one_who_declares_under_another_name_leaves_its_first_place():
+    places = [RemoteClient(name, Declaration([DELTA])) for name in ("left", "right")]
+    controller = Controller(slide(), lambda t, values: {}, clients=places)
+    with controller.serve() as server:
+        own, _ = raw(server, Introduction("left", sends=Declaration([DELTA])))
+        again = Introduction("right", sends=Declaration([DELTA]))
+        own.send(encoded(Message(MessageKind.DECLARE, text=as_text(again))))
+        until(lambda: places[1].connected)
+        assert not places[0].connected
+
+
+def test_a_declaration_once_more_forgets_no_answer():
+    rig = Run()
+    own, _ = raw(rig.server, STREAM)
+    rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
+    own.send(encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5]))))
+    until(lambda: rig.place.answer(10) is not None)
+    own.recv(65536)
+    own.send(encoded(Message(MessageKind.DECLARE, text=as_text(STREAM))))
+    own.recv(65536)
+    assert rig.place.answer(10) is not None
+    own.send(encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.9]))))  # the same sample, once more
+    until(lambda: rig.place.dropped == 1)
+    rig.server.close()
+
+
+def test_a_place_that_is_made_while_it_serves_is_one():
+    controller = Controller(slide(), lambda t, values: {})
+    with controller.serve() as server:
+        controller.attach(RemoteClient("stream", Declaration([DELTA])))
+        assert raw(server, STREAM)[1].kind == MessageKind.DECLARE
+
+
+def test_a_port_that_is_refused_stays_closed():
+    before = threading.active_count()
+    controller = Controller(slide(), lambda t, values: {})
+    with controller.serve(), pytest.raises(ModelError, match="found a client named 'server', expected none"):
+        controller.serve()
+    controller.run(0.04)
+    with pytest.raises(ModelError, match="found a controller that has run, expected it before; serve first"):
+        controller.serve()
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("token", ["", " ", "two\tparts", "line\n", "schlüssel", "\udc80", 5, b"bytes"])
+def test_tokens_that_do_not_travel_are_refused(token):
+    with pytest.raises(
+        ModelError, match="serve: found a token with spaces, signs that are not ASCII, or nothing"
+    ):
+        Controller(slide(), lambda t, values: {}).serve(token=token)
+
+
+@pytest.mark.parametrize("name", ["two\tparts", "line\n", "\x1b[31m", "a\u2028b", "\udc80", ""])
+def test_names_that_are_no_line_are_refused_before_they_are_sent(name):
+    if name:
+        with pytest.raises(
+            ModelError, match=r"declaration: found the name .*, expected a text that can be printed"
+        ):
+            as_text(Introduction(name))
+    else:
+        assert as_text(Introduction(name)) == "name\t\ntoken\t\n"
+
+
+def test_refusals_of_long_names_arrive():
+    with Controller(slide(), lambda t, values: {}).serve() as server:
+        reply = raw(server, Introduction("x" * 16_000, sends=Declaration([DELTA])))[1]
+        assert reply.kind == MessageKind.BYE
+        assert reply.text.startswith("there is no place for 'xxx")
+
+
+def test_more_names_than_a_message_holds_are_told_at_once():
+    many = [
+        Channel(f"robot.arms[{k}].joint.of_the_plate.frame_b.force_as_measured.of_{k}", "N")
+        for k in range(250)
+    ]
+    plant = PythonComponent(
+        lambda t, values: {c.name: 0.0 for c in many}, inputs=[Q_REF], outputs=many, sampled=False
+    )
+    with pytest.raises(ModelError, match=r"found \d+ bytes of names and units, expected 16384 at most"):
+        Controller(plant, lambda t, values: {}).serve()
