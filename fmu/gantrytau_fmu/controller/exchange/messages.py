@@ -154,7 +154,7 @@ def from_text(text: str) -> Introduction:
     """What a declaration says. WrongMessage for what says nothing of the kind."""
     said: dict[str, str] = {}
     channels: dict[str, list[Channel]] = {"sends": [], "parameter": []}
-    for line in text.removesuffix("\n").split("\n"):
+    for line in text.removesuffix("\n").split("\n") if text else ():
         role, *rest = line.split("\t")
         if role in ("name", "token") and len(rest) == 1 and role not in said:
             said[role] = rest[0]
