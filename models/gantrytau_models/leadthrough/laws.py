@@ -5,6 +5,8 @@ Forces and torques are those of the tool on the workpiece, in axes of the tool, 
 so a positive gain is stable. The thesis prints neither signs nor gains.
 """
 
+import math
+
 import casadi as ca
 
 from gantrytau import (
@@ -122,7 +124,11 @@ class NormalEstimate(Model):
     """
 
     gate = Parameter(
-        0.1745329251994330, unit="rad", min=0.0, description="angle within which it is believed, phi_L"
+        0.1745329251994330,
+        unit="rad",
+        min=0.0,
+        max=math.pi,
+        description="angle within which it is believed, phi_L",
     )
     nominal = Parameter([0.0, 0.0, 1.0], unit="1", description="nominal normal, n_n, of length one")
     least = Parameter(0.05, unit="N", min=0.0, description="force below which there is no estimate")

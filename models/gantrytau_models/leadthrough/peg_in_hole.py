@@ -52,7 +52,7 @@ class PegInHole(Model):
             raise ModelError(
                 f"PegInHole: found match={match!r}, expected a record such as Match(clearance=2e-4)"
             )
-        if not (isinstance(tilt, int | float) and abs(tilt) <= STEEPEST):
+        if not (isinstance(tilt, int | float | np.number) and abs(tilt) <= STEEPEST):
             raise ModelError(
                 f"PegInHole: found tilt={tilt!r}, expected at most {STEEPEST:.2f} rad either way; is it in degrees?"
             )

@@ -21,6 +21,7 @@ from gantrytau.flattening.flatten import flatten
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SLOWEST = 1e-9  # of the sampling frequency: a critical gain below it drowns in rounding
 HALF = 0.5  # of the sampling frequency, above which nothing is said
 
 
@@ -34,7 +35,8 @@ class ContactLoop:
     delay: computing delay, s, shorter or longer than the period; mode, damping: Hz and damping ratio of a structure between
     servo and surface, if there is one.
 
-    Raises ModelError for a period or gain that is not positive, and for negative delays and time constants.
+    Raises ModelError for what is no number, a period or mode that is not above zero, a negative gain, delay, damping or
+    time constant, and for a mode so slow that rounding hides where the loop begins to swing.
     """
 
     gain: float
@@ -45,13 +47,13 @@ class ContactLoop:
     damping: float = 0.02
 
     def __post_init__(self):
-        for name, least in (("gain", 0.0), ("period", 0.0)):
+        for name in ("period",) if self.mode is None else ("period", "mode"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > least):
+            if not (_is_number(value) and value > 0):
                 raise ModelError(f"ContactLoop: found {name}={value!r}, expected a positive number")
-        for name in ("T_v", "delay", "damping"):
+        for name in ("gain", "T_v", "delay", "damping"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
+            if not (_is_number(value) and value >= 0):
                 raise ModelError(f"ContactLoop: found {name}={value!r}, expected a number of at least zero")
 
     @cached_property
@@ -110,6 +112,11 @@ class ContactLoop:
         for _ in range(80):
             middle = (low + high) / 2
             low, high = (middle, high) if largest(middle) < 1 else (low, middle)
+        if high * self.period < SLOWEST:
+            raise ModelError(
+                f"ContactLoop: found mode={self.mode!r} for a period of {self.period:g} s, expected a mode that moves "
+                "within some thousand periods; take a longer period, or no mode"
+            )
         poles = np.linalg.eigvals(A - high * B @ C)
         angle = abs(np.angle(poles[np.argmax(np.abs(poles))]))
         return high, float(angle / (2 * np.pi * self.period))
@@ -168,6 +175,10 @@ class ContactLoop:
         if file is not None:
             figure.savefig(file)
         return figure
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and math.isfinite(value)
 
 
 def contact_loop(model: Model) -> ContactLoop:

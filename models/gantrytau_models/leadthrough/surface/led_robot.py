@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Fixed, Parameter, Real, connect, der, dot
+from gantrytau import Fixed, ModelError, Parameter, Real, connect, der, dot
 from gantrytau.mechanics.multibody import WorldForce
 from gantrytau_models.leadthrough.servo_and_sensors import LedArm
 from gantrytau_models.mechanisms.flexible import unstretched
@@ -21,7 +21,7 @@ class LedRobot(LedArm):
 
     prototype: as `prototypes.L1`; place: of the tool where r is zero, (3,) in m, in the world. The servos are as stiff as
     those of a velocity-controlled robot: no force pushes them back, and `drives` are the forces that this takes,
-    those of the tool on the surface included. Raises ModelError for a place that the links do not reach.
+    those of the tool on the surface included. Raises ModelError for a place that is none, or that the links do not reach.
     """
 
     T_v = Parameter(2.303e-3, unit="s", min=0.0, description="time constant of the carts' speeds")
@@ -39,6 +39,9 @@ class LedRobot(LedArm):
         start: Sequence[float] = (0.0, 0.0, -0.03),
         **modifications: Any,
     ):
+        for name, vector in (("place", place), ("start", start)):
+            if np.shape(vector) != (3,):
+                raise ModelError(f"LedRobot: found {name}={vector!r}, expected x, y and z in m")
         tool = np.asarray(place, dtype=float) + np.array(DOWN) @ np.asarray(start, dtype=float)
         unstretched(prototype, tool)  # refuses what is out of reach
         robot = dict(GantryTau(prototype).modifications)

@@ -8,7 +8,6 @@ import casadi as ca
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
-EYE = 5  # samples, 20 ms, in which the eye sees once
 DELAY = 10  # looks, 0.2 s, between what is seen and what is done about it
 
 
@@ -22,6 +21,7 @@ class Operator(Model):
     """
 
     period = Parameter(0.004, unit="s", min=0.0, description="between two decisions")
+    look = Parameter(0.02, unit="s", min=0.0, description="between two looks of the eye")
     speed = Parameter(unit="m/s", min=0.0, description="speed to and fro along x")
     stroke_time = Parameter(unit="s", min=0.0, description="time of one way")
     approach = Parameter(unit="m/s", min=0.0, description="largest speed to and from the surface")
@@ -73,9 +73,9 @@ class Operator(Model):
         keep = ca.exp(-period / self.misjudgement_time)
         judged = keep * self.judged + self.misjudgement * ca.sqrt(1 - keep**2) * self.white
         yield sampled(self.judged, judged, period=period)
-        yield sampled(self.seen[0], self.height, period=EYE * period)
+        yield sampled(self.seen[0], self.height, period=self.look)
         for k in range(1, DELAY):
-            yield sampled(self.seen[k], self.seen[k - 1], period=EYE * period)
+            yield sampled(self.seen[k], self.seen[k - 1], period=self.look)
         # z points into the surface
         down = self.eye_gain * (self.seen[DELAY - 1] + self.judged + self.depth * self._spread(1))
         down = ca.fmax(-self.approach, ca.fmin(down, self.approach))

@@ -1,11 +1,13 @@
 """A tool that is led along a surface, section 8.4 of Dressler (2012)."""
 
+import math
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, white_noise
+from gantrytau import Input, Model, ModelError, Output, Parameter, Real, require, white_noise
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.language.model import merge
 from gantrytau_models.leadthrough.assumed import operators
@@ -17,6 +19,7 @@ from gantrytau_models.leadthrough.surface.operator import Operator
 
 SLOW = 1e-3  # m/s, below which rolling resistance fades
 LONG = 1e6  # s: noise of this period is one number for a run
+STEEPEST = math.radians(30.0)  # of a face that is nearly flat; a tilt in degrees is beyond it
 START = -0.03  # m, of the tool before the surface
 
 
@@ -27,7 +30,9 @@ class Surface(Model):
     """
 
     stiffness = Parameter(unit="N/m", min=0.0, description="stiffness against the tool")
-    tilt = Parameter(0.0, unit="rad", description="angle against the x axis of the tool")
+    tilt = Parameter(
+        0.0, unit="rad", min=-STEEPEST, max=STEEPEST, description="angle against the x axis of the tool"
+    )
     ripple = Parameter(0.0, unit="m", min=0.0, description="amplitude of its ripple")
     ripple_length = Parameter(0.03, unit="m", min=0.0, description="length of a ripple along x")
     rolling = Parameter(0.0, unit="1", min=0.0, description="rolling resistance over normal force")
@@ -42,6 +47,11 @@ class Surface(Model):
         wave = 2 * ca.pi / self.ripple_length
         slope = ca.tan(self.tilt)
         z = slope * self.r[0] + self.ripple * ca.sin(wave * self.r[0])
+        yield require(self.ripple_length > 0, "expected ripples longer than nothing")
+        yield require(
+            self.ripple * wave <= math.tan(STEEPEST),
+            "expected flat ripples, 30 degrees at most; are they in m?",
+        )
         rise = slope + self.ripple * wave * ca.cos(wave * self.r[0])
         yield self.height == z - self.r[2]
         yield self.n == ca.vertcat(-rise, 0, 1) / ca.sqrt(1 + rise**2)
@@ -75,7 +85,7 @@ class ToolOnSurface(Model):
         *,
         pressing: bool = True,
         operator: OperatorRecord = operators.SKILLED,
-        arm: LedArm | None = None,
+        arm: LedArm | Mapping[str, Any] | None = None,
         **modifications: Any,
     ):
         if not isinstance(surface, SurfaceRecord):
@@ -84,8 +94,9 @@ class ToolOnSurface(Model):
             )
         face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
         hand = Operator(operator, pressing=pressing).modifications
-        rigid = VelocityServo(r=dict(start=[0.0, 0.0, START]))
-        super().__init__(dict(face=face, hand=dict(hand), arm=arm or rigid), **modifications)
+        if not isinstance(arm, LedArm):
+            arm = VelocityServo(dict(r=dict(start=[0.0, 0.0, START])), **(arm or {}))
+        super().__init__(dict(face=face, hand=dict(hand), arm=arm), **modifications)
 
     def equations(self):
         arm, face = self.arm, self.face
@@ -117,9 +128,10 @@ class SurfaceTracking(ToolOnSurface):
     """A tool that is led along a surface and holds 2 N there by itself.
 
     surface: as `surfaces.METAL`; tool_control=False leaves the contact to the hand; operator: as `operators.SKILLED`; arm: a
-    rigid one that follows velocities unless given, as `LedRobot(prototypes.L1)`. Axes are those of the tool, z into the
-    surface. What is random comes from outside: `inputs=surface_disturbances()`. Warns of a
-    gain beyond the critical one (`CriticalGain`). Raises ModelError for what is no such record.
+    `VelocityServo`, of which dict(T_v=0.001) changes the lag, unless another is given, as `LedRobot(prototypes.L1)` or a
+    `LedArm` of yours. Axes are those of the tool, z into the surface. What is random comes from outside:
+    `inputs=surface_disturbances()`. Warns of a gain beyond the critical one (`CriticalGain`), where the arm has the lag of a
+    servo. Raises ModelError for what is no such record.
     """
 
     control = LeadThrough(period=ToolOnSurface.period)
@@ -134,7 +146,9 @@ class SurfaceTracking(ToolOnSurface):
     ):
         control = merge(dict(tool_control=tool_control), modifications.pop("control", {}))
         super().__init__(surface, pressing=tool_control, operator=operator, control=control, **modifications)
-        if tool_control and (loop := contact_loop(self)).share >= 1:
+        # an arm that is no servo with a lag of first order has another loop
+        lagging = not isinstance(arm := modifications.get("arm"), LedArm) or hasattr(arm, "T_v")
+        if tool_control and lagging and (loop := contact_loop(self)).share >= 1:
             warnings.warn(
                 f"SurfaceTracking: the tool will hop on the surface: {loop}; a smaller control.tool.K or a softer "
                 "surface holds it",

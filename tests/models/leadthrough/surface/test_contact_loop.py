@@ -5,9 +5,10 @@ import warnings
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import ModelError, der, simulate
 from gantrytau_models import Pendulum
 from gantrytau_models.leadthrough.assumed import surfaces
+from gantrytau_models.leadthrough.servo_and_sensors import LedArm
 from gantrytau_models.leadthrough.surface.contact_loop import ContactLoop, CriticalGain, contact_loop
 from gantrytau_models.leadthrough.surface.surface_tracking import SurfaceTracking
 
@@ -95,11 +96,46 @@ def test_the_curve_passes_as_near_to_the_critical_point_as_the_margin_says():
 
 @pytest.mark.parametrize(
     "wrong",
-    [dict(gain=0.0), dict(gain=-1.0), dict(gain=np.nan), dict(gain=1.0, T_v=-1.0), dict(gain=1.0, period=0)],
+    [
+        dict(gain=-1.0),
+        dict(gain=np.nan),
+        dict(gain="600"),
+        dict(gain=np.array([1.0, 2.0])),
+        dict(gain=1.0, T_v=-1.0),
+        dict(gain=1.0, period=0),
+        *(dict(gain=1.0, mode=mode) for mode in (0.0, -70.0, np.nan, np.inf)),
+        dict(gain=1.0, mode=1e-9),  # its critical gain drowns in rounding
+    ],
 )
 def test_wrong_loops_are_refused(wrong):
     with pytest.raises(ModelError, match="ContactLoop: found"):
-        ContactLoop(**wrong)
+        ContactLoop(**wrong).critical_gain  # noqa: B018
+
+
+@pytest.mark.parametrize("mode", [1e-3, 1.0])
+def test_a_slow_structure_bears_twice_its_damping_times_its_frequency(mode):
+    # far below the sampling frequency the loop is s (s^2 + 2 d w s + w^2) + g w^2, and Routh says g < 2 d w
+    assert ContactLoop(1.0, T_v=0.0, mode=mode, damping=0.02).critical_gain == pytest.approx(
+        2 * 0.02 * 2 * np.pi * mode, rel=1e-2
+    )
+
+
+def test_no_gain_is_no_share_of_the_critical_one():
+    assert ContactLoop(0.0).share == 0
+    SurfaceTracking(surfaces.METAL, control=dict(tool=dict(K=[0.0] * 3)))
+
+
+def test_other_servos_are_arguments_and_arms_without_a_lag_have_no_such_loop():
+    with pytest.warns(CriticalGain, match="114 % of the critical 576"):
+        SurfaceTracking(surfaces.METAL, arm=dict(T_v=5e-3))
+
+    class Ideal(LedArm):
+        def equations(self):
+            yield self.v == self.v_ref
+            yield der(self.r) == self.v
+
+    led = SurfaceTracking(surfaces.CARDBOARD, arm=Ideal(r=dict(start=[0.0, 0.0, -0.03])))
+    assert simulate(led, stop=4.0).final("f_n") == pytest.approx(2.0, abs=0.1)
 
 
 def test_another_model_has_no_such_loop():

@@ -164,6 +164,36 @@ def test_the_critical_gain_divides_quiet_from_hopping(share, least, most):
     assert least <= np.abs(settled).max() < most
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (dict(face=dict(tilt=np.pi / 2)), r"face\.tilt: value is 1\.5708, expected at most 0\.523"),
+        (dict(face=dict(tilt=np.pi)), r"face\.tilt"),
+        (dict(face=dict(tilt=-np.pi / 2)), r"face\.tilt: .* expected at least -0\.523"),
+        (dict(face=dict(ripple=0.2)), r"expected flat ripples, 30 degrees at most; are they in m\?"),
+        (dict(face=dict(ripple_length=0.0)), "expected ripples longer than nothing"),
+        (
+            dict(control=dict(normal=dict(gate=10.0))),
+            r"control\.normal\.gate: value is 10, expected at most 3\.14",
+        ),
+    ],
+)
+def test_angles_in_degrees_and_lengths_in_millimetres_are_refused(wrong, words):
+    with pytest.raises(ModelError, match=words):
+        simulate(SurfaceTracking(surfaces.CARDBOARD, **wrong), stop=0.1)
+
+
+@pytest.mark.parametrize("period", [0.002, 0.004, 0.005])
+def test_the_eye_is_as_late_whatever_the_period(period):
+    led = SurfaceTracking(surfaces.CARDBOARD, period=period)
+    run = simulate(led, stop=1.0, points=1001, outputs=["hand.seen", "hand.height"])
+    looks = np.arange(20, 49) * 0.02  # s; what is ten looks old is seen until the next one
+    seen = run["hand.seen"][np.searchsorted(run.time, looks + 0.01), 9]
+    height = np.interp(looks - 0.18, run.time, run["hand.height"])
+    assert np.ptp(height) > 1e-3
+    assert np.allclose(seen, height, atol=1e-6)
+
+
 def test_wrong_records_are_refused():
     with pytest.raises(
         ModelError, match=r"SurfaceTracking: found str, expected a record such as surfaces.METAL"
