@@ -31,7 +31,7 @@ class Channel:
 
     def __post_init__(self):
         if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
-            raise ModelError(f"channel: found the name {self.name!r}, expected a text that is not empty")
+            raise ModelError(f"channel: found the name {self.name!r}, expected a text that can be printed")
         if not isinstance(self.unit, str):
             raise ModelError(f"{self.name}: found unit={self.unit!r}, expected a text, as 'm/s', or '1'")
         dimension(self.unit)  # raises for a text that is no unit

@@ -69,7 +69,7 @@ def read_controller(file: Path, clock: str | None = None) -> "Controller":
     if clock is not None:
         keywords["clock"] = clock
     references = table.get("references", {})
-    keywords["references"] = dict(signal(f"{name}={value}") for name, value in references.items())
+    keywords["references"] = dict(_reference(file, name, value) for name, value in references.items())
     keywords |= {key: table[key] for key in ("wires", "starts") if table.get(key)}
     with refusing(f"{file}: "):
         keywords["limits"], keywords["parameters"] = _limits(file, table), _parameters(file, table)
@@ -82,6 +82,14 @@ def read_controller(file: Path, clock: str | None = None) -> "Controller":
         for k, event in enumerate(table.get("event", [])):
             _plan(controller, f"{file}: event[{k}]", event)
     return controller
+
+
+def _reference(file: Path, name: str, value: Any) -> tuple[str, Any]:
+    """A reference by its name; CommandError in the words of the file."""
+    try:
+        return signal(f"{name}={value}")
+    except CommandError as error:
+        raise CommandError(f"{file}: {str(error).replace('--input', 'references:', 1)}") from None
 
 
 def _check(file: Path, table: Mapping[str, Any]) -> None:
@@ -123,9 +131,15 @@ def _client(file: Path, text: Any) -> Any:
     if not isinstance(text, str):
         raise CommandError(f"{file}: clients: found {text!r}, expected names in quotes, as cell.py:probe")
     found = _named(file, text)
-    return (
-        found() if callable(found) and (isinstance(found, type) or not isinstance(found, Client)) else found
-    )
+    if not callable(found) or (isinstance(found, Client) and not isinstance(found, type)):
+        return found
+    try:
+        return found()
+    except TypeError as error:
+        raise CommandError(
+            f"{file}: clients: found {text}, which cannot be called without arguments ({error}), expected a client, or a "
+            "function that makes one"
+        ) from error
 
 
 def _place(file: Path, name: str, sends: Any) -> Any:

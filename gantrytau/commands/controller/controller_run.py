@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 LINES = ".jsonl"
 SPELLING = Spelling(
-    ("controller",), {"stop": "--stop", "clock": "--clock", "log": "--output", "port": "--port"}
+    ("controller",),
+    {"stop": "--stop", "clock": "--clock", "log": "--output", "port": "--port", "timeout": "--wait"},
 )
 
 

@@ -165,6 +165,13 @@ WRONG = [
     ("clients", "client", "cell.toml: there is no key 'client'; did you mean 'clients'?"),
     ('["cell.py:probe"]', "[3]", "cell.toml: clients: found 3, expected names in quotes"),
     ('["cell.py:probe"]', '["cell.py:three"]', "cell.toml: clients: found 3, expected name, sends, submit"),
+    (
+        '["cell.py:probe"]',
+        '["cell.py:law"]',
+        "cell.toml: clients: found cell.py:law, which cannot be called without arguments",
+    ),
+    ("q_ref = 0.1", 'q_ref = "much"', "cell.toml: references: q_ref=much: expected a number as 2.5"),
+    ("q_ref = 0.1", "q_ref = nan", "cell.toml: references: q_ref=nan: expected a number as 2.5"),
     ('["cell.py:probe"]', '"cell.py:probe"', "cell.toml: found clients = 'cell.py:probe', expected a list"),
     ("[limits.q_ref]", "[limits.q]", "cell.toml: limits: the plant has no input 'q'"),
     (

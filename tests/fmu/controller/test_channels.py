@@ -62,8 +62,8 @@ def test_nothing_is_a_declaration_too():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Channel("", "m"), "channel: found the name '', expected a text that is not empty"),
-        (lambda: Channel("q\n", "m"), "expected a text that is not empty"),
+        (lambda: Channel("", "m"), "channel: found the name '', expected a text that can be printed"),
+        (lambda: Channel("q\n", "m"), "expected a text that can be printed"),
         (lambda: Channel("q", "metre"), "metre"),
         (lambda: Channel("q", NOTHING), "q: found unit=None, expected a text, as 'm/s', or '1'"),
         (lambda: Channel("q", "m", 0), "q: found size=0, expected a whole number of at least 1"),

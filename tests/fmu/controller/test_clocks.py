@@ -138,7 +138,7 @@ REFUSED = [
     (lambda c: c.attach(3), "clients: found 3, expected name, sends, submit, answer, settled and close"),
     (
         lambda c: c.attach(InProcess("q\n")),
-        "channel: found the name 'q\\n', expected a text that is not empty",
+        "channel: found the name 'q\\n', expected a text that can be printed",
     ),
     (lambda c: c.set("f_activte", 1.0), "set: there is no parameter 'f_activte'; did you mean 'f_activate'?"),
     (lambda c: c.set("f_activate", 1.5), "set: found f_activate = 1.5 1, expected a number in [0, 1]"),

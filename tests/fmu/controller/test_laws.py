@@ -152,6 +152,10 @@ WRONG = [
         "the function <lambda> answered 1.0, expected {name: value} of references",
     ),
     (lambda t, v: {"q_ref": [1.0, 2.0]}, SolveError, "answered q_ref = [1.0, 2.0], expected numbers, 1"),
+    (lambda t, v: {"q_ref": None}, SolveError, "answered q_ref = None, expected numbers, 1"),
+    (lambda t, v: {"q_ref": "0.5"}, SolveError, "answered q_ref = '0.5', expected numbers, 1"),
+    (lambda t, v: {"q_ref": [None]}, SolveError, "answered q_ref = [None], expected numbers, 1"),
+    (lambda t, v: {"q_ref": 1j}, SolveError, "answered q_ref = 1j, expected numbers, 1"),
     (
         lambda t, v: {"q_ref": v["qq"]},
         SolveError,

@@ -68,10 +68,10 @@ def opened(address: tuple[str, int], transport: str, patience: float) -> ClientS
         else:
             own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             own.connect((host, port))
-    except OSError as error:
+    except (OSError, OverflowError, UnicodeError) as error:  # nobody, or no port, or no host
+        reason = getattr(error, "strerror", None) or error
         raise ModelError(
-            f"{host}:{port}: found nobody there ({error.strerror or error}), expected a controller; start it first, or name "
-            "its port"
+            f"{host}:{port}: found nobody there ({reason}), expected a controller; start it first, or name its port"
         ) from None
     own.settimeout(LOOK)
     return ClientSocket(own, Frames() if transport == "tcp" else None)

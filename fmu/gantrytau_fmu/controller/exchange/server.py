@@ -164,6 +164,10 @@ class Server:
                 raise ModelError(
                     f"wait: there is no place for '{name}', expected one of {', '.join(self.places) or 'none'}"
                 )
+        if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
+            raise ModelError(
+                f"wait: found timeout={timeout!r}, expected a time in s, 0 or more", argument="timeout"
+            )
         pause, end = threading.Event(), time.monotonic() + timeout
         while missing := [name for name in wanted if not self.places[name].connected]:
             if time.monotonic() > end:
@@ -358,12 +362,13 @@ def _sockets(host: str, port: int) -> tuple[socket.socket, socket.socket]:
         listener.bind((host, port))
         listener.listen(PEERS)
         datagrams.bind((host, listener.getsockname()[1]))
-    except OSError as error:
+    except (OSError, UnicodeError, TypeError) as error:
         listener.close()
         datagrams.close()
+        reason = getattr(error, "strerror", None) or error
         raise ModelError(
-            f"serve: {host}:{port} cannot be opened ({error.strerror or error}), expected a free port of this machine; take "
-            "another one, or 0 for any",
+            f"serve: {host}:{port} cannot be opened ({reason}), expected a free port of this machine; take another one, or "
+            "0 for any",
             argument="port",
         ) from None
     for own in (listener, datagrams):

@@ -82,7 +82,10 @@ class FunctionLaw:
                 words = did_you_mean(str(name), self._references.names)
                 raise self._failure(f"answered '{name}', which is no reference{words}", time)
             try:
-                wanted[place] = np.asarray(value, dtype=float).reshape(place.stop - place.start)
+                numbers = np.asarray(value)
+                if numbers.dtype.kind not in "biuf":  # None and texts are no numbers
+                    raise TypeError
+                wanted[place] = numbers.reshape(place.stop - place.start)
             except (TypeError, ValueError):
                 count = place.stop - place.start
                 raise self._failure(f"answered {name} = {value!r}, expected numbers, {count}", time) from None
