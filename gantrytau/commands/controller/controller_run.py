@@ -52,7 +52,10 @@ def run(
         ),
     ] = None,
     wait: Annotated[
-        float, typer.Option(help="Time in s to wait for the clients that have places in the file.")
+        float,
+        typer.Option(
+            help="Time in s in which clients with places in the file have to come; 0: they may come later."
+        ),
     ] = 30.0,
     example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
     json: Json = False,
@@ -101,7 +104,8 @@ def _served(controller: "Controller", port: int | None, wait: float) -> Iterator
         typer.echo(
             f"Serving at {server.host}:{server.port}; to set something: --token {server.token}", err=True
         )
-        server.wait(timeout=wait)
+        if wait:
+            server.wait(timeout=wait)
         yield
 
 

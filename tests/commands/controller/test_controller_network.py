@@ -114,6 +114,12 @@ def test_what_is_wrong_is_told_in_options(cell):
         assert words in " ".join(answer.output.split()), answer.output
 
 
+def test_without_waiting_it_runs_at_once(cell):
+    answer = asked("run", cell / "cell.toml", "--stop", 0.1, "--port", 0, "--wait", 0)
+    assert answer.exit_code == 0, answer.output
+    assert "26 samples of 0.004 s" in answer.output
+
+
 @pytest.mark.parametrize(
     ("places", "words"),
     [

@@ -8,7 +8,7 @@ from typing import Protocol
 from gantrytau.errors import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Sample
-from gantrytau_fmu.controller.exchange.messages import NUMBERS, Message, MessageKind
+from gantrytau_fmu.controller.exchange.messages import NUMBERS, SEQUENCES, Message, MessageKind
 
 KEPT = 4  # answers: those that may be asked for
 SILENCE = 1.0  # s without a message, after which a virtual clock does not wait any more
@@ -69,12 +69,13 @@ class RemoteClient:
         """A message of its peer; what is no newer answer to a sample that it was given is dropped."""
         with self._lock:
             self._heard = time.monotonic()
-            answers = self._newest < message.sequence <= self._given
-            if not answers or self.sends.refusal(message.values):
+            # counts of a message begin anew after 2^32 samples: it answers the last one given that has its count
+            k = message.sequence + (self._given - message.sequence) // SEQUENCES * SEQUENCES
+            if k <= self._newest or self.sends.refusal(message.values):
                 self.dropped += 1
                 return
-            self._newest = message.sequence
-            self._answers.append(Sample(message.sequence, message.time, message.values))
+            self._newest = k
+            self._answers.append(Sample(k, message.time, message.values))
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Send sample k, if somebody is there and the line is free."""

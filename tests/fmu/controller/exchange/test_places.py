@@ -118,6 +118,26 @@ def test_a_declaration_once_more_forgets_no_answer():
     rig.server.close()
 
 
+def test_counts_of_messages_begin_anew_after_all_that_they_have():
+    place, turn = RemoteClient("stream", Declaration([DELTA])), 2**32
+    for given, count, taken in (
+        (turn - 1, turn - 1, turn - 1),
+        (turn, turn - 1, None),  # twice
+        (turn, 1, None),  # a sample to come
+        (turn, 0, turn),
+        (turn + 7, 5, turn + 5),
+        (turn + 7, 4, None),  # older
+        (turn + 7, 8, None),  # to come
+    ):
+        place.submit(Sample(given, 0, np.zeros(1)), Declaration())
+        dropped = place.dropped
+        place.heard(Message(MessageKind.OBTAIN, count, 0, np.array([0.1])))
+        newest = place.answer(given + 1)
+        assert newest is not None
+        assert place.dropped - dropped == (taken is None)
+        assert taken is None or newest.k == taken
+
+
 def test_a_place_that_is_made_while_it_serves_is_one():
     controller = Controller(slide(), lambda t, values: {})
     with controller.serve() as server:
