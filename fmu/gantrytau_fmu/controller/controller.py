@@ -205,8 +205,8 @@ class Controller:
 
         `applied.x` is what the plant is given as x; log: a file of JSON, one object a line. Ctrl-C ends it at a sample,
         and the result is what was run until then (`.ended` says so), as it is where a plant ends by itself. Raises
-        ModelError for a second run and a start beyond limits, SolveError with `.result` where the plant or the controller
-        fails, or a client keeps the virtual clock waiting.
+        ModelError for a second run and a start beyond limits, SolveError with `.result` where the plant, the controller or a
+        reference fails, or a client keeps the virtual clock waiting.
         """
         if self._ran:
             raise ModelError(
@@ -248,7 +248,7 @@ class Controller:
                 return "interrupted"
             self.k, t = k, k * self.period
             self._changes.act(k, log)
-            nominal = np.array([drive(t) for drive in drives])
+            nominal = _nominal(drives, t)
             for group, values in zip(_GROUPS, (self._tuned, measured, nominal), strict=True):
                 self._board.put(group, values)
             self._board.values[0] = STATES.index(self._state)
@@ -374,9 +374,20 @@ class Controller:
             try:
                 found += drives_of(channel.name, value, channel.size, (0.0, stop))
             except ModelError as error:
-                words = str(error).removeprefix("inputs ").removeprefix("input ")
-                raise ModelError(f"references {words}", argument="references") from error
+                raise ModelError(_of_references(error), argument="references") from error
         return found
+
+
+def _nominal(drives: Sequence[Drive], t: float) -> Values:
+    """The references at t, s; SolveError where a function of the user has no value there."""
+    try:
+        return np.array([drive(t) for drive in drives])
+    except ModelError as error:
+        raise SolveError(_of_references(error), time=t) from error
+
+
+def _of_references(error: ModelError) -> str:
+    return "references " + str(error).removeprefix("inputs ").removeprefix("input ")
 
 
 _GROUPS = ("the parameters", "the plant", "the references")

@@ -281,6 +281,13 @@ def test_a_plant_that_breaks_is_told_with_its_time():
     assert error.value.result.time.size == 26
 
 
+@pytest.mark.parametrize("value", [lambda t: 1 / (t < 0.1), lambda t: 0.0 if t < 0.1 else math.nan])
+def test_a_reference_that_breaks_leaves_what_was_run(value, plant):
+    with pytest.raises(SolveError, match=r"references q_ref.*t = 0\.1 s") as error:
+        Controller(plant, lambda t, v: {}, references={"q_ref": value}).run(STOP)
+    assert error.value.result.time.size == 25
+
+
 class Tank(Model):
     """x' = u, until it is full."""
 

@@ -14,10 +14,12 @@ from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cel
 from gantrytau_fmu.controller.board import ACTIVATE
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.clients import Sample
+from gantrytau_fmu.controller.exchange.messages import SEQUENCES
 
 TIMES = ("time", "t")
 HEADED = re.compile(r"\s*(.*?)\s*(?:\[([^\[\]]*[a-zA-Z%1][^\[\]]*)\])?\s*$")  # name [unit]; [0] is an index
-SAME = 1e-6  # of a period, by which times may differ
+SAME = 1e-6  # of a period, by which the first two times may differ from it
+SHIFTED = 0.1  # of a period, by which rounding may shift those that follow
 
 
 class _Answering:
@@ -83,8 +85,8 @@ class FileStream(_Answering):
             return np.zeros(self.sends.size)
         if self.row < 0:
             self._times, self._rows = _table(self.path, self.columns)
-            self._first = sample.time
-        self.row += 1
+            self._first, self._timed = sample, False
+        self.row = (sample.k - self._first.k) % SEQUENCES  # so that one that was lost on its way shifts none
         if self.row < len(self._rows):
             self._check_time(sample)
             return self._rows[self.row]
@@ -93,13 +95,23 @@ class FileStream(_Answering):
 
     def _check_time(self, sample: Sample) -> None:
         """One row is one sample, so their times have to go on alike."""
-        if self.row != 1 or not self._times.size:
+        if self._timed or self.row < 1 or not self._times.size:
             return
-        found, expected = self._times[1] - self._times[0], 1e-9 * (sample.time - self._first)
+        self._timed = True
+        expected = 1e-9 * (sample.time - self._first.time) / self.row
+        found = self._times[1] - self._times[0]
         if abs(found - expected) > SAME * expected:
             raise ModelError(
                 f"{self.path}: found rows {found:g} s apart for samples every {expected:g} s, expected one for each sample; "
                 "resample the file"
+            )
+        due = self._times[0] + expected * np.arange(self._times.size)
+        late = np.flatnonzero(np.abs(self._times - due) > SHIFTED * expected)
+        if late.size:
+            row = int(late[0])
+            raise ModelError(
+                f"{self.path}: found row {row + 1} at {self._times[row]:g} s, expected it at {due[row]:g} s, one row for "
+                "each sample; fill in what is missing, or resample the file"
             )
 
 
@@ -138,7 +150,7 @@ def stream_file(
 
     Its columns, `name [unit]` ("1" without a unit), are what it sends; a first column `time` is not sent, and has to go on
     as samples do. The file is opened each time f_activate goes from 0 to 1, and read from its first row; while it is 0,
-    zeros are sent. at_end: "hold" goes on with the last row, "stop" sends nothing more; `.state` says where it is. Raises
+    zeros are sent. A sample that is lost on its way shifts no row. at_end: "hold" goes on with the last row, "stop" sends nothing more; `.state` says where it is. Raises
     ModelError for files that are no table of numbers.
     """
     if at_end not in ("hold", "stop"):
@@ -212,8 +224,12 @@ def _header(path: Path) -> tuple[list[str], list[str]]:
     for k, cell in enumerate(rows[0][1]):
         found = HEADED.match(cell)
         name, unit = (found[1], found[2]) if found else (cell.strip(), None)
-        if k == 0 and name in TIMES:
-            continue
+        if name in TIMES:
+            if k == 0:
+                continue
+            raise ModelError(
+                f"{path}: found '{name}' as column {k + 1}, expected the time as the first one; it is not sent"
+            )
         if _is_number(name):
             raise ModelError(
                 f"{path}: found the number {name} in the first line, expected a header, `name [unit]`"

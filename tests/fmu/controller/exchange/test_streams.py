@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, Result, Samples
-from gantrytau_fmu.controller import Channel, Controller
+from gantrytau_fmu.controller import Channel, Controller, Declaration, Sample
+from gantrytau_fmu.controller.board import ACTIVATE
 from gantrytau_fmu.controller.exchange import FunctionClient, haptic_client, stream_file, stream_sensor
 from tests.fmu.controller.conftest import slide
 
@@ -77,9 +78,38 @@ def test_rows_of_another_period_are_refused_and_the_robot_goes_on(tmp_path):
     assert found.timing.samples == N + 1
 
 
+@pytest.mark.parametrize("row", [2, 4, 7])
+def test_a_row_that_is_missing_is_told_and_not_sent_too_early(tmp_path, row):
+    whole = corrections(tmp_path / "u.csv")
+    lines = whole.read_text().splitlines()
+    whole.write_text("\n".join([*lines[: row + 1], *lines[row + 2 :]]) + "\n")
+    failure = run(stream_file(whole), "stream.dq").timing.clients["stream"].failure
+    if row == 7:  # the last one: nothing comes behind it
+        assert not failure
+    else:
+        assert (
+            f"found row {row + 1} at {(row + 1) * PERIOD:g} s, expected it at {row * PERIOD:g} s" in failure
+        )
+
+
+def test_a_sample_that_is_lost_on_its_way_shifts_no_row(tmp_path):
+    stream = stream_file(corrections(tmp_path / "u.csv"))
+    published = Declaration([ACTIVATE])
+    rows = {}
+    for k in (5, 6, 9, 10, 40):
+        stream.submit(Sample(k, k * 4_000_000, np.ones(1)), published)
+        answer = stream.answer(k + 1)
+        assert answer is not None
+        rows[k] = answer.values[0]
+    table = np.array([float(line.split(",")[1]) for line in stream.path.read_text().splitlines()[1:]])
+    assert [rows[k] for k in (5, 6, 9, 10)] == table[[0, 1, 4, 5]].tolist()
+    assert rows[40] == table[-1]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("dq [m],time [s]\n1,2\n", "found 'time' as column 2, expected the time as the first one"),
         ("", "found 0 lines, expected a header"),
         ("time [s],dq [m]\n", "found 1 lines, expected a header"),
         ("0.0,0.1\n0.004,0.2\n", r"found the number 0\.0 in the first line, expected a header"),
