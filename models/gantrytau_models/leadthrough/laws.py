@@ -52,6 +52,11 @@ class Impedance(Model):
         yield require(
             ca.mmin(self.M) > 0, "expected masses above zero; a small mass follows the hand at once"
         )
+        # a sample late the damping would push beyond rest, z^2 - z + T D / M = 0, and the tool swing between its limits
+        yield require(
+            ca.mmin(self.M - self.period * self.D) > 0,
+            "expected masses above period times damping; take a larger mass, or less damping",
+        )
         yield self.a == (self.f - self.D * self.v_tool) / self.M
         before = self.passed if self.anti_windup else self.v
         yield sampled(self.v, before + self.period * self.a, period=self.period)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Samples, simulate
+from gantrytau import Input, Model, ModelError, Samples, simulate
 from gantrytau_models.leadthrough.laws import (
     ContactState,
     Impedance,
@@ -44,20 +44,30 @@ def test_without_anti_windup_velocity_adds_up():
     assert np.isclose(behind(run, "v[2]", 9), 10 * PERIOD * 1.5, rtol=1e-12)
 
 
-def test_the_hand_moves_the_tool_with_its_damping_alone_in_the_end():
-    class Free(Model):
-        control = LeadThrough()
-        arm = VelocityServo()
+class Free(Model):
+    """A tool that touches nothing, under a steady hand."""
 
-        def equations(self):
-            yield self.control.f_h == [2.0, -1.0, 0.5]
-            yield self.control.f_t == 0
-            yield self.control.t_t == 0
-            yield self.control.v_tool == self.arm.v
-            yield self.arm.v_ref == self.control.v
+    control = LeadThrough()
+    arm = VelocityServo()
 
-    run = after(Free(), 800)
-    assert np.allclose(behind(run, "arm.v", 799), np.array([2.0, -1.0, 0.5]) / 40.0, atol=1e-9)
+    def equations(self):
+        yield self.control.f_h == [2.0, -1.0, 0.5]
+        yield self.control.f_t == 0
+        yield self.control.t_t == 0
+        yield self.control.v_tool == self.arm.v
+        yield self.arm.v_ref == self.control.v
+
+
+@pytest.mark.parametrize("damping", [40.0, 450.0])  # of 500 N s/m, above which a sampled law swings with 2 kg
+def test_the_hand_moves_the_tool_with_its_damping_alone_in_the_end(damping):
+    run = after(Free(control=dict(hand=dict(D=[damping] * 3))), 800)
+    assert np.allclose(behind(run, "arm.v", 799), np.array([2.0, -1.0, 0.5]) / damping, atol=1e-9)
+
+
+@pytest.mark.parametrize("hand", [dict(D=[40.0, 40.0, 500.0]), dict(M=[1e-9] * 3), dict(D=[1e9] * 3)])
+def test_damping_that_a_sampled_law_cannot_hold_is_refused(hand):
+    with pytest.raises(ModelError, match="expected masses above period times damping; take a larger mass"):
+        simulate(Free(control=dict(hand=hand)), stop=0.1)
 
 
 def test_tool_force_is_driven_to_its_reference_along_the_normal():

@@ -150,8 +150,8 @@ def stream_file(
 
     Its columns, `name [unit]` ("1" without a unit), are what it sends; a first column `time` is not sent, and has to go on
     as samples do. The file is opened each time f_activate goes from 0 to 1, and read from its first row; while it is 0,
-    zeros are sent. A sample that is lost on its way shifts no row. at_end: "hold" goes on with the last row, "stop" sends nothing more; `.state` says where it is. Raises
-    ModelError for files that are no table of numbers.
+    zeros are sent. A sample that is lost on its way shifts no row. at_end: "hold" goes on with the last row, "stop"
+    sends nothing more; `.state` says where it is. Raises ModelError for files that are no table of numbers.
     """
     if at_end not in ("hold", "stop"):
         raise ModelError(
