@@ -11,7 +11,7 @@ from gantrytau_fmu.controller.clients import Sample
 from gantrytau_fmu.controller.exchange.messages import NUMBERS, SEQUENCES, Message, MessageKind
 
 KEPT = 4  # answers: those that may be asked for
-SILENCE = 1.0  # s without a message, after which a virtual clock does not wait any more
+SILENCE = 1.0  # s without an answer, after which a virtual clock does not wait any more until there is one
 
 
 class Peer(Protocol):
@@ -39,7 +39,9 @@ class RemoteClient:
         self._lock = Lock()
         self._peer: Peer | None = None
         self._answers = deque[Sample](maxlen=KEPT)
-        self._newest, self._given, self._heard = -1, -1, 0.0
+        self._newest, self._given = -1, -1
+        self._heard = self._asked = 0.0  # s on the monotonic clock
+        self._lost = False  # silent since it was asked
 
     @property
     def peer(self) -> Peer | None:
@@ -56,7 +58,7 @@ class RemoteClient:
         with self._lock:
             if self._peer is peer:
                 return
-            self._peer, self._newest, self._heard = peer, -1, time.monotonic()
+            self._peer, self._newest, self._heard, self._lost = peer, -1, time.monotonic(), False
             self._answers.clear()
 
     def left(self, peer: Peer) -> None:
@@ -68,7 +70,7 @@ class RemoteClient:
     def heard(self, message: Message) -> None:
         """A message of its peer; what is no newer answer to a sample that it was given is dropped."""
         with self._lock:
-            self._heard = time.monotonic()
+            self._heard, self._lost = time.monotonic(), False
             # counts of a message begin anew after 2^32 samples: it answers the last one given that has its count
             k = message.sequence + (self._given - message.sequence) // SEQUENCES * SEQUENCES
             if k <= self._newest or self.sends.refusal(message.values):
@@ -79,7 +81,7 @@ class RemoteClient:
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Send sample k, if somebody is there and the line is free."""
-        peer, self._given = self._peer, sample.k
+        peer, self._given, self._asked = self._peer, sample.k, time.monotonic()
         if peer is not None and not peer.send(
             Message(MessageKind.SUBMIT, sample.k, sample.time, sample.values)
         ):
@@ -91,9 +93,12 @@ class RemoteClient:
             return next((found for found in reversed(self._answers) if found.k <= k - 1), None)
 
     def settled(self, k: int) -> bool:
-        """Whether it has answered sample k, has nothing to answer, or has gone."""
-        silent = time.monotonic() - self._heard > SILENCE
-        return self._peer is None or not self.sends.size or self._newest >= k or silent
+        """Whether it has answered sample k, has nothing to answer, has gone, or is silent since it was asked."""
+        if self._peer is None or not self.sends.size or self._newest >= k or self._lost:
+            return True
+        with self._lock:
+            self._lost = time.monotonic() - max(self._heard, self._asked) > SILENCE
+        return self._lost
 
     def close(self) -> None:
         """Say that the run has ended."""

@@ -20,7 +20,7 @@ from gantrytau_fmu.controller.exchange.messages import (
     framed,
 )
 from tests.fmu.controller.conftest import DELTA, Q_REF, slide
-from tests.fmu.controller.exchange.test_over_the_network import STREAM, Run, raw
+from tests.fmu.controller.exchange.test_over_the_network import STREAM, N, Run, answers, raw
 
 SOON = 0.3  # s, in place of the 3 s after which somebody is absent
 
@@ -47,6 +47,30 @@ def test_clients_stay_while_the_controller_is_idle():
     assert (
         found.timing.clients["stream"].taken > 40
     )  # of 75 samples that were not idle; a wall clock promises nothing
+
+
+def test_who_came_long_before_the_run_is_waited_for_from_the_first_sample_on():
+    def slowly(t, values):
+        time.sleep(0.002)
+        return {"delta": 0.01 * t}
+
+    rig = Run()
+    rig.start(answers(function=slowly))
+    rig.server.wait(timeout=5.0)
+    time.sleep(1.2)  # longer than the silence that holds nobody
+    found = rig.run()
+    assert found.timing.clients["stream"].taken == N
+    assert found.timing.clients["stream"].held == 0
+
+
+def test_who_is_silent_is_waited_for_once():
+    rig = Run()
+    own, _ = raw(rig.server, STREAM)
+    begin = time.monotonic()
+    found = rig.run()
+    assert 1.0 < time.monotonic() - begin < 3.0  # a second in all, not one for each sample
+    assert found.timing.clients["stream"].held == N
+    own.close()
 
 
 def test_those_who_died_lock_nobody_out(impatient):
