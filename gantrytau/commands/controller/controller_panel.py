@@ -1,5 +1,6 @@
 """`gantrytau controller panel`: what a controller that serves publishes, its state switch and parameters."""
 
+import contextlib
 import sys
 import time
 from typing import Annotated
@@ -33,7 +34,7 @@ def panel(
     with reporting(False, None, SPELLING):
         from gantrytau_fmu.controller.panel import PanelLink, WebPanel, terminal_panel
 
-        with PanelLink((host, port), token=token) as link:
+        with contextlib.suppress(KeyboardInterrupt), PanelLink((host, port), token=token) as link:
             if web is None:
                 from rich.console import Console
 

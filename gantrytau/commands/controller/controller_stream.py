@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import CommandError, as_json, reporting
+from gantrytau.commands.printing.reporting import INTERRUPTED, CommandError, as_json, reporting
 from gantrytau.commands.printing.spelling import Spelling
 
 SPELLING = Spelling(("controller",), {"at_end": "--at-end", "transport": "--tcp"})
@@ -48,3 +48,5 @@ def stream(
             typer.echo(
                 f"{attended.answers} answers to {attended.samples} samples; {attended.ended}; {client.state}"
             )
+        if attended.ended == "interrupted":
+            raise typer.Exit(INTERRUPTED)

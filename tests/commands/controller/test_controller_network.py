@@ -2,8 +2,10 @@
 
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 from typing import Any
 
 import pytest
@@ -112,6 +114,30 @@ def test_what_is_wrong_is_told_in_options(cell):
         answer = asked(*arguments)
         assert answer.exit_code != 0
         assert words in " ".join(answer.output.split()), answer.output
+
+
+def test_at_an_interrupt_stream_and_panel_leave_and_say_so(cell):
+    run = started("run", cell / "cell.toml", "--stop", 60, "--port", 0)
+    programs = [run]
+    try:
+        assert run.stderr is not None
+        serving = re.search(r":(\d+);", run.stderr.readline())
+        assert serving is not None
+        stream = started("stream", cell / "u.csv", "--port", serving[1])
+        page = started("panel", "--port", serving[1], "--web", 0)
+        programs += [stream, page]
+        assert page.stdout is not None
+        assert page.stdout.readline().startswith("The panel is at")
+        time.sleep(1.0)
+        for program, code in ((stream, 130), (page, 0)):
+            program.send_signal(signal.SIGINT)
+            told, error = program.communicate(timeout=20)
+            assert program.returncode == code
+            assert not error
+            assert program is not stream or re.match(r"\d+ answers to \d+ samples; interrupted; waits", told)
+    finally:
+        for program in programs:
+            program.kill()
 
 
 def test_without_waiting_it_runs_at_once(cell):

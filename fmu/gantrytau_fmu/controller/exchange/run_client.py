@@ -37,7 +37,7 @@ def run_client(
     duration: float | None = None,
     patience: float = 10.0,
 ) -> Attended:
-    """Let a client take part in the exchange of a controller at (host, port) until the run there ends.
+    """Let a client take part in the exchange of a controller at (host, port) until the run there ends, or at Ctrl-C.
 
     duration: s after which it leaves; patience: s for which the controller may keep silent, at first and later on. Raises
     ModelError where nobody is there, and where the controller refuses this client, in its words.
@@ -46,26 +46,35 @@ def run_client(
         raise ModelError(f"run_client: found transport={transport!r}, expected 'udp' or 'tcp'")
     end = None if duration is None else time.monotonic() + duration
     said, place = Introduction(client.name, token, client.sends), f"{address[0]}:{address[1]}"
-    own = opened(address, transport, patience)
+    own, found = opened(address, transport, patience), Attended()
     try:
-        return _attend(client, own, said, place, end, patience)
+        _attend(client, own, said, place, end, patience, found)
+    except KeyboardInterrupt:
+        found.ended = "interrupted"
     finally:
         own.send(Message(MessageKind.BYE, text="the client ends"))
         own.socket.close()
         client.close()
+    return found
 
 
 def _attend(
-    client: Client, own: ClientSocket, said: Introduction, place: str, end: float | None, patience: float
-) -> Attended:
-    found, declaration = Attended(), None
+    client: Client,
+    own: ClientSocket,
+    said: Introduction,
+    place: str,
+    end: float | None,
+    patience: float,
+    found: Attended,
+) -> None:
+    declaration = None
     heard = time.monotonic()
     own.send(Message(MessageKind.DECLARE, text=as_text(said)))
     while True:
         now = time.monotonic()
         if end is not None and now > end:
             found.ended = "its duration is over"
-            return found
+            return
         if now - heard > patience:
             raise ModelError(
                 f"{said.name}: found nobody who answers at {place} within {patience:g} s, expected a controller; start it "
@@ -82,12 +91,12 @@ def _attend(
                 if declaration is None:
                     raise ModelError(f"{said.name}: the controller at {place} refuses it: {message.text}")
                 found.ended = message.text or "the controller ended"
-                return found
+                return
             elif message.kind == MessageKind.SUBMIT and declaration is not None:
                 _answer(client, own, message, declaration, found)
         if own.ended:
             found.ended = "the connection ended"
-            return found
+            return
 
 
 def _answer(
