@@ -40,7 +40,11 @@ TEXTS = (MessageKind.DECLARE, MessageKind.BYE)
 
 
 class WrongMessage(ValueError):
-    """Bytes that are no message; its text says why."""
+    """Bytes that are no message; its text says why. sequence: of the sample that it answers, where that much is clear."""
+
+    def __init__(self, words: str, sequence: int | None = None):
+        super().__init__(words)
+        self.sequence = sequence
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +85,7 @@ def decoded(data: bytes | memoryview) -> Message:
         raise WrongMessage(f"magic {magic:#06x}, not {MAGIC:#06x}")
     if kind not in MessageKind.__members__.values():
         raise WrongMessage(f"unknown kind {kind}")
-    body = bytes(data[HEADER.size :])
+    body, answered = bytes(data[HEADER.size :]), sequence if kind == MessageKind.OBTAIN else None
     if kind in TEXTS:
         if count or len(body) > TEXT:
             raise WrongMessage(f"a text of {len(body)} bytes and {count} numbers")
@@ -90,10 +94,10 @@ def decoded(data: bytes | memoryview) -> Message:
         except UnicodeDecodeError:
             raise WrongMessage("a text that is none") from None
     if len(body) != 8 * count:
-        raise WrongMessage(f"{len(body)} bytes for {count} numbers")
+        raise WrongMessage(f"{len(body)} bytes for {count} numbers", answered)
     values = np.frombuffer(body, dtype="<f8").astype(np.float64)
     if not np.isfinite(values).all():
-        raise WrongMessage("numbers that are not finite")
+        raise WrongMessage("numbers that are not finite", answered)
     return Message(MessageKind(kind), sequence, time, values)
 
 

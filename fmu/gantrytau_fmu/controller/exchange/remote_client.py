@@ -40,6 +40,7 @@ class RemoteClient:
         self._peer: Peer | None = None
         self._answers = deque[Sample](maxlen=KEPT)
         self._newest, self._given = -1, -1
+        self._answered = -1  # the newest sample that it has done with, also by an answer that was refused
         self._heard = self._asked = 0.0  # s on the monotonic clock
         self._lost = False  # silent since it was asked
 
@@ -58,7 +59,8 @@ class RemoteClient:
         with self._lock:
             if self._peer is peer:
                 return
-            self._peer, self._newest, self._heard, self._lost = peer, -1, time.monotonic(), False
+            self._peer, self._newest, self._answered = peer, -1, -1
+            self._heard, self._lost = time.monotonic(), False
             self._answers.clear()
 
     def left(self, peer: Peer) -> None:
@@ -71,13 +73,24 @@ class RemoteClient:
         """A message of its peer; what is no newer answer to a sample that it was given is dropped."""
         with self._lock:
             self._heard, self._lost = time.monotonic(), False
-            # counts of a message begin anew after 2^32 samples: it answers the last one given that has its count
-            k = message.sequence + (self._given - message.sequence) // SEQUENCES * SEQUENCES
-            if k <= self._newest or self.sends.refusal(message.values):
+            k = self._sample(message.sequence)
+            answers, self._answered = k > self._newest, max(k, self._answered)
+            if not answers or self.sends.refusal(message.values):
                 self.dropped += 1
                 return
             self._newest = k
             self._answers.append(Sample(k, message.time, message.values))
+
+    def drop(self, sequence: int | None) -> None:
+        """A message of its peer was none. sequence: that it answers all the same, so that nobody waits for another one."""
+        with self._lock:
+            self.dropped += 1
+            if sequence is not None:
+                self._answered = max(self._sample(sequence), self._answered)
+
+    def _sample(self, sequence: int) -> int:
+        """The last sample given that has this count, as counts of messages begin anew after 2^32; negative if none has."""
+        return sequence + (self._given - sequence) // SEQUENCES * SEQUENCES
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Send sample k, if somebody is there and the line is free."""
@@ -94,7 +107,7 @@ class RemoteClient:
 
     def settled(self, k: int) -> bool:
         """Whether it has answered sample k, has nothing to answer, has gone, or is silent since it was asked."""
-        if self._peer is None or not self.sends.size or self._newest >= k or self._lost:
+        if self._peer is None or not self.sends.size or self._answered >= k or self._lost:
             return True
         with self._lock:
             self._lost = time.monotonic() - max(self._heard, self._asked) > SILENCE

@@ -2,6 +2,7 @@
 
 import contextlib
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,6 +45,10 @@ def run_client(
     """
     if transport not in ("udp", "tcp"):
         raise ModelError(f"run_client: found transport={transport!r}, expected 'udp' or 'tcp'")
+    if not (isinstance(address, Sequence) and len(address) == 2 and isinstance(address[1], int)):
+        raise ModelError(
+            f"run_client: found address={address!r}, expected (host, port), as ('127.0.0.1', 5000)"
+        )
     end = None if duration is None else time.monotonic() + duration
     said, place = Introduction(client.name, token, client.sends), f"{address[0]}:{address[1]}"
     own, found = opened(address, transport, patience), Attended()

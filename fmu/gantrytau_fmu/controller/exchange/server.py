@@ -233,12 +233,12 @@ class Server:
                 raise WrongMessage("values before a declaration")
             else:
                 self._hear(peer, message)
-        except WrongMessage:
+        except WrongMessage as error:
             place = self._slots.get(peer)
             if place is None:
                 self.dropped += 1
             else:
-                place.dropped += 1
+                place.drop(error.sequence)
 
     def _meet(self, peer: Any, said: Introduction) -> None:
         """Somebody says who he is: he gets his place, or hears why not."""

@@ -275,6 +275,10 @@ def test_nobody_there_is_told():
         run_client(answers(), ("127.0.0.1", port), transport="tcp", patience=0.3)
     with pytest.raises(ModelError, match=r"found nobody who answers .* within 0\.3 s"):
         run_client(answers(), ("127.0.0.1", port), patience=0.3)
+    for address in (5000, ("127.0.0.1", "5000"), "127.0.0.1:5000"):
+        anything: Any = address
+        with pytest.raises(ModelError, match=r"run_client: found address=.*, expected \(host, port\)"):
+            run_client(answers(), anything, patience=0.3)
     wrong: Any = "pigeon"
     with pytest.raises(ModelError, match="found transport='pigeon'"):
         run_client(answers(), ("127.0.0.1", port), transport=wrong)

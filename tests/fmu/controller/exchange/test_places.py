@@ -16,6 +16,7 @@ from gantrytau_fmu.controller.exchange.messages import (
     Message,
     MessageKind,
     as_text,
+    decoded,
     encoded,
     framed,
 )
@@ -61,6 +62,28 @@ def test_who_came_long_before_the_run_is_waited_for_from_the_first_sample_on():
     found = rig.run()
     assert found.timing.clients["stream"].taken == N
     assert found.timing.clients["stream"].held == 0
+
+
+@pytest.mark.parametrize("refused", [[5.0], [np.nan], [0.1, 0.2], []])
+def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused):
+    rig = Run()
+    own, _ = raw(rig.server, STREAM)
+
+    def answer():
+        while (got := decoded(own.recv(65536))).kind == MessageKind.SUBMIT:
+            values = np.array([0.01 * got.sequence] if got.sequence < 20 else refused)
+            own.send(encoded(Message(MessageKind.OBTAIN, got.sequence, got.time, values)))
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    begin = time.monotonic()
+    found = rig.run()
+    thread.join(timeout=5.0)
+    assert time.monotonic() - begin < 0.9  # nobody was waited for
+    counts = found.timing.clients["stream"]
+    assert (counts.taken, counts.held) == (20, N - 20)
+    assert counts.dropped >= N - 20
+    assert np.all(found["stream.delta"][21:] == 0.19)
 
 
 def test_who_is_silent_is_waited_for_once():
