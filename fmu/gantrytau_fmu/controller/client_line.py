@@ -25,7 +25,7 @@ class ClientLine:
         self.values: Values = np.clip(np.zeros(self.sends.size), self.sends.minimum, self.sends.maximum)
         self.taken_k = -1
         self.taken = self.held = self.stale = self.refused = 0
-        self.failure = ""
+        self.failure = self.reason = ""
 
     def submit(self, sample: Sample, declaration: Declaration) -> None:
         """Give it sample k; its own copy of the values."""
@@ -41,8 +41,10 @@ class ClientLine:
         whole = isinstance(found, Sample) and isinstance(found.k, (int, np.integer))
         if found is None or (whole and found.k == self.taken_k):
             self.held += 1
-        elif not whole or found.k > k - 1 or self.sends.refusal(found.values):
-            self.refused += 1
+        elif (
+            words := self._refusal(found, k) if whole else f"found {type(found).__name__}, expected a Sample"
+        ):
+            self.refused, self.reason = self.refused + 1, words
         elif found.k < self.taken_k or found.k < k - 1 - OLDEST:
             self.stale += 1
         else:
@@ -64,7 +66,16 @@ class ClientLine:
     def counts(self) -> ClientCounts:
         """Until now."""
         dropped = getattr(self.client, "dropped", 0)  # of clients behind a wire
-        return ClientCounts(self.taken, self.held, self.stale, self.refused, int(dropped), self.failure)
+        reason = self.reason or str(getattr(self.client, "reason", ""))
+        return ClientCounts(
+            self.taken, self.held, self.stale, self.refused, int(dropped), self.failure, reason
+        )
+
+    def _refusal(self, found: Sample, k: int) -> str:
+        """Why an answer cannot be taken in sample k, "" if it can."""
+        if found.k > k - 1:
+            return f"found an answer to sample {found.k} in sample {k}, expected one to a sample before it"
+        return self.sends.refusal(found.values)
 
     def _ask(self, call: Callable[[], Any]) -> Any:
         if self.failure:

@@ -27,7 +27,8 @@ class Sample:
 class Client(Protocol):
     """One that is given every sample and may answer with values for the controller. No call raises or blocks.
 
-    One behind a wire may have `dropped` besides: how many messages never became answers.
+    One behind a wire may have `dropped` and `reason` besides: how many messages never became answers, and why the last one
+    did not, if for its values.
     """
 
     @property

@@ -16,7 +16,8 @@ PERCENTILES = (50, 99, 100)
 class ClientCounts:
     """Of one client, in samples: answers that were taken; samples with those of before, as nothing new was there (held);
     answers that were too old or older than one taken (stale), or not finite, out of range, of another shape or of a sample
-    to come (refused); messages that never became answers (dropped). failure: why it is not asked any more, "" while it is.
+    to come (refused); messages that never became answers (dropped). failure: why it is not asked any more, "" while it is;
+    reason: why an answer was refused or dropped for its values, the last time, "" if none was.
     """
 
     taken: int = 0
@@ -25,6 +26,7 @@ class ClientCounts:
     refused: int = 0
     dropped: int = 0
     failure: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ class Timing:
         for name, c in self.clients.items():
             lines.append(
                 f"{name}: {c.taken} taken, {c.held} held, {c.stale} stale, {c.refused} refused, {c.dropped} dropped"
+                + (f"; refused last: {c.reason}" if c.reason else "")
                 + (f"; {c.failure}" if c.failure else "")
             )
         return "\n".join(lines)

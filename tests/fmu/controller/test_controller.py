@@ -174,6 +174,8 @@ def test_a_client_that_fails_changes_nothing_but_the_counters(make, lost, counte
     assert counts.taken == N - len(lost)
     assert found.timing.clients["other"].taken == N
     assert bool(counts.failure) == isinstance(client, Dies)
+    assert bool(counts.reason) == (counter == "refused")
+    assert not counts.reason or "expected" in counts.reason
     if counts.failure:
         assert counts.failure == "raised ConnectionError: gone"
 

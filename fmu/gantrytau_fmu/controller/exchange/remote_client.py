@@ -35,7 +35,7 @@ class RemoteClient:
             raise ModelError(
                 f"{name}: found {self.sends.size} numbers, expected {NUMBERS} at most in a message; take two clients"
             )
-        self.dropped = 0
+        self.dropped, self.reason = 0, ""  # why values were dropped, the last time
         self._lock = Lock()
         self._peer: Peer | None = None
         self._answers = deque[Sample](maxlen=KEPT)
@@ -75,18 +75,20 @@ class RemoteClient:
             self._heard, self._lost = time.monotonic(), False
             k = self._sample(message.sequence)
             answers, self._answered = k > self._newest, max(k, self._answered)
-            if not answers or self.sends.refusal(message.values):
+            if refusal := self.sends.refusal(message.values):
+                self.reason = refusal
+            if not answers or refusal:
                 self.dropped += 1
                 return
             self._newest = k
             self._answers.append(Sample(k, message.time, message.values))
 
-    def drop(self, sequence: int | None) -> None:
-        """A message of its peer was none. sequence: that it answers all the same, so that nobody waits for another one."""
+    def drop(self, words: str, sequence: int | None) -> None:
+        """A message of its peer was none, as words say. sequence: that it answers all the same, so that nobody waits on."""
         with self._lock:
             self.dropped += 1
             if sequence is not None:
-                self._answered = max(self._sample(sequence), self._answered)
+                self.reason, self._answered = words, max(self._sample(sequence), self._answered)
 
     def _sample(self, sequence: int) -> int:
         """The last sample given that has this count, as counts of messages begin anew after 2^32; negative if none has."""

@@ -238,7 +238,7 @@ class Server:
             if place is None:
                 self.dropped += 1
             else:
-                place.drop(error.sequence)
+                place.drop(str(error), error.sequence)
 
     def _meet(self, peer: Any, said: Introduction) -> None:
         """Somebody says who he is: he gets his place, or hears why not."""

@@ -64,8 +64,16 @@ def test_who_came_long_before_the_run_is_waited_for_from_the_first_sample_on():
     assert found.timing.clients["stream"].held == 0
 
 
-@pytest.mark.parametrize("refused", [[5.0], [np.nan], [0.1, 0.2], []])
-def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused):
+@pytest.mark.parametrize(
+    ("refused", "words"),
+    [
+        ([5.0], "found delta = 5 m, expected a number in [-1, 1]"),
+        ([np.nan], "numbers that are not finite"),
+        ([0.1, 0.2], "found values of shape (2,), expected (1,)"),
+        ([], "found values of shape (0,), expected (1,)"),
+    ],
+)
+def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused, words):
     rig = Run()
     own, _ = raw(rig.server, STREAM)
 
@@ -84,6 +92,7 @@ def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused):
     assert (counts.taken, counts.held) == (20, N - 20)
     assert counts.dropped >= N - 20
     assert np.all(found["stream.delta"][21:] == 0.19)
+    assert f"refused last: {words}" in str(found.timing)
 
 
 def test_who_is_silent_is_waited_for_once():
