@@ -1,5 +1,7 @@
 """The three-link robot as the arm that is led."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,7 @@ def test_drives_are_those_of_the_robot_with_the_tool_force_on_it(robot):
 def test_a_place_out_of_reach_is_refused():
     with pytest.raises(ModelError, match="reach"):
         LedRobot(prototypes.L1, place=[0.0, 9.0, 0.0])
-    for name, wrong in (("place", (0.9, 2.7)), ("place", "here"), ("start", (0.0, 0.0))):
+    for name, value in (("place", (0.9, 2.7)), ("place", "here"), ("start", (0.0, 0.0))):
+        wrong: Any = {name: value}
         with pytest.raises(ModelError, match=f"LedRobot: found {name}=.*, expected x, y and z in m"):
-            LedRobot(prototypes.L1, **{name: wrong})
+            LedRobot(prototypes.L1, **wrong)
