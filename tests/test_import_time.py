@@ -20,6 +20,7 @@ HEAVY = [
     "scipy.io",
     "scipy.integrate",
     "scipy.interpolate",
+    "cv2",
 ]
 
 

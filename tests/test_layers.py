@@ -23,7 +23,7 @@ ORDER = {  # a room imports the rooms before it
     "answers dae ensembles __init__ kinematics mechanics blocks electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy given prepared optimize "
-    "studies estimation paths calibration procedure identification learning __init__",
+    "studies estimation paths calibration procedure identification learning vision __init__",
     "gantrytau_optimica.calibration": "data rods fitting design judging report calibration calibrate "
     "devices trust surveys __init__",
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies fleet workspace_resolution candidates pose_choice "
@@ -43,7 +43,11 @@ READMES = {  # the page with the map of a folder
 }
 FILES_IN_A_FOLDER, FILES_IN_THE_ROOT, LINES, LINES_OF_A_FUNCTION, ARGUMENTS = 14, 8, 400, 60, 8
 SHARED_NAMES = {"__init__", "figures", "files", "report"}  # of files
-SHARED_CLASSES = {"Experiment"}  # of an FMU, and of an estimation: each is the word of its field, and public
+SHARED_CLASSES = {  # each is the word of its field, and public
+    "Experiment",  # of an FMU, and of an estimation
+    "Camera",  # a device that stands somewhere, and one of which only images are known
+    "Pattern",  # of a sparse matrix, and that which cameras look for
+}
 COMPONENTS = (
     "gantrytau.mechanics.",
     "gantrytau.blocks.",

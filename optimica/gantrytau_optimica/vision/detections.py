@@ -1,0 +1,94 @@
+"""Where the corners of a pattern were found in images, and at which step the others were lost."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.vision.boards import Pattern
+
+Array = np.ndarray
+LOST = {  # step -> what it says of an image that ended there, and what to do
+    "file": "there is no image, or it cannot be read; take it again or write it anew",
+    "dark": "it is black or of one grey; open the aperture, or look at the lens cap",
+    "saturated": "white is at the end of the grey values; close the aperture or expose less",
+    "corners": "no four corners where black squares touch; the pattern is hidden, out of focus or out of the image",
+    "squares": "no four of these corners make a square; the pattern is hidden, or seen from too far aside",
+    "edges": "too few edges are where the pattern has them; it is partly hidden or out of the image",
+    "background": "the pattern stands where it stands in the background; leave out images that are alike, or background=0",
+    "ambiguous": "two patterns are seen; cover one, or let the other stand still in all images",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """Corners of a pattern in images of C cameras at N poses.
+
+    corners: (C, N, P, 2) in pixels, in the order of `pattern.points`, NaN where missing; sigma: standard deviation of
+    each in pixels, (C, N, P), by how much its edges scatter; steps: (C, N), the step that lost an image, a key of LOST,
+    and "" where it was found; size: (width, height) of the images of each camera, (C, 2) in pixels; numbers: of the
+    images, as their files have them, (N,); findings: what was noticed, rows from 0.
+    """
+
+    pattern: Pattern
+    corners: Array = field(repr=False)
+    sigma: Array = field(repr=False)
+    steps: Array = field(repr=False)
+    size: Array
+    numbers: Array = field(repr=False)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def found(self) -> Array:
+        """Whether the pattern was found in an image, (C, N)."""
+        return self.steps == ""
+
+    @property
+    def pairs(self) -> Array:
+        """Whether all cameras found it, (N,)."""
+        return self.found.all(axis=0)
+
+    @cached_property
+    def centres(self) -> Array:
+        """Mean of the corners, (C, N, 2) in pixels, NaN where the pattern was not found.
+
+        Corners that are missing are those of the projective map of the pattern through the others.
+        """
+        filled = self.corners.copy()
+        for c, k in zip(*np.nonzero(self.found & np.isnan(self.corners).any(axis=(2, 3))), strict=True):
+            there = np.isfinite(filled[c, k, :, 0])
+            H = homography(self.pattern.points[there, :2], filled[c, k, there])
+            filled[c, k, ~there] = mapped(H, self.pattern.points[~there, :2])
+        return filled.mean(axis=2)
+
+    def __str__(self) -> str:
+        cameras, poses = self.steps.shape
+        lines = [f"{self.pairs.sum()} of {poses} poses seen by all of {cameras} cameras"]
+        return "\n".join([*lines, *(str(finding) for finding in self.findings)])
+
+
+def homography(flat: Array, images: Array) -> Array:
+    """The projective map (3, 3) from points (k, 2) in a plane to their images (k, 2) with least squares, k from 4.
+
+    Direct linear transformation with both sets about their means and of size one (Hartley 1997).
+    """
+    sides = []
+    for points in (flat, images):
+        mean, spread = points.mean(axis=0), np.sqrt(np.mean((points - points.mean(axis=0)) ** 2))
+        sides.append(
+            np.array([[1 / spread, 0, -mean[0] / spread], [0, 1 / spread, -mean[1] / spread], [0, 0, 1]])
+        )
+    a, b = mapped(sides[0], flat), mapped(sides[1], images)
+    one, zero = np.ones(len(a)), np.zeros((len(a), 3))
+    rows = np.column_stack([a, one])
+    upper = np.hstack([rows, zero, -b[:, :1] * rows])
+    lower = np.hstack([zero, rows, -b[:, 1:] * rows])
+    H = np.linalg.solve(sides[1], np.linalg.svd(np.vstack([upper, lower]))[2][-1].reshape(3, 3) @ sides[0])
+    return H / H[2, 2]
+
+
+def mapped(H: Array, points: Array) -> Array:
+    """Points (k, 2) by a projective map (3, 3)."""
+    found = points @ H[:, :2].T + H[:, 2]
+    return found[:, :2] / found[:, 2:]
