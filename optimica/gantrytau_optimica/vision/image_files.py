@@ -1,7 +1,6 @@
 """Folders of images, and the poses that they show, on file."""
 
 import os
-import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from gantrytau_optimica.vision.opencv import VisionError, opencv
 Array = np.ndarray
 ENDINGS = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm")
 HEADER = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")  # the last of a name
 
 
 def file_name(k: int) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.vision.opencv import opencv
-from gantrytau_optimica.vision.scene import Scene
+from gantrytau_optimica.vision.scenes.scene import Scene
 
 Array = np.ndarray
 SAMPLES = 4

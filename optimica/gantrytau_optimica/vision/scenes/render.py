@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
-from gantrytau_optimica.vision.drawing import Wall, bodies, draw, wall_of
 from gantrytau_optimica.vision.image_files import file_name, write_image, write_poses
 from gantrytau_optimica.vision.opencv import VisionError, opencv
-from gantrytau_optimica.vision.scene import GREATEST, Light, Scene
+from gantrytau_optimica.vision.scenes.drawing import Wall, bodies, draw, wall_of
+from gantrytau_optimica.vision.scenes.scene import GREATEST, Light, Scene
 
 Array = np.ndarray
 POSES = "poses.csv"

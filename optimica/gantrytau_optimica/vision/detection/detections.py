@@ -11,7 +11,7 @@ from gantrytau_optimica.vision.boards import Pattern
 Array = np.ndarray
 LOST = {  # step -> what it says of an image that ended there, and what to do
     "file": "there is no image, or it cannot be read; take it again or write it anew",
-    "dark": "it is black or of one grey; open the aperture, or look at the lens cap",
+    "dark": "it is black, or of one grey and noise; open the aperture, or look at the lens cap",
     "saturated": "white is at the end of the grey values; close the aperture or expose less",
     "corners": "no four corners where black squares touch; the pattern is hidden, out of focus or out of the image",
     "squares": "no four of these corners make a square; the pattern is hidden, or seen from too far aside",

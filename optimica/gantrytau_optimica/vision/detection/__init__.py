@@ -1,0 +1,1 @@
+"""A pattern in images: its corners, and the steps that lost others."""

@@ -1,0 +1,1 @@
+"""What cameras look at, and the images that they take of it."""
