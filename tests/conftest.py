@@ -13,6 +13,7 @@ TESTS = Path(__file__).parent
 LONGEST = (  # ten seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/building/test_compiling.py",
     "notebooks/test_notebooks.py",
+    "optimica/vision/detection/test_detect.py",
     "optimica/known_answers/test_closed_loops.py",
     "commands/calibrate/test_calibrate_cell.py",
     "fmu/runtime/test_singular_poses.py",

@@ -21,6 +21,7 @@ from tests.benchmarks import (
     sampling,
     studies,
     surface_seeds,
+    vision,
 )
 from tests.benchmarks.peers import rows as peers
 from tests.benchmarks.table import Row, at_most, print_table
@@ -51,6 +52,7 @@ if __name__ == "__main__":
         rig_runs.rows(),
         peg_seeds.rows(),
         surface_seeds.rows(),
+        vision.rows(),
     )
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))

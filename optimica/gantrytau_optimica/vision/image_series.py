@@ -140,8 +140,7 @@ def grey_of(image: Array, place: str) -> Array:
         raise VisionError(
             f"{place}: found an image of shape {image.shape}, expected (height, width) or (height, width, 3)"
         )
-    if min(values.shape) < 16:
-        raise VisionError(
-            f"{place}: found {values.shape[1]} x {values.shape[0]} pixels, expected at least 16 x 16"
-        )
+    height, width = image.shape[:2]
+    if min(height, width) < 16:
+        raise VisionError(f"{place}: found {width} x {height} pixels, expected at least 16 x 16")
     return values * np.float32(SCALE[image.dtype])

@@ -42,7 +42,7 @@ class Detections:
     @property
     def found(self) -> Array:
         """Whether the pattern was found in an image, (C, N)."""
-        return self.steps == ""
+        return np.asarray(self.steps == "")
 
     @property
     def pairs(self) -> Array:

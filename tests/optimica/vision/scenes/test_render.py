@@ -117,7 +117,11 @@ def test_a_pattern_from_behind_or_behind_the_camera_is_not_seen():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda: render(scene(), MIDDLE, [LENS]), VisionError, "place them by Camera.looking"),
+        (
+            lambda: render(scene(), MIDDLE, [LENS]),  # pyright: ignore[reportArgumentType]
+            VisionError,
+            "place them by Camera.looking",
+        ),
         (lambda: render(scene(), MIDDLE, []), VisionError, "place them by Camera.looking"),
         (
             lambda: render(scene(), MIDDLE, pair(), light=[Light()] * 2),
