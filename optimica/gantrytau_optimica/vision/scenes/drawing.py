@@ -13,6 +13,7 @@ import numpy as np
 
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.calibration.devices.sight import Bars
+from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import opencv
 from gantrytau_optimica.vision.scenes.scene import Scene
 
@@ -23,7 +24,7 @@ WALL, WHITE, INK, LINKS, TOOL, PLATE = 120, 215, 22, 70, 60, 90
 BORDER = 0.5  # cells of white around the pattern
 BEHIND = 1.5  # m, from the scene to the wall
 AT_PATTERN = 0.05  # m, bars nearer to the camera than this before the pattern are drawn over it
-NEAR, ROUNDS = 1e-4, 8  # m, of a difference to start from; steps of Newton's method
+FAR = 1e3  # m, of a plane
 TURNS = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 
 
@@ -177,18 +178,20 @@ def _lay_pattern(image: Array, scene: Scene, camera: PlacedCamera, middle: Array
 def _on_plane(camera: PlacedCamera, low: Array, high: Array, middle: Array, axes: Array) -> Array:
     """Coordinates in a plane, m, of the middles of samples between two pixels, (h SAMPLES, w SAMPLES, 2).
 
-    At the corners of pixels by Newton's method on the projection of the plane, which needs no inverse of the lens, and
-    linear within a pixel, where perspective bends by 1e-4 of it.
+    Where the rays through the corners of pixels meet it, FAR where they do not, and linear within a pixel, where
+    perspective bends by 1e-4 of it.
     """
     nodes = np.stack(np.meshgrid(*(np.arange(low[k], high[k] + 1) - 0.5 for k in (0, 1))), axis=-1)
-    base = camera.project(np.stack([middle, middle + NEAR * axes[:, 0], middle + NEAR * axes[:, 1]]))
-    found = np.linalg.solve(((base[1:] - base[0]) / NEAR).T, (nodes - base[0])[..., None])[..., 0]
-    for _ in range(ROUNDS):
-        images, slopes = camera.slopes(middle + found @ axes[:, :2].T)
-        missed = nodes - images
-        found = found + np.linalg.solve(slopes @ axes[:, :2], missed[..., None])[..., 0]
-        if not np.nanmax(np.abs(missed)) > 1e-6:
-            break
+    (f_x, f_y), (c_x, c_y) = camera.focal, camera.centre
+    lens = Camera([[f_x, 0, c_x], [0, f_y, c_y], [0, 0, 1]], camera.distortion, camera.size)
+    flat = lens.directions(nodes)
+    rays = np.concatenate([flat, np.ones_like(flat[..., :1])], axis=-1) @ camera.R.T
+    towards = rays @ axes[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = (middle - camera.r) @ axes[:, 2] / towards
+        found = (camera.r - middle + depth[..., None] * rays) @ axes[:, :2]
+    meets = (depth > 0) & np.isfinite(found).all(axis=-1)
+    found = np.where(meets[..., None], np.clip(found, -FAR, FAR), FAR)
     within = (np.arange(SAMPLES) + 0.5) / SAMPLES
     for axis in (0, 1):
         first, last = np.delete(found, -1, axis), np.delete(found, 0, axis)

@@ -106,6 +106,26 @@ def test_a_pattern_partly_outside_is_found_by_what_is_left_or_lost():
         assert not found.found.all() or np.nanmax(distance) < 0.3
 
 
+@pytest.mark.parametrize("tilt", [20, 40, 60, 75, 85, 90])
+def test_a_pattern_seen_aslant_is_found_or_lost_and_never_wrong(tilt):
+    board, at = turned(0.0), MIDDLE[None]
+    for direction in (0.0, 1.0, 2.0, 4.0):
+        axis = np.array([0.0, np.cos(direction), np.sin(direction)])
+        R = about(axis, np.radians([tilt]))[0]
+        found = detect(render(board, (at, R), pair()), QUINCUNX, background=0)
+        distance = missed(found, true_corners(board, pair(), at, R))
+        assert found.pairs.all() or tilt > 40
+        assert np.all(np.nan_to_num(distance) < 1.0)
+
+
+def test_clutter_alone_is_no_pattern():
+    away = np.array([[0, 0, -1.0], [-1.0, 0, 0], [0, 1.0, 0]])
+    for seed in range(1, 5):
+        turned_away = Scene(QUINCUNX, scene().robot, R=away, seed=seed)
+        images = render(turned_away, places(1, seed), pair(), light=Light((1.0, 0.15)[seed % 2]), seed=seed)
+        assert not detect(images, QUINCUNX, background=0).found.any()
+
+
 def with_a_second(images, step):
     """The images with a copy of the first pattern, `step` pixels further in each image of the first camera."""
     corners = true_corners(scene(), pair(), images.r)[0, 0]
