@@ -81,6 +81,15 @@ def test_at_45_degrees_all_images_have_one_numbering_and_doubt_is_told(degrees):
     assert "looks the same after 90" in found.findings[0].message
 
 
+def test_a_plate_that_turns_is_numbered_from_up_and_images_near_45_degrees_are_named():
+    angles = np.radians([-30.0, -10.0, 15.0, 38.0, 42.5])
+    R = about(np.array([1.0, 0.0, 0.0]), angles)
+    r = np.repeat(MIDDLE[None], 5, axis=0)
+    found = detect(render(turned(0.0), (r, R), pair(), seed=2), QUINCUNX, background=0)
+    assert missed(found, true_corners(turned(0.0), pair(), r, R)).max() < 0.3
+    assert [finding.rows.tolist() for finding in found.findings] == [[4], [4]]
+
+
 @pytest.mark.parametrize("z", [-0.12, -0.09, -0.05, 0.0, 0.06, 0.09])
 @pytest.mark.parametrize("radius", [0.004, 0.02])
 def test_what_a_bar_hides_is_missing_and_never_wrong(z, radius):
