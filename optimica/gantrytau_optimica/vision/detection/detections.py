@@ -42,12 +42,12 @@ class Detections:
     @property
     def found(self) -> Array:
         """Whether the pattern was found in an image, (C, N)."""
-        return np.asarray(self.steps == "")
+        return self.steps == ""
 
     @property
     def pairs(self) -> Array:
         """Whether all cameras found it, (N,)."""
-        return self.found.all(axis=0)
+        return np.asarray(self.found.all(axis=0))
 
     @cached_property
     def centres(self) -> Array:
