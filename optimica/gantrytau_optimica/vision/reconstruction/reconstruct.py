@@ -1,0 +1,89 @@
+"""Poses of a robot from the images of its pattern: start, bundle adjustment, scale, covariance."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from gantrytau_optimica.vision.detection.detections import Detections
+from gantrytau_optimica.vision.intrinsics import Camera
+from gantrytau_optimica.vision.reconstruction.adjustment import Placed, adjusted, places, started
+from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, Told
+from gantrytau_optimica.vision.reconstruction.mistakes import check_images, check_words, usable_poses
+from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
+from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
+from gantrytau_optimica.vision.reconstruction.suspicion import suspected
+
+Array = np.ndarray
+
+
+def reconstruct(
+    detections: Detections,
+    cameras: Sequence[Camera],
+    *,
+    intrinsics: Literal["fixed", "estimate"] = "fixed",
+    scale: Literal["spacing", "pattern", "both"] | None = None,
+    spacing: Any = None,
+    orientation: Literal["fixed", "free"] = "fixed",
+    corners: Literal["plate", "free"] = "plate",
+) -> Reconstruction:
+    """Poses of the pattern, and where the cameras stand, from what `detect` found. Thesis section 5.5.
+
+    cameras: what is known of each lens, in the order of the images. intrinsics: "estimate" fits focal length, centre, k1 and
+    k2 of each as well, about what is given. scale: what tells lengths: the side of the pattern, `spacing` along the
+    guideways, or both; by default whatever is given. spacing: positions of the carts (N, n) in m, of which those that differ
+    by a common shift say how far apart poses are, or distances along the guideways (N,). orientation: "fixed" for robots
+    that never turn their plate, "free" fits one for each pose. corners: "plate" keeps them where the pattern has them,
+    "free" takes each as a point of its own, as the thesis does, with the scale afterwards.
+
+    One camera needs the plate. Poses that fewer than two of several cameras saw are NaN. Raises VisionError for fewer than ten
+    poses, lenses that are not as many as the images or of another size, and spacing that tells nothing; what is doubtful
+    stands in `.findings`.
+    """
+    begin = time.perf_counter()
+    lenses = check_images(detections, cameras)
+    scale = check_words(intrinsics, scale, spacing, orientation, corners, len(lenses))
+    rows = usable_poses(detections)
+    distances = None if scale == "pattern" else spacing_of(spacing, len(detections.numbers)).select(rows)
+    plate = corners == "plate"
+    told = Told(
+        lenses=intrinsics == "estimate",
+        plate=plate,
+        alike=orientation == "fixed",
+        sized=scale == "spacing",
+        spacing=distances if plate else None,
+    )
+    pixels = detections.corners[:, rows]
+    bundle = Bundle(pixels, np.ones(pixels.shape[:-1]), detections.pattern.points, lenses, told)
+    bundle, state, fitted, steps = adjusted(bundle, started(bundle))
+    state, placed = places(bundle, state, fitted, distances)
+    found = _of_all_poses(bundle, state, placed, rows, detections)
+    found = replace(found, steps=steps, seconds=time.perf_counter() - begin)
+    return replace(
+        found, findings=(*detections.findings, *suspected(bundle, state, found, rows, detections, spacing))
+    )
+
+
+def _of_all_poses(
+    bundle: Bundle, state: State, placed: Placed, rows: Array, detections: Detections
+) -> Reconstruction:
+    cameras, count = detections.found.shape
+    points = detections.corners.shape[2]
+    r, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
+    R, residuals = np.full((count, 3, 3), np.nan), np.full((cameras, count, points, 2), np.nan)
+    r[rows], covariance[rows], R[rows] = placed.r, placed.covariance, state.R
+    residuals[:, rows] = bundle.residuals(state)
+    return Reconstruction(
+        r=r,
+        R=R,
+        covariance=covariance,
+        cameras=state.cameras,
+        rms=float(np.sqrt(np.nanmean(residuals**2))),
+        residuals=residuals,
+        scale=placed.scale,
+        lens_deviations=placed.lens_deviations,
+        turning=not bundle.told.alike,
+        numbers=detections.numbers,
+    )
