@@ -1,24 +1,33 @@
-"""Cameras: images of a scene, and the pattern found in images. Needs OpenCV, the extra `vision`."""
+"""Cameras: images of a scene, the pattern in them, and poses of the robot from it. Needs OpenCV, the extra `vision`."""
 
 from gantrytau_optimica.vision.boards import Pattern
+from gantrytau_optimica.vision.comparison.compare import Comparison, compare
+from gantrytau_optimica.vision.comparison.comparison_figures import plot_comparison
 from gantrytau_optimica.vision.detection.detect import detect
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.image_files import read_poses, write_poses
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
+from gantrytau_optimica.vision.reconstruction.reconstruct import reconstruct
+from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.scenes.render import Images, render
 from gantrytau_optimica.vision.scenes.scene import Light, Scene, true_corners
 
 __all__ = [
     "Camera",
+    "Comparison",
     "Detections",
     "Images",
     "Light",
     "Pattern",
+    "Reconstruction",
     "Scene",
     "VisionError",
+    "compare",
     "detect",
+    "plot_comparison",
     "read_poses",
+    "reconstruct",
     "render",
     "true_corners",
     "write_poses",

@@ -26,7 +26,8 @@ class Measurements:
     q: actuator positions (N, n), carts in m first, then angles in rad; r: tool positions (N, 3) in m; R: orientations of
     the plate (N, 3, 3), world = R @ plate, or unit quaternions (N, 4), scalar first, or None; rails: for each guideway
     (k, 4) the columns q, x, y, z of points measured along it, k from 2, in any frame, or None. numbers: of the poses in
-    a plan (N,), or None; lines: of the rows in the file that they were read from (N,), or None.
+    a plan (N,), or None; lines: of the rows in the file that they were read from (N,), or None; covariance: of r,
+    (N, 3, 3) in m2, where a device says how sure each is (`uncertain`), or None for poses that are all as sure.
     Arrays are copied and cannot be written to. Raises ModelError for shapes that do not fit; what is doubtful about the
     numbers stands in `findings`.
     """
@@ -45,6 +46,7 @@ class Measurements:
         self.rails = None if rails is None else tuple(_rail(k, rail) for k, rail in enumerate(rails))
         self.numbers = None if numbers is None else np.array(numbers, dtype=int).reshape(len(self.q))
         self.lines: np.ndarray | None = None
+        self.covariance: np.ndarray | None = None
         for array in (self.q, self.r, self.R, *(self.rails or ())):
             if array is not None:
                 array.flags.writeable = False
@@ -114,7 +116,39 @@ class Measurements:
         found.rails = self.rails
         found.numbers = None if self.numbers is None else self.numbers[rows]
         found.lines = None if self.lines is None else self.lines[rows]
+        found.covariance = None if self.covariance is None else self.covariance[rows]
         return found
+
+    def uncertain(self, covariance: Any) -> "Measurements":
+        """The measurements with covariances of their positions, (N, 3, 3) in m2: `calibrate` believes sure ones more.
+
+        Raises ModelError for other shapes, and for covariances of finite positions that are not finite and above zero.
+        """
+        given = _numbers("covariance", covariance)
+        if given.shape != (len(self), 3, 3):
+            raise ModelError(
+                f"Measurements: found covariance of shape {given.shape}, expected ({len(self)}, 3, 3) in m2"
+            )
+        known = np.isfinite(self.r).all(axis=1)
+        wrong = np.flatnonzero(known & ~(np.trace(given, axis1=1, axis2=2) > 0))
+        if wrong.size or not np.all(np.isfinite(given[known])):
+            raise ModelError(
+                f"Measurements: found a covariance that is not finite or not above zero, the first in row "
+                f"{wrong[0] if wrong.size else np.flatnonzero(known & ~np.isfinite(given).all(axis=(1, 2)))[0]}, expected "
+                "squares of m"
+            )
+        found = self.select(slice(None))
+        found.covariance = given
+        found.covariance.flags.writeable = False
+        return found
+
+    @property
+    def certainty(self) -> np.ndarray | None:
+        """Weights of poses, (N,), 1 for one of median covariance; None where all are as sure."""
+        if self.covariance is None:
+            return None
+        size = np.sqrt(np.trace(self.covariance, axis1=1, axis2=2))
+        return np.nan_to_num(np.nanmedian(size) / size, nan=1.0)
 
 
 def is_all(rows: np.ndarray, count: int) -> bool:

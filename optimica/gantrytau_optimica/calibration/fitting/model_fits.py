@@ -32,6 +32,8 @@ ANOTHER_FRAME = (
     0.005  # rad, between nominal guideways and identified ones, from which on the frame is another
 )
 
+Judged = tuple[str, np.ndarray | None]  # the loss, and how sure poses are
+
 
 def fit_model(
     model: object,
@@ -47,24 +49,27 @@ def fit_model(
     if model == 3:
         links = [own_directions(link) for link in links]
     if model == "parallel":
-        return _fit_parallel(links, start, expected, loss)
-    return _fit_groups(with_prior(grouped(links), expected), loss)
+        return _fit_parallel(links, start, expected, (loss, data.certainty))
+    return _fit_groups(with_prior(grouped(links), expected), (loss, data.certainty))
 
 
-def _fit_groups(groups: Sequence[Group], loss: str) -> list[Fit]:
-    return fit_robust(groups) if loss == "robust" else [fit_group(group) for group in groups]
+def _fit_groups(groups: Sequence[Group], judged: Judged) -> list[Fit]:
+    loss, certainty = judged
+    if loss == "robust":
+        return fit_robust(groups, certainty)
+    return [fit_group(group, certainty) for group in groups]
 
 
-def _fit_parallel(links: list[ModelLink], start: str, prior: Prior, loss: str) -> list[Fit]:
+def _fit_parallel(links: list[ModelLink], start: str, prior: Prior, judged: Judged) -> list[Fit]:
     """One direction for all guideways: the nominal one, unless it is unknown or that of another frame."""
-    common = _fit_groups(with_prior(grouped(parallel(links, True)), prior), loss)
+    common = _fit_groups(with_prior(grouped(parallel(links, True)), prior), judged)
     found = common[0].values
     identified = np.array([found[name] for name in elements(COMMON)])
     nominal = np.mean([link.start[4:7] for link in links], axis=0)
     cosine = identified @ nominal / np.linalg.norm(identified) / np.linalg.norm(nominal)
     if start == "linear" or np.arccos(np.clip(cosine, -1, 1)) > ANOTHER_FRAME:
         return common
-    return _fit_groups(with_prior(grouped(parallel(links, False)), prior), loss)
+    return _fit_groups(with_prior(grouped(parallel(links, False)), prior), judged)
 
 
 def _fit_rails(
@@ -72,6 +77,7 @@ def _fit_rails(
 ) -> list[Fit]:
     """Models 2, 4 and 5: first where straight guideways lie, then how the measured ones do."""
     assert data.rails is not None
+    judged = (loss, data.certainty)
     single = [link for link in links if link.chain.R is None]
     if not single:  # models 4 and 5 turn guideways as model 2 finds them
         single = started_linear([_without_plate(cart, links) for cart in range(len(data.rails))])
@@ -79,7 +85,7 @@ def _fit_rails(
     single = [_at(link, fit) for link, fit in zip(single, fits, strict=True)]
     placed = [_placed(k, data.rails[k.cart], not_held(fit)) for k, fit in zip(single, fits, strict=True)]
     if model == 2:
-        return _fit_groups(with_prior([fit.group.started(fit.x) for fit in placed], prior), loss)
+        return _fit_groups(with_prior([fit.group.started(fit.x) for fit in placed], prior), judged)
     whole: list[ModelLink] = []
     for link in links:
         own = own_directions(link)
@@ -92,7 +98,7 @@ def _fit_rails(
             whole += on_rail(started, data.rails[link.cart], turned)
         else:
             whole.append(own)
-    return _fit_groups(with_prior(grouped(whole), prior), loss)
+    return _fit_groups(with_prior(grouped(whole), prior), judged)
 
 
 def _placed(link: ModelLink, rail: np.ndarray, truncated: float) -> Fit:

@@ -127,18 +127,21 @@ def _count(group: Group) -> int:
     return sum(len(c.q) for c in group.chains)
 
 
-def fit_robust(groups: Sequence[Group]) -> list[Fit]:
-    """All groups with one weight for each pose: Huber's until it settles, then Tukey's, which drops gross errors."""
-    fits = [fit_group(group) for group in groups]
-    weights = np.ones(len(groups[0].chains[0].q))
+def fit_robust(groups: Sequence[Group], certainty: np.ndarray | None = None) -> list[Fit]:
+    """All groups with one weight for each pose: Huber's until it settles, then Tukey's, which drops gross errors.
+
+    certainty: (N,), how much surer poses are than others, by which their errors and weights are multiplied.
+    """
+    fits = [fit_group(group, certainty) for group in groups]
+    weights = sure = np.ones(len(groups[0].chains[0].q)) if certainty is None else certainty
     for tukey in (False, True):
         for _ in range(ROUNDS):
-            size = relative_size(fits)
+            size = relative_size(fits, sure)
             if tukey:
                 square = np.where(size < TUKEY, (1 - (size / TUKEY) ** 2) ** 2, 0.0)
             else:
                 square = np.minimum(1.0, HUBER / np.maximum(size, 1e-12))
-            old, weights = weights, np.sqrt(square)
+            old, weights = weights, sure * np.sqrt(square)
             fits = [fit_group(fit.group, weights, begin=_onwards(fit)) for fit in fits]
             if np.abs(weights - old).max() < 1e-6:
                 break
@@ -150,9 +153,9 @@ def _onwards(fit: Fit) -> np.ndarray | None:
     return None if fit.group.noise is not None else fit.x
 
 
-def relative_size(fits: Sequence[Fit]) -> np.ndarray:
-    """The largest closure error of each pose in robust standard deviations of its link, (N,)."""
-    distances = np.abs(np.hstack([fit.distances() for fit in fits]))
+def relative_size(fits: Sequence[Fit], sure: np.ndarray | float = 1.0) -> np.ndarray:
+    """The largest closure error of each pose in robust standard deviations of its link, (N,); sure: (N,) as above."""
+    distances = np.abs(np.hstack([fit.distances() for fit in fits]).T * sure).T
     scale = 1.4826 * np.median(distances, axis=0)
     return (distances / np.maximum(scale, 1e-12)).max(axis=1)
 

@@ -14,12 +14,14 @@ from gantrytau.kinematics.rotations import mean_rotation, motion
 from gantrytau_optimica.calibration.data.findings import CalibrationError, rows_in_words
 from gantrytau_optimica.calibration.data.measurements import thinned
 from gantrytau_optimica.calibration.data.mistakes import Mistake, mistakes
+from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.rods.arm_links import ArmLink
 from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.error_models import ModelLink, moved
 from gantrytau_optimica.calibration.rods.linear_start import linear_start
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
+ROUGH = 1e-3  # m, of links by their linear equations, above which their closure is solved
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
 BETTER = 10.0  # times smaller errors that undoing a mistake must leave
 ALIKE = 0.05  # m; a D1 is within 75 mm of an L1 whose q2 and q3 are exchanged
@@ -152,7 +154,11 @@ def compare(links: Sequence[ModelLink], q: np.ndarray, r: np.ndarray, R: np.ndar
     for link in links:
         chain = Chain("", link.cart, q[:, link.cart], r)
         x = linear_start(chain)
-        left.append(np.median(np.abs(np.linalg.norm(chain.vector(x), axis=1) - x[0])))
+        off = _left(chain, x)
+        if off > ROUGH:  # noise of millimetres in all of the equations bends what is linear in them
+            closed = gauss_newton(chain.error, chain.slopes, x, np.ones(len(x), dtype=bool)).x
+            x = closed if _left(chain, closed) < off else x
+        left.append(_left(chain, x))
         # a joint on the plate moves the guideway that is found, in the axes of the measurements
         lever = np.zeros(3) if link.chain.R is None or R is None else mean_rotation(R) @ link.start[7:10]
         for s in (-1.0, 1.0):  # two points of the guideway
@@ -162,6 +168,11 @@ def compare(links: Sequence[ModelLink], q: np.ndarray, r: np.ndarray, R: np.ndar
     turn, shift = motion(a, b)
     off = np.linalg.norm(b - shift - a @ turn.T, axis=1).max()
     return Fitting(miss(misses_of(links), q, r, R), float(max(left)), turn, shift, float(off))
+
+
+def _left(chain: Chain, x: np.ndarray) -> float:
+    """How far a link is from the length of numbers x, median in m."""
+    return float(np.median(np.abs(chain.gap(x))))
 
 
 def trimmed_motion(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from gantrytau_optimica.vision.reconstruction.relative_orientation import (
     plates_of_one,
     triangulated,
 )
-from gantrytau_optimica.vision.reconstruction.schur import Rows, minimised, reduced
+from gantrytau_optimica.vision.reconstruction.schur import BlockRows, minimised, reduced
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
 Array = np.ndarray
@@ -44,19 +44,19 @@ def started(bundle: Bundle) -> State:
     corners = np.where(np.isfinite(corners), corners, r[:, None] + bundle.points @ R.transpose(0, 2, 1))
     if bundle.told.alike:
         R = np.broadcast_to(mean_rotation(R), R.shape).copy()
-    size, middles, offsets = 1.0, np.zeros((0, 3)), np.zeros(0)
-    spacing = bundle.told.spacing
-    if spacing is not None:
-        if bundle.told.sized:
-            size = 1 / float(np.linalg.norm(spacing.displaced(r)))
-            cameras = tuple(replace(camera, r=camera.r * size) for camera in cameras)
-            r, corners = r * size, corners * size
-        middles = spacing.middles(r)
-        offsets = -spacing.middles(np.repeat(spacing.x[:, None], 3, axis=1))[:, 0]
-    return State(cameras, r, R, size, corners, middles, offsets)
+    return State(cameras, r, R, 1.0, corners, np.zeros((0, 3)), np.zeros(0))
 
 
-def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, Rows, int]:
+def scaled_by(spacing: Spacing, state: State, sized: bool) -> State:
+    """The state with lines of poses where it has them; sized: as large as spacing says, whatever the pattern says."""
+    size = 1 / float(np.linalg.norm(spacing.displaced(state.r))) if sized else 1.0
+    cameras = tuple(replace(camera, r=camera.r * size) for camera in state.cameras)
+    r = state.r * size
+    offsets = -spacing.middles(np.repeat(spacing.x[:, None], 3, axis=1))[:, 0]
+    return replace(state, cameras=cameras, r=r, size=size, middles=spacing.middles(r), offsets=offsets)
+
+
+def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, BlockRows, int]:
     """The bundle with the weights of its corners, its least squares, the rows there, and how many steps it took."""
     taken, sigma, share = 0, SIGMA, np.ones(bundle.seen.shape)
     for _ in range(ROUNDS):
@@ -65,7 +65,10 @@ def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, Rows, int]:
         taken += steps
         missed = np.linalg.norm(np.nan_to_num(bundle.residuals(state)), axis=-1)
         freedom = 2 * bundle.seen.sum() - rows.by_own.shape[0] * rows.by_own.shape[2] - bundle.shared
-        before, sigma = sigma, max(float(np.sqrt(np.sum((share * missed) ** 2) / max(freedom, 1))), LEAST_SIGMA)
+        before, sigma = (
+            sigma,
+            max(float(np.sqrt(np.sum((share * missed) ** 2) / max(freedom, 1))), LEAST_SIGMA),
+        )
         beyond = max(HUBER * float(np.median(missed[bundle.seen > 0])), LEAST_SIGMA)
         old, share = share, np.sqrt(np.minimum(1.0, beyond / np.maximum(missed, beyond)))
         if np.allclose(share, old, atol=0.01) and abs(sigma / before - 1) < 0.1:
@@ -75,7 +78,7 @@ def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, Rows, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class Located:
     """Places of the pattern (N, 3), their covariances (N, 3, 3), a scale, and deviations of the lenses (C, 5)."""
 
     r: Array
@@ -84,8 +87,8 @@ class Placed:
     lens_deviations: Array
 
 
-def places(bundle: Bundle, state: State, rows: Rows, lengths: Spacing | None) -> tuple[State, Placed]:
-    """Where the pattern is, in metres. lengths: of free corners, what tells their scale: spacing, or None for the pattern."""
+def places(bundle: Bundle, state: State, rows: BlockRows, lengths: Spacing | None) -> tuple[State, Located]:
+    """Where the pattern is, in metres; lengths: what tells the scale of free corners, spacing or None for the pattern."""
     equations = reduced(rows)
     shared = np.linalg.pinv(equations.complement, rcond=1e-15, hermitian=True)
     lenses = np.zeros((len(bundle.given), LENS))
@@ -95,12 +98,12 @@ def places(bundle: Bundle, state: State, rows: Rows, lengths: Spacing | None) ->
             lenses[c] = np.sqrt(np.maximum(np.diag(shared)[where], 0.0))
     own, coupling = equations.own[:, :3, :3], -equations.coupling[:, :3]
     if bundle.told.plate:
-        return state, Placed(state.r, free_covariance(state.r, own, coupling, shared), state.size, lenses)
+        return state, Located(state.r, free_covariance(state.r, own, coupling, shared), state.size, lenses)
     count, corners = state.corners.shape[:2]
     r = state.corners.mean(axis=1)
     each, own = own.reshape(count, corners, 3, 3), own.reshape(count, corners, 3, 3).sum(axis=1) / corners**2
     coupling = coupling.reshape(count, corners, 3, -1)
-    scale, slopes = (_by_pattern(bundle, state) if lengths is None else _by_spacing(lengths, r, corners))
+    scale, slopes = _by_pattern(bundle, state) if lengths is None else _by_spacing(lengths, r, corners)
     spread = float(np.einsum("nki,nkij,nkj->", slopes, each, slopes))
     by_shared = np.einsum("nki,nkis->s", slopes, coupling)
     away = r - r.mean(axis=0)
@@ -112,7 +115,7 @@ def places(bundle: Bundle, state: State, rows: Rows, lengths: Spacing | None) ->
     cameras = tuple(replace(camera, r=scale * camera.r) for camera in state.cameras)
     _, R = plates(state.corners, bundle.points)
     state = replace(state, cameras=cameras, r=scale * r, R=R, corners=scale * state.corners)
-    return state, Placed(scale * r, covariance, _size(state, bundle), lenses)
+    return state, Located(scale * r, covariance, _size(state, bundle), lenses)
 
 
 def _size(state: State, bundle: Bundle) -> float:

@@ -1,9 +1,8 @@
 """The images of a pattern at all poses as one least squares: cameras, lenses, pattern and poses at once.
 
 Shared unknowns, in this order: of each camera its lens (focal length, centre, k1, k2), of each but the first where it
-stands; how the pattern is turned, where it always is alike; its size, where spacing tells it; where each line of poses begins
-on the guideways. Own unknowns are those of a pose: place, and perhaps orientation, or the place
-of a corner alone.
+stands; how the pattern is turned, where it always is alike; its size, where spacing tells it; where each line of poses
+begins on the guideways. Own unknowns are those of a pose: place, and perhaps orientation, or the place of a corner alone.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ import numpy as np
 from gantrytau.kinematics.rotations import skewed, turned
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.vision.intrinsics import Camera
-from gantrytau_optimica.vision.reconstruction.schur import Rows
+from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
 Array = np.ndarray
@@ -22,11 +21,12 @@ LENS = 5  # unknowns of a lens: logarithm of the focal length, centre, k1, k2
 PLACE = 6  # of a camera: turn and shift
 PRIOR = np.array([0.05, 30.0, 30.0, 0.3, 0.5])  # standard deviations of what was given of a lens, assumed
 FILLED = 1e-3  # m, of a corner of its own that no two cameras saw
+BEHIND = 1e9  # error of a corner that was seen and would be behind its camera
 GAUGE = 1e-6  # of the base: how well it is held where nothing tells a length
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class TakenAsKnown:
     """What the bundle takes for known: whether lenses are estimated; whether corners are those of a plate, or each alone;
     whether the plate always is turned alike; whether its size is unknown; the spacing of poses, or None.
     """
@@ -34,14 +34,14 @@ class Told:
     lenses: bool
     plate: bool
     alike: bool
-    sized: bool
-    spacing: Spacing | None
+    sized: bool = False
+    spacing: Spacing | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """cameras: where they are held to stand, and their lenses; corners (N, P, 3) or, of a plate, r (N, 3), R (N, 3, 3) and its
-    size as a multiple; of lines of poses middles to count from (L, 3) and offsets (L,) in m.
+    """cameras: where they are held to stand, and their lenses; corners (N, P, 3) or, of a plate, r (N, 3), R (N, 3, 3) and
+    its size as a multiple; of lines of poses middles to count from (L, 3) and offsets (L,) in m.
     """
 
     cameras: tuple[PlacedCamera, ...]
@@ -63,7 +63,7 @@ class Bundle:
     weights: Array
     points: Array
     given: tuple[Camera, ...]
-    told: Told
+    told: TakenAsKnown
 
     @cached_property
     def columns(self) -> dict[str, slice]:
@@ -98,7 +98,7 @@ class Bundle:
             return state.corners
         return state.r[:, None] + state.size * self.points @ state.R.transpose(0, 2, 1)
 
-    def rows(self, state: State) -> Rows:
+    def rows(self, state: State) -> BlockRows:
         """Weighted errors of all images, with those of spacing and of what was given."""
         points = self.points_at(state)
         count, corners = points.shape[:2]
@@ -110,14 +110,18 @@ class Bundle:
         for c, camera in enumerate(state.cameras):
             images, slopes = camera.slopes(points)
             weight = np.where(np.isfinite(self.pixels[c, ..., 0]), self.weights[c], 0.0)[..., None]
-            error[:, :, c] = np.nan_to_num((images - self.pixels[c]) * weight)
+            error[:, :, c] = np.where(
+                weight > 0, np.nan_to_num((images - self.pixels[c]) * weight, nan=BEHIND), 0.0
+            )
             seen = weight[..., None] * slopes
             by_point[:, :, c] = np.nan_to_num(seen, posinf=0.0, neginf=0.0)
             for name, rows in self._by_camera(c, camera, points, by_point[:, :, c], weight).items():
                 by_shared[:, :, c, :, self.columns[name]] = rows
         if self.told.plate:
             across = by_point @ -skewed(lever)[:, :, None]
-            by_shared[..., self.columns["size"]] = (by_point @ lever[:, :, None, :, None])[..., :, : int(self.told.sized)]
+            by_shared[..., self.columns["size"]] = (by_point @ lever[:, :, None, :, None])[
+                ..., :, : int(self.told.sized)
+            ]
             by_shared[..., self.columns["turn"]] = across[..., : 3 * self.told.alike]
             own = by_point if self.told.alike else np.concatenate([by_point, across], axis=-1)
         else:
@@ -125,7 +129,10 @@ class Bundle:
         blocks = count if self.told.plate else count * corners
         wide = error.size // blocks
         return self._with_the_rest(
-            state, error.reshape(blocks, wide), own.reshape(blocks, wide, own.shape[-1]), by_shared.reshape(blocks, wide, self.shared)
+            state,
+            error.reshape(blocks, wide),
+            own.reshape(blocks, wide, own.shape[-1]),
+            by_shared.reshape(blocks, wide, self.shared),
         )
 
     def _by_camera(
@@ -147,7 +154,7 @@ class Bundle:
             found[f"lens {c}"] = np.nan_to_num(rows * weight[..., None])
         return found
 
-    def _with_the_rest(self, state: State, error: Array, own: Array, by_shared: Array) -> Rows:
+    def _with_the_rest(self, state: State, error: Array, own: Array, by_shared: Array) -> BlockRows:
         told, lone, slopes = self.told, [], []
         spacing = told.spacing
         if spacing is not None:
@@ -177,7 +184,9 @@ class Bundle:
             slopes.append(rows)
             lone.append(np.zeros(1))
         none = np.zeros((0, self.shared))
-        return Rows(error, own, by_shared, np.concatenate([np.zeros(0), *lone]), np.vstack([none, *slopes]))
+        return BlockRows(
+            error, own, by_shared, np.concatenate([np.zeros(0), *lone]), np.vstack([none, *slopes])
+        )
 
     def moved(self, state: State, shared: Array, own: Array) -> State:
         """The state after steps of shared unknowns (S,) and own ones (B, d)."""
@@ -188,7 +197,9 @@ class Bundle:
             moved = replace(camera, R=turned(camera.R[None], place[None, :3])[0], r=camera.r + place[3:])
             cameras.append(_with_lens(moved, at[f"lens {c}"]) if self.told.lenses else moved)
         if not self.told.plate:
-            return replace(state, cameras=tuple(cameras), corners=state.corners + own.reshape(state.corners.shape))
+            return replace(
+                state, cameras=tuple(cameras), corners=state.corners + own.reshape(state.corners.shape)
+            )
         turns = np.broadcast_to(at["turn"], (len(own), 3)) if self.told.alike else own[:, 3:]
         return replace(
             state,

@@ -13,7 +13,9 @@ Array = np.ndarray
 
 
 def free_covariance(r: Array, own: Array, coupling: Array, shared: Array) -> Array:
-    """Covariances (N, 3, 3) of places (N, 3), in m2, after the best motion; before they are own_k + coupling_k shared coupling_k'.
+    """Covariances (N, 3, 3) of places r (N, 3), in m2, after the best motion of all.
+
+    Before it they are own_k + coupling_k shared coupling_k'.
 
     own: (N, 3, 3); coupling: (N, 3, S); shared: (S, S).
     """

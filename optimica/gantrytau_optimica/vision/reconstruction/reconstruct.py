@@ -9,12 +9,16 @@ import numpy as np
 
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
-from gantrytau_optimica.vision.reconstruction.adjustment import Placed, adjusted, places, started
-from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, Told
-from gantrytau_optimica.vision.reconstruction.mistakes import check_images, check_words, usable_poses
+from gantrytau_optimica.vision.reconstruction.adjustment import Located, adjusted, places, scaled_by, started
+from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
+from gantrytau_optimica.vision.reconstruction.image_mistakes import check_left, check_spacing, suspected
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
+from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
+    check_images,
+    check_words,
+    usable_poses,
+)
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
-from gantrytau_optimica.vision.reconstruction.suspicion import suspected
 
 Array = np.ndarray
 
@@ -38,36 +42,37 @@ def reconstruct(
     that never turn their plate, "free" fits one for each pose. corners: "plate" keeps them where the pattern has them,
     "free" takes each as a point of its own, as the thesis does, with the scale afterwards.
 
-    One camera needs the plate. Poses that fewer than two of several cameras saw are NaN. Raises VisionError for fewer than ten
-    poses, lenses that are not as many as the images or of another size, and spacing that tells nothing; what is doubtful
+    One camera needs the plate. Poses that fewer than two of several cameras saw are NaN. Raises VisionError for fewer than
+    ten poses, lenses that are not as many as the images or of another size, and spacing that tells nothing; what is doubtful
     stands in `.findings`.
     """
     begin = time.perf_counter()
     lenses = check_images(detections, cameras)
-    scale = check_words(intrinsics, scale, spacing, orientation, corners, len(lenses))
+    tells = check_words(intrinsics, scale, spacing, orientation, corners, len(lenses))
     rows = usable_poses(detections)
-    distances = None if scale == "pattern" else spacing_of(spacing, len(detections.numbers)).select(rows)
+    distances = None if tells == "pattern" else spacing_of(spacing, len(detections.numbers)).select(rows)
     plate = corners == "plate"
-    told = Told(
-        lenses=intrinsics == "estimate",
-        plate=plate,
-        alike=orientation == "fixed",
-        sized=scale == "spacing",
-        spacing=distances if plate else None,
-    )
+    told = TakenAsKnown(lenses=intrinsics == "estimate", plate=plate, alike=orientation == "fixed")
     pixels = detections.corners[:, rows]
     bundle = Bundle(pixels, np.ones(pixels.shape[:-1]), detections.pattern.points, lenses, told)
     bundle, state, fitted, steps = adjusted(bundle, started(bundle))
+    check_left(bundle, state)
+    if distances is not None:
+        check_spacing(distances, places(bundle, state, fitted, None)[1].r, rows)
+        if plate:
+            sized = tells == "spacing"
+            bundle = replace(bundle, told=replace(told, sized=sized, spacing=distances))
+            bundle, state, fitted, more = adjusted(bundle, scaled_by(distances, state, sized))
+            steps += more
     state, placed = places(bundle, state, fitted, distances)
     found = _of_all_poses(bundle, state, placed, rows, detections)
-    found = replace(found, steps=steps, seconds=time.perf_counter() - begin)
-    return replace(
-        found, findings=(*detections.findings, *suspected(bundle, state, found, rows, detections, spacing))
-    )
+    noticed = suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
+    seconds = time.perf_counter() - begin
+    return replace(found, steps=steps, seconds=seconds, findings=(*detections.findings, *noticed))
 
 
 def _of_all_poses(
-    bundle: Bundle, state: State, placed: Placed, rows: Array, detections: Detections
+    bundle: Bundle, state: State, placed: Located, rows: Array, detections: Detections
 ) -> Reconstruction:
     cameras, count = detections.found.shape
     points = detections.corners.shape[2]

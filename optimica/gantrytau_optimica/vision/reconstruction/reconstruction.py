@@ -21,9 +21,9 @@ class Reconstruction:
     """Poses of a pattern from images, in the axes of the first camera: x right, y down, z ahead.
 
     r: middle of the pattern, (N, 3) in m, NaN where it was not seen; R: its orientation, (N, 3, 3); covariance: of r after
-    the best motion of all poses, (N, 3, 3) in m2; cameras: where they stand, with the lenses of the fit; rms: of what is left
-    of image points, in pixels; residuals: (C, N, P, 2) in pixels; scale: by how much the pattern is larger than its side
-    says, or would be where spacing tells lengths; lens_deviations: (C, 5) standard deviations of ln focal length, centre in
+    the best motion of all poses, (N, 3, 3) in m2; cameras: where they stand, with the lenses of the fit; rms: of what is
+    left of image points, in pixels; residuals: (C, N, P, 2) in pixels; scale: the size of the pattern as a multiple of what
+    its side says, where spacing tells lengths; lens_deviations: (C, 5) standard deviations of ln focal length, centre in
     pixels, k1, k2, zero where lenses are given; turning: whether orientations differ from pose to pose; seconds: of the
     adjustment; steps: how many; findings: what was noticed, rows from 0.
     """
@@ -52,11 +52,14 @@ class Reconstruction:
         """The error of a place that covariance foretells after the best motion, rms in m."""
         return float(np.sqrt(np.mean(np.trace(self.covariance[self.found], axis1=1, axis2=2))))
 
-    def measurements(self, q: Any, *, place: Any = (0.0, 0.0, 0.0), R: Any = AHEAD) -> Measurements:
+    def measurements(
+        self, q: Any, *, place: Any = (0.0, 0.0, 0.0), R: Any = AHEAD, turning: bool | None = None
+    ) -> Measurements:
         """What `calibrate` takes: poses of the plate at positions q (N, n) of the actuators, of the rows that were found.
 
         place: middle of the pattern in the frame of the plate, (3,) in m; R: axes of the pattern in the frame of the plate,
-        (3, 3). Where all poses are turned alike orientations are left out: then `place` only shifts them all.
+        (3, 3); turning: whether orientations go along, by default where they were free. One camera ahead of the pattern
+        tells its tilt badly: leave them out for robots that do not turn their plate.
         Raises VisionError for q of another number of rows.
         """
         q = np.asarray(q, dtype=float)
@@ -64,10 +67,11 @@ class Reconstruction:
             raise VisionError(
                 f"measurements: found q of shape {q.shape}, expected ({len(self.r)}, n), a row for each pose of the images"
             )
+        turning = self.turning if turning is None else turning
         rows = np.flatnonzero(self.found)
         axes = self.R[rows] @ np.asarray(R, dtype=float).T
         r = self.r[rows] - axes @ np.asarray(place, dtype=float)
-        found = Measurements(q[rows], r, axes if self.turning else None, numbers=self.numbers[rows])
+        found = Measurements(q[rows], r, axes if turning else None, numbers=self.numbers[rows])
         return found.uncertain(self.covariance[rows])
 
     def __str__(self) -> str:
@@ -78,8 +82,9 @@ class Reconstruction:
         ]
         for c, camera in enumerate(self.cameras):
             turn = np.degrees(np.linalg.norm(rotation_vector(camera.R[None])[0]))
+            focal, unsure = camera.focal[0], camera.focal[0] * self.lens_deviations[c, 0]
             lines.append(
-                f"camera {c + 1}: focal length {camera.focal[0]:.1f} +- {camera.focal[0] * self.lens_deviations[c, 0]:.1f} pixel, "
+                f"camera {c + 1}: focal length {focal:.1f} +- {unsure:.1f} pixel, "
                 f"centre {camera.centre[0]:.1f}, {camera.centre[1]:.1f}, k1 {camera.distortion[0]:.4f}, "
                 f"{np.linalg.norm(camera.r):.4f} m from the first, turned by {turn:.2f} deg"
             )

@@ -8,7 +8,7 @@ from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError, opencv
 
 Array = np.ndarray
-THRESHOLD = 3.0  # pixels off the epipolar line, up to which a corner takes part: lenses are not known well
+THRESHOLD = 2.0  # pixels off the epipolar line, up to which a corner takes part: lenses are not known well
 CONFIDENCE = 0.9999
 FAR = 1e4  # bases: farthest point
 LEAST_POINTS = 8
@@ -28,7 +28,7 @@ def relative_orientation(first: Array, second: Array, pixel: float) -> tuple[Arr
     cv2 = opencv()
     eye = np.eye(3)
     E, mask = cv2.findEssentialMat(
-        first, second, eye, method=cv2.RANSAC, prob=CONFIDENCE, threshold=THRESHOLD * pixel
+        first, second, eye, method=cv2.USAC_MAGSAC, prob=CONFIDENCE, threshold=THRESHOLD * pixel
     )
     if E is None or E.shape != (3, 3):
         raise VisionError(
@@ -38,8 +38,8 @@ def relative_orientation(first: Array, second: Array, pixel: float) -> tuple[Arr
     count, turn, shift, _, _ = cv2.recoverPose(E, first, second, eye, distanceThresh=FAR, mask=mask.copy())
     if count < len(first) / 4:
         raise VisionError(
-            f"relative_orientation: found {count} of {len(first)} points ahead of both cameras, expected most of them; check "
-            "that images of both cameras are of the same poses, in the same order"
+            f"relative_orientation: found {count} of {len(first)} points ahead of both cameras, expected most of them; "
+            "check that images of both cameras are of the same poses, in the same order"
         )
     return turn.T, (-turn.T @ shift).ravel()
 
@@ -64,7 +64,9 @@ def triangulated(cameras: tuple[PlacedCamera, ...], directions: Array) -> Array:
     return np.where(twice[..., None], found, np.nan)
 
 
-def cameras_from_points(cameras: tuple[Camera, ...], directions: Array, points: Array) -> tuple[PlacedCamera, ...]:
+def cameras_from_points(
+    cameras: tuple[Camera, ...], directions: Array, points: Array
+) -> tuple[PlacedCamera, ...]:
     """Where cameras stand in the axes of the first, m; the side of the pattern tells the length of the first base."""
     placed = [cameras[0].placed(np.zeros(3), np.eye(3))]
     for c in range(1, len(cameras)):
@@ -73,7 +75,7 @@ def cameras_from_points(cameras: tuple[Camera, ...], directions: Array, points: 
         R, r = relative_orientation(directions[0][both], directions[c][both], pixel)
         pair = (placed[0], cameras[c].placed(r, R))
         corners = triangulated(pair, directions[[0, c]])
-        scale = float(np.nanmedian(extents(points[None]) / extents(corners[both.all(axis=1)])))
+        scale = float(np.nanmedian(extents(points[None]) / extents(corners[both.min(axis=1)])))
         placed.append(cameras[c].placed(scale * r, R))
     return tuple(placed)
 

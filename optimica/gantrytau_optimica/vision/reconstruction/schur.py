@@ -1,6 +1,6 @@
 """Least squares of many small blocks of unknowns that share a few others: Levenberg and Marquardt by Schur complements.
 
-Rows of block b know its own unknowns y_b and the shared x, no other block:
+BlockRows of block b know its own unknowns y_b and the shared x, no other block:
 
     H_b = A_b' A_b      W_b = A_b' C_b      V = sum C_b' C_b + C_0' C_0
     (V - sum W_b' H_b^-1 W_b) dx = -(g - sum W_b' H_b^-1 g_b),    dy_b = -H_b^-1 (g_b + W_b dx)
@@ -24,8 +24,8 @@ State = TypeVar("State")
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Errors and their derivatives: error (B, m), by_own (B, m, d), by_shared (B, m, S); of shared unknowns alone (k,), (k, S)."""
+class BlockRows:
+    """Errors (B, m) and derivatives, by_own (B, m, d), by_shared (B, m, S); those of shared unknowns alone, (k,), (k, S)."""
 
     error: Array
     by_own: Array
@@ -40,9 +40,9 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
-    """Normal equations without own unknowns: H^-1 (B, d, d), H^-1 W (B, d, S), H^-1 g (B, d), what these alone gain, complement
-    (S, S) and right side (S,) of the shared ones.
+class WithoutOwn:
+    """Normal equations without own unknowns: H^-1 (B, d, d), H^-1 W (B, d, S), H^-1 g (B, d), what these alone gain,
+    complement (S, S) and right side (S,) of the shared ones.
     """
 
     own: Array
@@ -53,11 +53,13 @@ class Reduced:
     right: Array
 
 
-def reduced(rows: Rows, damping: float = 0.0) -> Reduced:
+def reduced(rows: BlockRows, damping: float = 0.0) -> WithoutOwn:
     """The normal equations of rows; LinAlgError where a block does not determine its own unknowns."""
     turned = rows.by_own.transpose(0, 2, 1)
     H, W, g = turned @ rows.by_own, turned @ rows.by_shared, turned @ rows.error[..., None]
-    flat = np.concatenate([rows.by_shared.reshape(rows.error.size, rows.by_shared.shape[-1]), rows.by_shared_0])
+    flat = np.concatenate(
+        [rows.by_shared.reshape(rows.error.size, rows.by_shared.shape[-1]), rows.by_shared_0]
+    )
     V, right = flat.T @ flat, flat.T @ np.concatenate([rows.error.ravel(), rows.error_0])
     if damping:
         H = H * (1 + damping * np.eye(H.shape[-1]))
@@ -67,30 +69,25 @@ def reduced(rows: Rows, damping: float = 0.0) -> Reduced:
     wide = W.reshape(alone.size, len(V))
     complement = V - wide.T @ coupling.reshape(wide.shape)
     gain = float(np.sum(alone[..., None] * g))
-    return Reduced(own, coupling, alone, gain, complement, right - wide.T @ alone.ravel())
+    return WithoutOwn(own, coupling, alone, gain, complement, right - wide.T @ alone.ravel())
 
 
 def minimised(
-    state: State, rows_of: Callable[[State], Rows], moved: Callable[[State, Array, Array], State]
-) -> tuple[State, Rows, int]:
+    state: State, rows_of: Callable[[State], BlockRows], moved: Callable[[State, Array, Array], State]
+) -> tuple[State, BlockRows, int]:
     """The state of least squares from one near to it, its rows, and how many steps it took.
 
     moved: the state after steps (S,) of shared unknowns and (B, d) of own ones.
     """
     rows, damping = rows_of(state), 0.0
     for step in range(1, ROUNDS + 1):
-        try:
-            equations = reduced(rows, damping)
-            shared = -np.linalg.solve(equations.complement, equations.right)
-        except np.linalg.LinAlgError:
-            shared = np.full(rows.by_shared.shape[-1], np.nan)
-        if np.all(np.isfinite(shared)):
-            own = -equations.alone - equations.coupling @ shared
+        shared, own, gain = _step(rows, damping)
+        if np.isfinite(gain):
             trial = moved(state, shared, own)
             after = rows_of(trial)
             if after.cost <= rows.cost * (1 + ROUNDING):
                 state, rows = trial, after
-                if equations.gain - equations.right @ shared <= GAIN * rows.cost:
+                if gain <= GAIN * rows.cost:
                     return state, rows, step
                 damping = EASED * damping if damping > FIRST else 0.0
                 continue
@@ -98,3 +95,14 @@ def minimised(
         if damping > MOST:
             return state, rows, step
     return state, rows, ROUNDS
+
+
+def _step(rows: BlockRows, damping: float) -> tuple[Array, Array, float]:
+    """Steps of shared and own unknowns, and what they should gain of the cost; NaN where rows do not determine them."""
+    try:
+        equations = reduced(rows, damping)
+        shared = -np.linalg.solve(equations.complement, equations.right)
+    except np.linalg.LinAlgError:
+        return np.zeros(0), np.zeros(0), np.nan
+    own = -equations.alone - equations.coupling @ shared
+    return shared, own, equations.gain - float(equations.right @ shared)

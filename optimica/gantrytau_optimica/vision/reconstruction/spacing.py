@@ -111,9 +111,9 @@ def _lines(differences: Array) -> Array:
     """Numbers of groups whose rows are alike, (N,)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    pairs = cKDTree(differences).query_pairs(ALIKE, output_type="ndarray")
+    pairs = KDTree(differences).query_pairs(ALIKE, output_type="ndarray")
     size = len(differences)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (size, size))
     return connected_components(graph, directed=False)[1]

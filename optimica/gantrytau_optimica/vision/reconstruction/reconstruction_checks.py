@@ -31,7 +31,8 @@ def check_images(detections: Detections, cameras: Sequence[Camera]) -> tuple[Cam
     wrong = next((each for each in lenses if not isinstance(each, Camera)), None)
     if wrong is not None:
         raise VisionError(
-            f"reconstruct: found {type(wrong).__name__} among cameras, expected gantrytau_optimica.vision.Camera, the lens alone"
+            f"reconstruct: found {type(wrong).__name__} among cameras, expected Camera of vision, "
+            "the lens alone"
         )
     if len(lenses) != len(detections.size):
         raise VisionError(
@@ -46,10 +47,18 @@ def check_images(detections: Detections, cameras: Sequence[Camera]) -> tuple[Cam
     return lenses
 
 
-def check_words(intrinsics: str, scale: str | None, spacing: Any, orientation: str, corners: str, count: int) -> str:
+def check_words(
+    intrinsics: str, scale: str | None, spacing: Any, orientation: str, corners: str, count: int
+) -> str:
     """What tells the scale; VisionError for unknown words and for words that contradict each other."""
-    scale = ("pattern" if spacing is None else "both" if corners == "plate" else "spacing") if scale is None else scale
-    for name, value in dict(intrinsics=intrinsics, scale=scale, orientation=orientation, corners=corners).items():
+    scale = (
+        ("pattern" if spacing is None else "both" if corners == "plate" else "spacing")
+        if scale is None
+        else scale
+    )
+    for name, value in dict(
+        intrinsics=intrinsics, scale=scale, orientation=orientation, corners=corners
+    ).items():
         if value not in KNOWN[name]:
             listed = ", ".join(map(repr, KNOWN[name]))
             raise VisionError(
@@ -61,13 +70,19 @@ def check_words(intrinsics: str, scale: str | None, spacing: Any, orientation: s
             "scale='pattern'"
         )
     if scale == "pattern" and spacing is not None:
-        raise VisionError("reconstruct: found spacing and scale='pattern', which leaves it out; take scale='both'")
+        raise VisionError(
+            "reconstruct: found spacing and scale='pattern', which leaves it out; take scale='both'"
+        )
     if corners == "free":
         refused = None
         if scale == "both":
-            refused = "scale='both', expected 'spacing' or 'pattern': free corners are scaled once, at the end"
+            refused = (
+                "scale='both', expected 'spacing' or 'pattern': free corners are scaled once, at the end"
+            )
         elif intrinsics == "estimate":
-            refused = "intrinsics='estimate', expected 'fixed': without the plate images do not tell the lenses"
+            refused = (
+                "intrinsics='estimate', expected 'fixed': without the plate images do not tell the lenses"
+            )
         elif count < 2:
             refused = "one camera, expected two or more: depth of a single corner is not seen by one"
         if refused:
@@ -76,18 +91,18 @@ def check_words(intrinsics: str, scale: str | None, spacing: Any, orientation: s
 
 
 def usable_poses(detections: Detections) -> np.ndarray:
-    """Rows of poses that two cameras saw, or the only one; VisionError for fewer than ten, with the step that lost the others."""
+    """Rows of poses that two cameras saw, or the only one; VisionError for fewer than ten, with what lost the others."""
     needed = min(2, len(detections.size))
     rows = np.flatnonzero(detections.found.sum(axis=0) >= needed)
     if len(rows) < LEAST_POSES:
         steps = Counter(step for step in detections.steps.ravel().tolist() if step)
-        words = [
-            f"{count} images at {step!r}, {rows_in_words(np.flatnonzero((detections.steps == step).any(axis=0)))}: {LOST[step]}"
-            for step, count in steps.most_common()
-        ]
+        where = {
+            step: rows_in_words(np.flatnonzero((detections.steps == step).any(axis=0))) for step in steps
+        }
+        words = [f"{n} images at {step!r}, {where[step]}: {LOST[step]}" for step, n in steps.most_common()]
         lost = "; ".join(words) if words else "no image was lost"
         raise VisionError(
-            f"reconstruct: found {len(rows)} poses of {len(detections.numbers)} with the pattern in {needed} images, expected at "
-            f"least {LEAST_POSES}; lost were {lost}"
+            f"reconstruct: found {len(rows)} poses of {len(detections.numbers)} with the pattern in {needed} images, "
+            f"expected at least {LEAST_POSES}; lost were {lost}"
         )
     return rows

@@ -1,0 +1,1 @@
+"""Places by cameras beside those of a laser tracker."""

@@ -1,0 +1,96 @@
+"""What reconstruct refuses, and what it notices."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gantrytau_optimica.vision import Camera, Detections, Pattern, VisionError, reconstruct
+from tests.optimica.vision.camera_rig import LENS, TYPICAL, lines, pair, seen
+
+BOTH = [LENS, LENS]
+WRONGLY: Any = reconstruct  # called with what types forbid
+R, Q = lines(7, count=5)
+IMAGES = seen(R, pair())
+
+
+def of(**changes) -> Detections:
+    return replace(IMAGES, **changes)
+
+
+def lost(rows):
+    corners, steps = IMAGES.corners.copy(), np.where(IMAGES.found, "", "corners").astype("U16")
+    corners[0, rows], steps[0, rows] = np.nan, "dark"
+    return of(corners=corners, steps=steps)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: WRONGLY(IMAGES, BOTH, intrinsics="fix"), "intrinsics='fix', expected one of 'fixed', 'estimate'"),
+        (lambda: WRONGLY(IMAGES, BOTH, scale="laser"), "scale='laser', expected one of"),
+        (lambda: WRONGLY(IMAGES, BOTH, orientation="constant"), "orientation='constant', expected one of"),
+        (lambda: WRONGLY(IMAGES, BOTH, corners="points"), "corners='points', expected one of"),
+        (lambda: reconstruct(IMAGES, BOTH, scale="both"), "scale='both' without spacing, expected spacing="),
+        (lambda: reconstruct(IMAGES, BOTH, scale="pattern", spacing=Q), "which leaves it out; take scale='both'"),
+        (lambda: reconstruct(IMAGES, BOTH, corners="free", scale="both", spacing=Q), "free corners are scaled once"),
+        (lambda: reconstruct(IMAGES, BOTH, corners="free", intrinsics="estimate"), "without the plate images do not tell"),
+        (lambda: reconstruct(IMAGES, [LENS]), "found 1 cameras and images of 2, expected one lens for each"),
+        (lambda: WRONGLY(IMAGES, pair()), "found Camera among cameras, expected Camera of vision, the lens alone"),
+        (lambda: WRONGLY(R, BOTH), "found ndarray, expected Detections"),
+        (
+            lambda: reconstruct(IMAGES, [LENS, Camera.guess((512, 384), 645.0)]),
+            "camera 2: found K for 512 x 384 pixels and images of 1024 x 768, expected the same; K scales",
+        ),
+        (
+            lambda: reconstruct(lost(np.arange(55)), BOTH),
+            "found 5 poses of 60 with the pattern in 2 images, expected at least 10; lost were 55 images at 'dark', "
+            "rows 0 to 54: it is black",
+        ),
+        (lambda: reconstruct(IMAGES, BOTH, spacing=Q[:5]), r"found spacing of shape \(5, 3\), expected \(60,\)"),
+        (lambda: reconstruct(IMAGES, BOTH, spacing=1000 * Q), "expected distances in m, below 20; divide mm by 1000"),
+        (lambda: reconstruct(IMAGES, BOTH, spacing=0.1 * Q), "times as large as its side says, expected about 1"),
+        (lambda: reconstruct(IMAGES, BOTH, spacing=0 * Q), "poses of a line within 0 m, expected a spacing above"),
+        (
+            lambda: reconstruct(IMAGES, BOTH, spacing=np.random.default_rng(1).random(Q.shape)),
+            "no two poses whose carts differ by one common shift",
+        ),
+        (
+            lambda: reconstruct(IMAGES, BOTH, spacing=np.roll(Q, 1, axis=0)),
+            "images and carts are shifted by one",
+        ),
+        (
+            lambda: reconstruct(IMAGES, BOTH, spacing=Q[np.random.default_rng(1).permutation(len(Q))]),
+            "miss the spacing along the guideways by .* check that rows of spacing are those of the images",
+        ),
+        (
+            lambda: reconstruct(of(corners=np.stack([IMAGES.corners[0], np.roll(IMAGES.corners[1], 1, axis=0)])), BOTH),
+            "images of camera 2 are one pose late",
+        ),
+        (lambda: reconstruct(IMAGES, BOTH).measurements(Q[:4]), r"found q of shape \(4, 3\), expected \(60, n\)"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused_by_name(call, words):
+    with pytest.raises(VisionError, match=words):
+        call()
+
+
+def test_swapped_lenses_are_noticed():
+    wide = Camera([[1500.0, 0, 520], [0, 1500.0, 390], [0, 0, 1]])
+    images = seen(R, [pair(wide)[0], pair()[1]])
+    with pytest.raises(VisionError, match="lenses are swapped"):
+        reconstruct(images, [LENS, wide])
+
+
+def test_one_line_of_poses_does_not_tell_a_lens():
+    r, q = lines(7, count=1, each=14)
+    found = reconstruct(seen(r, pair(TYPICAL)), BOTH, spacing=q, intrinsics="estimate")
+    assert {finding.kind for finding in found.findings} == {"lens"}
+    assert "the centre across, the centre down hardly better" in str(found)
+
+
+def test_a_size_that_spacing_contradicts_is_told():
+    images = of(pattern=Pattern.quincunx(0.063))
+    found = reconstruct(images, BOTH, spacing=Q, scale="spacing")
+    assert [finding.kind for finding in found.findings] == ["size"]
