@@ -82,7 +82,7 @@ class Bundle:
         """How many shared unknowns there are."""
         return max(each.stop for each in self.columns.values())
 
-    @property
+    @cached_property
     def seen(self) -> Array:
         """1 where a corner was found, else 0, (C, N, P)."""
         return np.isfinite(self.pixels[..., 0]).astype(float)
@@ -166,10 +166,11 @@ class Bundle:
             extra = np.zeros((len(own), 1, self.shared))
             extra[:, 0, self.columns["offsets"]] = by_offset
             by_shared = np.concatenate([by_shared, extra], axis=1)
-        if not told.plate:  # a corner that no two cameras saw stays where the others have it
-            lost = (self.seen.sum(axis=0) < min(2, len(self.given))).reshape(-1, 1, 1)
+        lost = self.seen.sum(axis=0) < 2
+        if not told.plate and lost.any():  # a corner that no two cameras saw stays where the others have it
             error = np.column_stack([error, np.zeros((len(error), 3))])
-            own = np.concatenate([own, lost * np.eye(3) / FILLED], axis=1)
+            held = lost.reshape(-1, 1, 1) * np.eye(3) / FILLED
+            own = np.concatenate([own, held], axis=1)
             by_shared = np.concatenate([by_shared, np.zeros((len(own), 3, self.shared))], axis=1)
         if told.lenses:
             for c, (camera, given) in enumerate(zip(state.cameras, self.given, strict=True)):
