@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands import controller, fmu
+from gantrytau.commands import controller, fmu, vision
 from gantrytau.commands.calibrate.calibrate_command import calibrate
 from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
@@ -70,3 +70,4 @@ app.command(
 app.command(epilog="Example: gantrytau library --json")(library)
 app.add_typer(fmu.app, name="fmu")
 app.add_typer(controller.app, name="controller")
+app.add_typer(vision.app, name="vision")

@@ -8,6 +8,8 @@ from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.image_files import read_poses, write_poses
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
+from gantrytau_optimica.vision.pages.vision_page import write_vision_page
+from gantrytau_optimica.vision.places_files import paired, read_carts, read_places
 from gantrytau_optimica.vision.reconstruction.reconstruct import reconstruct
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.scenes.render import Images, render
@@ -25,10 +27,14 @@ __all__ = [
     "VisionError",
     "compare",
     "detect",
+    "paired",
     "plot_comparison",
+    "read_carts",
+    "read_places",
     "read_poses",
     "reconstruct",
     "render",
     "true_corners",
     "write_poses",
+    "write_vision_page",
 ]

@@ -10,13 +10,15 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.kinematics.rotations import of_quaternions
+from gantrytau.kinematics.rotations import of_quaternions, quaternions
 from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.calibration.data.findings import Finding
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
+_COVARIANCE = {"cxx": (0, 0), "cxy": (0, 1), "cxz": (0, 2), "cyy": (1, 1), "cyz": (1, 2), "czz": (2, 2)}
 _ACTUATOR = re.compile(r"q[1-9]\d*")
 
 
@@ -57,7 +59,8 @@ class Measurements:
 
         Columns are known by the names in the first line, in any order. `number` is that of a pose in a plan; rows whose
         `measured` is 0 are left out; columns with other names are not read. Cells are separated by commas, or by
-        semicolons or tabs: then decimals may have a comma. Empty cells count as NaN. rails: as above, or paths of CSV
+        semicolons or tabs: then decimals may have a comma. Empty cells count as NaN. cxx, cxy, cxz, cyy, cyz and czz are
+        the covariance of a position in m2. rails: as above, or paths of CSV
         files with the columns q, x, y, z, one for each guideway.
         Raises ModelError for columns that are missing and cells that are no numbers, with the line.
         """
@@ -73,7 +76,25 @@ class Measurements:
         read = [_rail_file(Path(r)) if isinstance(r, (str, Path)) else r for r in rails] if rails else None
         found = cls(q, r, R, read, numbers=_whole(columns.get("number")))
         found.lines = lines
+        if all(name in columns for name in _COVARIANCE):
+            covariance = np.empty((len(found), 3, 3))
+            for name, (i, j) in _COVARIANCE.items():
+                covariance[:, i, j] = covariance[:, j, i] = columns[name]
+            return found.uncertain(covariance)
         return found
+
+    def write(self, path: str | Path) -> None:
+        """Write the CSV file that `read` reads, without guideways."""
+        columns = {} if self.numbers is None else {"number": self.numbers}
+        columns |= {f"q{k + 1}": column for k, column in enumerate(self.q.T)}
+        columns |= dict(zip(_POSITION, self.r.T, strict=True))
+        if self.R is not None:
+            columns |= dict(zip(_QUATERNION, quaternions(self.R).T, strict=True))
+        if self.covariance is not None:
+            columns |= {name: self.covariance[:, i, j] for name, (i, j) in _COVARIANCE.items()}
+        rows = np.column_stack(list(columns.values()))
+        with replacing(path) as partial:
+            np.savetxt(partial, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
 
     def __len__(self) -> int:
         return len(self.q)
@@ -100,14 +121,14 @@ class Measurements:
         """
         return check_data(self.q, self.r, self.R, self.finite, self.rails)
 
-    def shifted(self, offset: np.ndarray) -> "Measurements":
+    def shifted(self, offset: np.ndarray) -> Self:
         """The measurements with positions moved by an offset, (3,) in m."""
         found = self.select(slice(None))
         found.r = self.r + offset
         found.r.flags.writeable = False
         return found
 
-    def select(self, rows: Any) -> "Measurements":
+    def select(self, rows: Any) -> Self:
         """The measurements of some rows (indices, a slice or a mask), with all guideways."""
         if isinstance(rows, np.ndarray) and rows.dtype != bool and is_all(rows, len(self)):
             return self
@@ -119,7 +140,7 @@ class Measurements:
         found.covariance = None if self.covariance is None else self.covariance[rows]
         return found
 
-    def uncertain(self, covariance: Any) -> "Measurements":
+    def uncertain(self, covariance: Any) -> Self:
         """The measurements with covariances of their positions, (N, 3, 3) in m2: `calibrate` believes sure ones more.
 
         Raises ModelError for other shapes, and for covariances of finite positions that are not finite and above zero.
@@ -244,7 +265,14 @@ def _cells(path: Path, line: int, row: list[str], header: Sequence[str], separat
 
 def _read(name: str) -> bool:
     """Whether a column of this name is read."""
-    return bool(_ACTUATOR.fullmatch(name)) or name in (*_POSITION, *_QUATERNION, "q", "number", "measured")
+    return bool(_ACTUATOR.fullmatch(name)) or name in (
+        *_POSITION,
+        *_QUATERNION,
+        *_COVARIANCE,
+        "q",
+        "number",
+        "measured",
+    )
 
 
 def _whole(numbers: np.ndarray | None) -> np.ndarray | None:

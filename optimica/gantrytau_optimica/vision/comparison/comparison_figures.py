@@ -7,6 +7,7 @@ import numpy as np
 from gantrytau_optimica.vision.comparison.compare import Comparison
 
 ARROW = 0.08  # of the extent of the places: the largest arrow
+MARGIN = 0.12  # of the extent, for arrows at the border
 AXES = "xyz"
 
 
@@ -30,14 +31,16 @@ def plot_comparison(comparison: Comparison, *, file: str | os.PathLike[str]) -> 
         dots.append(axes.scatter(places[:, i], places[:, j], c=amounts, s=14, cmap="viridis"))
         axes.set_xlabel(f"{AXES[i]} [m]")
         axes.set_ylabel(f"{AXES[j]} [m]")
+        axes.margins(MARGIN)
         axes.set_aspect("equal")
     figure.colorbar(dots[0], ax=[shown["a"], shown["b"]], label="error [mm]")
     mean = f"mean {amounts.mean():.2g} mm, largest {amounts.max():.2g} mm"
     figure.suptitle(f"{known.sum()} places: {mean}; arrows {enlarged * 1e3:.3g} times as long")
-    shown["c"].hist(amounts, bins=20, color="tab:blue")
+    bins = int(np.clip(np.sqrt(len(amounts)), 5, 20))
+    shown["c"].hist(amounts, bins=bins, color="tab:blue")
     shown["c"].set_xlabel("error [mm]")
     shown["c"].set_ylabel("places")
     for k, name in enumerate("def"):
-        shown[name].hist(error[:, k], bins=20, color="tab:orange")
+        shown[name].hist(error[:, k], bins=bins, color="tab:orange")
         shown[name].set_xlabel(f"along {AXES[k]} [mm]")
     figure.savefig(file, dpi=120)

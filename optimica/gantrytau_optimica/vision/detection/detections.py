@@ -1,14 +1,21 @@
 """Where the corners of a pattern were found in images, and at which step the others were lost."""
 
-from dataclasses import dataclass, field
+import json
+import os
+import zipfile
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.vision.boards import Pattern
+from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
+ARRAYS = ("corners", "sigma", "steps", "size", "numbers")
 LOST = {  # step -> what it says of an image that ended there, and what to do
     "file": "there is no image, or it cannot be read; take it again or write it anew",
     "dark": "it is black, or of one grey and noise; open the aperture, or look at the lens cap",
@@ -61,6 +68,38 @@ class Detections:
             H = homography(self.pattern.points[there, :2], filled[c, k, there])
             filled[c, k, ~there] = mapped(H, self.pattern.points[~there, :2])
         return filled.mean(axis=2)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Keep them in a file that `read` reads, .npz."""
+        pattern = {f.name: getattr(self.pattern, f.name) for f in fields(Pattern)}
+        told = [dict(kind=f.kind, rows=f.rows.tolist(), message=f.message) for f in self.findings]
+        with replacing(path) as partial, open(partial, "wb") as file:
+            np.savez_compressed(
+                file,
+                **{name: getattr(self, name) for name in ARRAYS},
+                said=np.array(json.dumps({"pattern": pattern, "findings": told})),
+            )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> "Detections":
+        """Detections of a file as of `save`. Raises VisionError for what is none."""
+        path = Path(path)
+        if not path.is_file():
+            raise VisionError(f"{path}: there is no such file; write it by Detections.save")
+        try:
+            with np.load(path, allow_pickle=False) as kept:
+                arrays = {name: kept[name] for name in ARRAYS}
+                said = json.loads(str(kept["said"]))
+                pattern = Pattern(**said["pattern"])
+                told = tuple(
+                    Finding(f["kind"], np.array(f["rows"], dtype=int), f["message"]) for f in said["findings"]
+                )
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            raise VisionError(
+                f"{path}: found no corners of images ({error}), expected a file by `gantrytau vision detect` or "
+                "Detections.save"
+            ) from None
+        return cls(pattern, findings=told, **arrays)
 
     def __str__(self) -> str:
         cameras, poses = self.steps.shape
