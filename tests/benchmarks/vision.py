@@ -2,19 +2,32 @@
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from gantrytau.kinematics.rotations import of_vector, rotation_vector
-from gantrytau_optimica.vision import Detections, Light, Pattern, compare, detect, reconstruct, true_corners
+from gantrytau_optimica.vision import (
+    Detections,
+    Light,
+    Pattern,
+    PatternTracker,
+    compare,
+    detect,
+    reconstruct,
+    render,
+    true_corners,
+)
 from gantrytau_optimica.vision.reconstruction.adjustment import started
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
 from gantrytau_optimica.vision.reconstruction.schur import minimised
 from tests.benchmarks.table import Row, at_least, at_most
-from tests.optimica.vision.camera_rig import LENS, SIDE, TYPICAL, lines, pair, scene, seen, views
+from tests.optimica.vision.camera_rig import LENS, MIDDLE, SIDE, TYPICAL, lines, pair, scene, seen, views
 
 PAIRS, SEED, SEEDS = 60, 100, 10
-RECONSTRUCTIONS = (  # name, cameras, options, the most that is asked for in mm
+RECONSTRUCTIONS: tuple[
+    tuple[str, Any, dict[str, Any], float], ...
+] = (  # name, cameras, options, the most that is asked for in mm
     ("lenses known", pair(), {}, 0.25),
     ("typical lenses estimated", pair(TYPICAL), dict(intrinsics="estimate"), 0.5),
     ("one camera, plate and spacing", pair()[:1], {}, 1.3),
@@ -30,6 +43,23 @@ def rows() -> Iterator[Row]:
     """Detection, then reconstruction."""
     yield from _detected()
     yield from _reconstructed()
+    yield from _followed()
+
+
+def _followed() -> Iterator[Row]:
+    """A moving pattern at 250 Hz: processor time of a pair of images."""
+    times = 0.004 * np.arange(30)
+    r = MIDDLE + np.column_stack([0.5 * times, 0.2 * np.sin(8 * times), -0.1 * np.cos(8 * times)])
+    images = render(scene(), r, pair(), seed=SEED)
+    tracker = PatternTracker(Pattern.quincunx(SIDE), pair())
+    spent, error = [], []
+    for k, true in enumerate(r + scene().place):
+        begin = time.process_time()
+        here = tracker.update([frames[k] for frames in images.frames])
+        spent.append(time.process_time() - begin)
+        error.append(np.inf if here is None else np.linalg.norm(here.r - true))
+    yield at_most("a pair of images, pattern followed", 1e3 * float(np.median(spent[1:])), 4.0, "ms")
+    yield at_most("pattern followed: largest error", 1e3 * float(max(error)), 0.5, "mm")
 
 
 def _reconstructed() -> Iterator[Row]:
@@ -52,7 +82,7 @@ def _reconstructed() -> Iterator[Row]:
         images.corners, np.ones(images.corners.shape[:3]) / 0.1, images.pattern.points, (LENS, LENS), told
     )
     start = started(bundle)
-    taken = []
+    taken, state = [], start
     for _ in range(5):
         begin = time.perf_counter()
         state, _, _ = minimised(start, bundle.rows, bundle.moved)

@@ -14,6 +14,7 @@ from gantrytau_optimica.vision.reconstruction.reconstruct import reconstruct
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.scenes.render import Images, render
 from gantrytau_optimica.vision.scenes.scene import Light, Scene, true_corners
+from gantrytau_optimica.vision.tracking.tracker import PatternTracker, Tracked
 
 __all__ = [
     "Camera",
@@ -22,8 +23,10 @@ __all__ = [
     "Images",
     "Light",
     "Pattern",
+    "PatternTracker",
     "Reconstruction",
     "Scene",
+    "Tracked",
     "VisionError",
     "compare",
     "detect",

@@ -123,7 +123,9 @@ def homography(flat: Array, images: Array) -> Array:
     rows = np.column_stack([a, one])
     upper = np.hstack([rows, zero, -b[:, :1] * rows])
     lower = np.hstack([zero, rows, -b[:, 1:] * rows])
-    H = np.linalg.solve(sides[1], np.linalg.svd(np.vstack([upper, lower]))[2][-1].reshape(3, 3) @ sides[0])
+    both = np.vstack([upper, lower])
+    least = np.linalg.svd(both, full_matrices=len(both) < both.shape[1])[2][-1]
+    H = np.linalg.solve(sides[1], least.reshape(3, 3) @ sides[0])
     return H / H[2, 2]
 
 

@@ -43,10 +43,13 @@ class Edges:
     contrast: float
 
 
-def measure_edges(grey: Array, H: Array, pattern: Pattern, noise: float, least: float) -> Edges | None:
+def measure_edges(
+    grey: Array, H: Array, pattern: Pattern, noise: float, least: float, settled: float = 0.0
+) -> Edges | None:
     """The edges of a quincunx near a projective map of it, or None where they are not those of one.
 
-    noise: of the image, and least: the least contrast of an edge, in grey values.
+    noise: of the image, and least: the least contrast of an edge, in grey values; settled: pixels, by which corners may
+    lie from where they were looked for; if they do so by more, edges are looked for anew, three times at most.
     """
     flat, width = pattern.points[:, :2], None
     found = None
@@ -61,6 +64,8 @@ def measure_edges(grey: Array, H: Array, pattern: Pattern, noise: float, least: 
         H = homography(flat[there], found.corners[there])
         if np.linalg.norm(mapped(H, flat[there]) - found.corners[there], axis=1).max() > APART:
             return None
+        if np.abs(found.corners[there] - squares.reshape(-1, 2)[there]).max() < settled:
+            break
     if found is None or found.good < ENOUGH_EDGES:
         return None
     corners = _without_strays(flat, found.corners)

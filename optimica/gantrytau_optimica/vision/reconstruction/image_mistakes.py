@@ -21,6 +21,7 @@ SIZE_TOLD = (
 )
 LARGE = 0.3  # pixel, of what is left of image points, above which reasons are looked for
 REFUSED = 1.0  # pixel, above which images do not belong together
+CLEARLY = 0.93  # of what is left, below which what is held is better let go: noise gains 2 % by it
 BETTER = 0.6  # of what is left, below which a reason explains it
 TILT = np.radians(0.5)  # from which on a pose is told to be turned
 LEARNT = 0.35  # of the deviation that is assumed of what was given, above which images do not tell a lens
@@ -56,7 +57,8 @@ def check_left(bundle: Bundle, state: State) -> None:
     left = _left(bundle, state)
     if left <= REFUSED:
         return
-    reasons = [words for words, other in _explained(bundle, state) if other < BETTER * left]
+    trials = [*_freed(bundle, state), *_exchanged(bundle)]
+    reasons = [words for words, other in trials if other < BETTER * left]
     raise VisionError(
         f"reconstruct: image points miss by {left:.3g} pixel in the median, expected below {REFUSED:g}; "
         + (
@@ -72,8 +74,12 @@ def suspected(
     """Findings on a reconstruction, rows from 0 of all poses. size: of the pattern as a multiple of its side."""
     found = []
     left = _left(bundle, state)
-    reasons = _explained(bundle, state) if left > LARGE else _turning(bundle, state)
-    for words, other in reasons:
+    for words, other in _freed(bundle, state):
+        if other < CLEARLY * left:
+            found.append(
+                Finding("images", rows, f"image points miss by {left:.3g} pixel in the median; {words}")
+            )
+    for words, other in _exchanged(bundle) if left > LARGE else ():
         if other < BETTER * left:
             found.append(
                 Finding("images", rows, f"image points miss by {left:.3g} pixel in the median; {words}")
@@ -97,14 +103,24 @@ def suspected(
     return found
 
 
-def _explained(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
-    """Reasons, and what would be left of image points with each undone, median in pixels."""
-    told = bundle.told
+def _freed(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
+    """What is held and would not stay where it is held, and what would be left of image points, median in pixels."""
     yield from _turning(bundle, state)
+    told = bundle.told
     if told.plate and not told.lenses:
         estimated = replace(bundle, told=replace(told, lenses=True))
         _, bent, _, _ = adjusted(estimated, state)
-        yield "lenses are not those given; intrinsics='estimate' finds them", _left(estimated, bent)
+        left = _left(estimated, bent)
+        k1 = ", ".join(f"{camera.distortion[0]:.3f}" for camera in bent.cameras)
+        yield (
+            f"with k1 {k1} they would by {left:.3g}: lenses are not those given; intrinsics='estimate' finds them",
+            left,
+        )
+
+
+def _exchanged(bundle: Bundle) -> Iterator[tuple[str, float]]:
+    """Images and lenses in another order, and what would be left of image points, median in pixels."""
+    told = bundle.told
     if len(bundle.given) == 2:
         pixels = bundle.pixels
         others: list[tuple[str, Callable[[], Bundle]]] = [

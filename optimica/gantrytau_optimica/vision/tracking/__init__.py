@@ -1,0 +1,1 @@
+"""A pattern that moves, image by image."""
