@@ -6,6 +6,7 @@ from gantrytau.commands.vision.vision_compare import compare
 from gantrytau.commands.vision.vision_detect import detect
 from gantrytau.commands.vision.vision_example import example
 from gantrytau.commands.vision.vision_reconstruct import reconstruct
+from gantrytau.commands.vision.vision_rehearse import rehearse
 
 app = typer.Typer(
     help="Images of a pattern on a robot, by one camera or more: corners, poses, comparison with a laser.",
@@ -21,3 +22,4 @@ app.command(
     "--estimate --output places.csv"
 )(reconstruct)
 app.command(epilog="Example: gantrytau vision compare places.csv laser.csv --to error.png")(compare)
+app.command(epilog="Example: gantrytau calibrate cell.toml; gantrytau vision rehearse cell-plan")(rehearse)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics import Limits
+from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.procedure.documents.files import plan_on_file, write_plan
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
@@ -57,7 +58,11 @@ class CalibrationPlan(PosePlan):
         found = placed(self._as_planned(measurements), self.q[self.measured], self.r[self.measured])
         moved = Measurements(measurements.q, found.r, found.R, found.rails, numbers=measurements.numbers)
         moved.lines = measurements.lines
-        return moved
+        if measurements.covariance is None:
+            return moved
+        known = np.isfinite(measurements.r).all(axis=1)
+        turn, _ = motion(measurements.r[known], found.r[known])
+        return moved.uncertain(turn @ measurements.covariance @ turn.T)
 
     def missing(self, measurements: Measurements) -> np.ndarray:
         """Rows of the program that are to be measured and that measurements do not hold yet, by their q, or by number."""

@@ -12,6 +12,7 @@ from gantrytau_optimica.vision.pages.vision_page import write_vision_page
 from gantrytau_optimica.vision.places_files import paired, read_carts, read_places
 from gantrytau_optimica.vision.reconstruction.reconstruct import reconstruct
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
+from gantrytau_optimica.vision.rehearsal import Rehearsal, rehearse_plan
 from gantrytau_optimica.vision.scenes.render import Images, render
 from gantrytau_optimica.vision.scenes.scene import Light, Scene, true_corners
 from gantrytau_optimica.vision.tracking.tracker import PatternTracker, Tracked
@@ -25,6 +26,7 @@ __all__ = [
     "Pattern",
     "PatternTracker",
     "Reconstruction",
+    "Rehearsal",
     "Scene",
     "Tracked",
     "VisionError",
@@ -36,6 +38,7 @@ __all__ = [
     "read_places",
     "read_poses",
     "reconstruct",
+    "rehearse_plan",
     "render",
     "true_corners",
     "write_poses",

@@ -27,6 +27,7 @@ from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
 STILL = 1e-4  # m, over which a cart must move to be calibrated
+SHARED = 2.0  # times what links show, from which on foretold errors of positions are shared by poses
 MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
 EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
 
@@ -194,7 +195,23 @@ def judged(found: FittedRods) -> list[Finding]:
         *scaled(found),
         *_far(found),
         *_in_doubt(found),
+        *_shared(found),
     ]
+
+
+def _shared(found: FittedRods) -> Iterator[Finding]:
+    """Errors of positions that their covariance foretells and that closures do not show, as poses share them."""
+    data = found.measurements.select(found.rows)
+    if data.covariance is None:
+        return
+    foretold = float(np.sqrt(np.mean(np.trace(data.covariance, axis1=1, axis2=2))))
+    left = np.sqrt(3) * found.noise
+    if foretold > SHARED * left:
+        words = (
+            f"positions are foretold to be off by {1e3 * foretold:.2g} mm, of which links show {1e3 * left:.2g} mm: the "
+            "rest is shared by neighbouring poses, as by lenses or a scale, and moves the calibrated tool with it"
+        )
+        yield Finding("shared", found.rows, words)
 
 
 def _far(found: FittedRods) -> Iterator[Finding]:

@@ -178,7 +178,7 @@ class PatternTracker:
         seen = np.isfinite(corners).any(axis=(1, 2))
         if not seen.any():
             return None
-        chosen = np.flatnonzero(seen)
+        chosen = np.flatnonzero(seen).tolist()
         directions = np.stack([_directions(self.cameras[c], corners[c]) for c in chosen])
         if len(chosen) > 1:
             flat = tuple(self.cameras[c] for c in chosen)
