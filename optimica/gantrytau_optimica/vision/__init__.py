@@ -1,6 +1,7 @@
 """Cameras: images of a scene, the pattern in them, and poses of the robot from it. Needs OpenCV, the extra `vision`."""
 
 from gantrytau_optimica.vision.boards import Pattern
+from gantrytau_optimica.vision.comparison.arm_table import ArmTable, arm_table
 from gantrytau_optimica.vision.comparison.compare import Comparison, compare
 from gantrytau_optimica.vision.comparison.comparison_figures import plot_comparison
 from gantrytau_optimica.vision.detection.detect import detect
@@ -18,6 +19,7 @@ from gantrytau_optimica.vision.scenes.scene import Light, Scene, true_corners
 from gantrytau_optimica.vision.tracking.tracker import PatternTracker, Tracked
 
 __all__ = [
+    "ArmTable",
     "Camera",
     "Comparison",
     "Detections",
@@ -30,6 +32,7 @@ __all__ = [
     "Scene",
     "Tracked",
     "VisionError",
+    "arm_table",
     "compare",
     "detect",
     "paired",
