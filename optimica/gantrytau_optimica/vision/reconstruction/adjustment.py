@@ -9,6 +9,7 @@ from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.bundle import LENS, Bundle, State
 from gantrytau_optimica.vision.reconstruction.free_network import free_covariance
 from gantrytau_optimica.vision.reconstruction.relative_orientation import (
+    cameras_from_plates,
     cameras_from_points,
     extents,
     plates,
@@ -25,10 +26,14 @@ SIGMA = 0.1  # pixel, of a corner, before it is found from what is left
 LEAST_SIGMA = 1e-3  # pixel; images do not tell more
 
 
-def started(bundle: Bundle) -> State:
-    """A state near to the truth: cameras by five points, corners by their rays, the pattern where it fits these."""
+def started(bundle: Bundle, by_plates: bool = False) -> State:
+    """A state near to the truth: cameras by five points, corners by their rays, the pattern where it fits these.
+
+    by_plates: cameras by the poses of the plate before each instead, where five points tell nothing.
+    """
     directions = np.stack([c.directions(p) for c, p in zip(bundle.given, bundle.pixels, strict=True)])
-    cameras = cameras_from_points(bundle.given, directions, bundle.points)
+    placed = cameras_from_plates if by_plates else cameras_from_points
+    cameras = placed(bundle.given, directions, bundle.points)
     if len(cameras) > 1:
         corners = triangulated(cameras, directions)
         r, R = plates(corners, bundle.points)
@@ -64,7 +69,8 @@ def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, BlockRows, in
         state, rows, steps = minimised(state, bundle.rows, bundle.moved)
         taken += steps
         missed = np.linalg.norm(np.nan_to_num(bundle.residuals(state)), axis=-1)
-        freedom = 2 * bundle.seen.sum() - rows.by_own.shape[0] * rows.by_own.shape[2] - bundle.shared
+        blocks = len(rows.error) if bundle.told.plate else np.count_nonzero(bundle.seen.max(axis=0))
+        freedom = 2 * bundle.seen.sum() - blocks * rows.by_own.shape[2] - bundle.shared
         before, sigma = (
             sigma,
             max(float(np.sqrt(np.sum((share * missed) ** 2) / max(freedom, 1))), LEAST_SIGMA),
@@ -99,21 +105,25 @@ def places(bundle: Bundle, state: State, rows: BlockRows, lengths: Spacing | Non
     own, coupling = equations.own[:, :3, :3], -equations.coupling[:, :3]
     if bundle.told.plate:
         return state, Located(state.r, free_covariance(state.r, own, coupling, shared), state.size, lenses)
-    count, corners = state.corners.shape[:2]
-    r = state.corners.mean(axis=1)
-    each, own = own.reshape(count, corners, 3, 3), own.reshape(count, corners, 3, 3).sum(axis=1) / corners**2
-    coupling = coupling.reshape(count, corners, 3, -1)
+    seen = bundle.seen.max(axis=0)  # corners that nothing is known of stand where the others have them
+    r, R = plates(np.where(seen[..., None] > 0, state.corners, np.nan), bundle.points)
+    filled = r[:, None] + bundle.points @ R.transpose(0, 2, 1)
+    state = replace(state, corners=np.where(seen[..., None] > 0, state.corners, filled))
+    count, corners = seen.shape
+    share = seen / seen.sum(axis=1, keepdims=True)
+    each = own.reshape(count, corners, 3, 3) * seen[..., None, None]
+    own = np.einsum("np,npij->nij", share**2, each)
+    coupling = coupling.reshape(count, corners, 3, -1) * seen[..., None, None]
     scale, slopes = _by_pattern(bundle, state) if lengths is None else _by_spacing(lengths, r, corners)
     spread = float(np.einsum("nki,nkij,nkj->", slopes, each, slopes))
     by_shared = np.einsum("nki,nkis->s", slopes, coupling)
     away = r - r.mean(axis=0)
-    coupling = coupling.mean(axis=1) - away[:, :, None] * by_shared
+    coupling = np.einsum("np,npis->nis", share, coupling) - away[:, :, None] * by_shared
     coupling = np.concatenate([coupling, away[:, :, None]], axis=2)
     both = np.zeros((len(shared) + 1,) * 2)
     both[:-1, :-1], both[-1, -1] = shared, spread
     covariance = scale**2 * free_covariance(r, own, coupling, both)
     cameras = tuple(replace(camera, r=scale * camera.r) for camera in state.cameras)
-    _, R = plates(state.corners, bundle.points)
     state = replace(state, cameras=cameras, r=scale * r, R=R, corners=scale * state.corners)
     return state, Located(scale * r, covariance, _size(state, bundle), lenses)
 

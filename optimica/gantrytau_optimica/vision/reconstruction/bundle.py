@@ -20,7 +20,8 @@ Array = np.ndarray
 LENS = 5  # unknowns of a lens: logarithm of the focal length, centre, k1, k2
 PLACE = 6  # of a camera: turn and shift
 PRIOR = np.array([0.05, 30.0, 30.0, 0.3, 0.5])  # standard deviations of what was given of a lens, assumed
-FILLED = 1e-3  # m, of a corner of its own that no two cameras saw
+FILLED = 1.0  # m, deviation of a corner of its own of which nothing is known
+LONGEST = 0.5  # of the logarithm of a focal length, in one step
 BEHIND = 1e9  # error of a corner that was seen and would be behind its camera
 GAUGE = 1e-6  # of the base: how well it is held where nothing tells a length
 
@@ -84,13 +85,15 @@ class Bundle:
 
     @cached_property
     def seen(self) -> Array:
-        """1 where a corner was found, else 0, (C, N, P)."""
-        return np.isfinite(self.pixels[..., 0]).astype(float)
+        """1 where a corner was found, else 0, (C, N, P); of corners for themselves where two cameras found it."""
+        found = np.isfinite(self.pixels[..., 0])
+        return (found if self.told.plate else found & (found.sum(axis=0) > 1)).astype(float)
 
     def residuals(self, state: State) -> Array:
         """Images less detections, (C, N, P, 2) in pixels, NaN where there are none."""
         points = self.points_at(state)
-        return np.stack([camera.project(points) for camera in state.cameras]) - self.pixels
+        images = np.stack([camera.project(points) for camera in state.cameras])
+        return np.where(self.seen[..., None] > 0, images - self.pixels, np.nan)
 
     def points_at(self, state: State) -> Array:
         """Corners in the axes of the first camera, (N, P, 3) in m."""
@@ -109,7 +112,7 @@ class Bundle:
         lever = points - state.r[:, None] if self.told.plate else points
         for c, camera in enumerate(state.cameras):
             images, slopes = camera.slopes(points)
-            weight = np.where(np.isfinite(self.pixels[c, ..., 0]), self.weights[c], 0.0)[..., None]
+            weight = (self.seen[c] * self.weights[c])[..., None]
             error[:, :, c] = np.where(
                 weight > 0, np.nan_to_num((images - self.pixels[c]) * weight, nan=BEHIND), 0.0
             )
@@ -166,8 +169,8 @@ class Bundle:
             extra = np.zeros((len(own), 1, self.shared))
             extra[:, 0, self.columns["offsets"]] = by_offset
             by_shared = np.concatenate([by_shared, extra], axis=1)
-        lost = self.seen.sum(axis=0) < 2
-        if not told.plate and lost.any():  # a corner that no two cameras saw stays where the others have it
+        lost = self.seen.sum(axis=0) == 0
+        if not told.plate and lost.any():  # what nothing is known of stays where it is
             error = np.column_stack([error, np.zeros((len(error), 3))])
             held = lost.reshape(-1, 1, 1) * np.eye(3) / FILLED
             own = np.concatenate([own, held], axis=1)
@@ -221,5 +224,8 @@ def _with_lens(camera: PlacedCamera, step: Array) -> PlacedCamera:
     bent = np.array(camera.distortion, dtype=float)
     bent[:2] += step[3:]
     return replace(
-        camera, focal=camera.focal * np.exp(step[0]), centre=camera.centre + step[1:3], distortion=bent
+        camera,
+        focal=camera.focal * np.exp(np.clip(step[0], -LONGEST, LONGEST)),
+        centre=camera.centre + step[1:3],
+        distortion=bent,
     )

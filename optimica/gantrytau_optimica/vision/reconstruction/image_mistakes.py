@@ -1,6 +1,6 @@
 """What is doubtful about a reconstruction: spacing of other rows, lenses of other cameras, plates that turn."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ SIZE_TOLD = (
     0.01  # of the side of the pattern, by which spacing says it is another, from which on that is told
 )
 LARGE = 0.3  # pixel, of what is left of image points, above which reasons are looked for
-REFUSED = 1.0  # pixel, above which images do not belong together
+REFUSED, NOISY = 1.0, 3.0  # pixel, and deviations of a corner, above which images do not belong together
 CLEARLY = 0.93  # of what is left, below which what is held is better let go: noise gains 2 % by it
 BETTER = 0.6  # of what is left, below which a reason explains it
 TILT = np.radians(0.5)  # from which on a pose is told to be turned
@@ -52,15 +52,15 @@ def check_spacing(spacing: Spacing, r: Array, rows: Array) -> None:
         )
 
 
-def check_left(bundle: Bundle, state: State) -> None:
-    """VisionError where images do not belong together, with what would explain it."""
-    left = _left(bundle, state)
-    if left <= REFUSED:
+def check_left(bundle: Bundle, state: State, sigma: float) -> None:
+    """VisionError where images do not belong together, with what would explain it; sigma: of a corner in pixels."""
+    left, expected = left_over(bundle, state), max(REFUSED, NOISY * sigma)
+    if left <= expected:
         return
     trials = [*_freed(bundle, state), *_exchanged(bundle)]
     reasons = [words for words, other in trials if other < BETTER * left]
     raise VisionError(
-        f"reconstruct: image points miss by {left:.3g} pixel in the median, expected below {REFUSED:g}; "
+        f"reconstruct: image points miss by {left:.3g} pixel in the median, expected below {expected:.2g}; "
         + (
             "; ".join(reasons)
             or "check the lenses, the side, and that images of all cameras are of the same poses"
@@ -73,7 +73,7 @@ def suspected(
 ) -> list[Finding]:
     """Findings on a reconstruction, rows from 0 of all poses. size: of the pattern as a multiple of its side."""
     found = []
-    left = _left(bundle, state)
+    left = left_over(bundle, state)
     for words, other in _freed(bundle, state):
         if other < CLEARLY * left:
             found.append(
@@ -110,7 +110,7 @@ def _freed(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
     if told.plate and not told.lenses:
         estimated = replace(bundle, told=replace(told, lenses=True))
         _, bent, _, _ = adjusted(estimated, state)
-        left = _left(estimated, bent)
+        left = left_over(estimated, bent)
         k1 = ", ".join(f"{camera.distortion[0]:.3f}" for camera in bent.cameras)
         yield (
             f"with k1 {k1} they would by {left:.3g}: lenses are not those given; intrinsics='estimate' finds them",
@@ -120,40 +120,30 @@ def _freed(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
 
 def _exchanged(bundle: Bundle) -> Iterator[tuple[str, float]]:
     """Images and lenses in another order, and what would be left of image points, median in pixels."""
-    told = bundle.told
-    if len(bundle.given) == 2:
-        pixels = bundle.pixels
-        others: list[tuple[str, Callable[[], Bundle]]] = [
-            (
-                "lenses are swapped: give them in the order of the images",
-                lambda: replace(bundle, given=bundle.given[::-1]),
-            ),
-            (
-                "images of camera 2 are one pose late: leave out its first",
-                lambda: replace(
-                    bundle,
-                    told=replace(told, spacing=None, sized=False),
-                    pixels=np.stack([pixels[0, :-1], pixels[1, 1:]]),
-                    weights=bundle.weights[:, :-1],
-                ),
-            ),
-            (
-                "images of camera 2 are one pose early: leave out the first of camera 1",
-                lambda: replace(
-                    bundle,
-                    told=replace(told, spacing=None, sized=False),
-                    pixels=np.stack([pixels[0, 1:], pixels[1, :-1]]),
-                    weights=bundle.weights[:, 1:],
-                ),
-            ),
-        ]
-        for words, other in others:
-            try:
-                trial = other()
-                trial, fitted, _, _ = adjusted(trial, started(trial))
-            except (GantryTauError, np.linalg.LinAlgError):
-                continue
-            yield words, _left(trial, fitted)
+    if len(bundle.given) != 2:
+        return
+    plain = replace(bundle, told=replace(bundle.told, spacing=None, sized=False))
+    trials = [
+        (
+            "lenses are swapped: give them in the order of the images",
+            replace(plain, given=bundle.given[::-1]),
+        ),
+        ("images of camera 2 are one pose late: leave out its first", _late(plain, 1)),
+        ("images of camera 2 are one pose early: leave out the first of camera 1", _late(plain, 0)),
+    ]
+    for words, trial in trials:
+        try:
+            trial, fitted, _, _ = adjusted(trial, started(trial))
+        except (GantryTauError, np.linalg.LinAlgError):
+            continue
+        yield words, left_over(trial, fitted)
+
+
+def _late(bundle: Bundle, which: int) -> Bundle:
+    """The bundle without the first image of one of two cameras, later ones paired anew."""
+    rows = [slice(1, None) if c == which else slice(None, -1) for c in (0, 1)]
+    pixels = np.stack([each[row] for each, row in zip(bundle.pixels, rows, strict=True)])
+    return replace(bundle, pixels=pixels, weights=bundle.weights[:, :-1])
 
 
 def _turning(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
@@ -169,10 +159,11 @@ def _turning(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
         words = (
             f"plates turn by up to {np.degrees(angles.max()):.3g} deg ({rows_in_words(rows)} of those found)"
         )
-        yield f"{words}; orientation='free' lets them", _left(free, turned)
+        yield f"{words}; orientation='free' lets them", left_over(free, turned)
 
 
-def _left(bundle: Bundle, state: State) -> float:
+def left_over(bundle: Bundle, state: State) -> float:
+    """What is left of image points, median in pixels."""
     return float(np.nanmedian(np.linalg.norm(bundle.residuals(state), axis=-1)))
 
 

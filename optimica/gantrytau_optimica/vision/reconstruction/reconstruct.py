@@ -9,15 +9,23 @@ import numpy as np
 
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
+from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.adjustment import Located, adjusted, places, scaled_by, started
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
-from gantrytau_optimica.vision.reconstruction.image_mistakes import check_left, check_spacing, suspected
+from gantrytau_optimica.vision.reconstruction.image_mistakes import (
+    LARGE,
+    check_left,
+    check_spacing,
+    left_over,
+    suspected,
+)
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
     check_images,
     check_words,
     usable_poses,
 )
+from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
 
 Array = np.ndarray
@@ -55,8 +63,8 @@ def reconstruct(
     told = TakenAsKnown(lenses=intrinsics == "estimate", plate=plate, alike=orientation == "fixed")
     pixels = detections.corners[:, rows]
     bundle = Bundle(pixels, np.ones(pixels.shape[:-1]), detections.pattern.points, lenses, told)
-    bundle, state, fitted, steps = adjusted(bundle, started(bundle))
-    check_left(bundle, state)
+    bundle, state, fitted, steps = _begun(bundle)
+    check_left(bundle, state, float(np.nanmedian(detections.sigma[:, rows])))
     if distances is not None:
         check_spacing(distances, places(bundle, state, fitted, None)[1].r, rows)
         if plate:
@@ -69,6 +77,23 @@ def reconstruct(
     noticed = suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
     seconds = time.perf_counter() - begin
     return replace(found, steps=steps, seconds=seconds, findings=(*detections.findings, *noticed))
+
+
+def _begun(bundle: Bundle) -> tuple[Bundle, State, BlockRows, int]:
+    """The least squares without spacing, from five points, or where these lead nowhere from the plates."""
+    trials, failed = [], None
+    for by_plates in (False, True):
+        try:
+            trials.append(adjusted(bundle, started(bundle, by_plates)))
+        except (VisionError, np.linalg.LinAlgError) as error:
+            failed = failed or error
+            continue
+        if left_over(*trials[-1][:2]) < LARGE:
+            break
+    if not trials:
+        assert failed is not None
+        raise failed
+    return min(trials, key=lambda trial: left_over(*trial[:2]))
 
 
 def _of_all_poses(

@@ -12,6 +12,7 @@ THRESHOLD = 2.0  # pixels off the epipolar line, up to which a corner takes part
 CONFIDENCE = 0.9999
 FAR = 1e4  # bases: farthest point
 LEAST_POINTS = 8
+LEAST_CORNERS = 4  # of a pattern, to tell its size
 
 
 def relative_orientation(first: Array, second: Array, pixel: float) -> tuple[Array, Array]:
@@ -70,13 +71,30 @@ def cameras_from_points(
     """Where cameras stand in the axes of the first, m; the side of the pattern tells the length of the first base."""
     placed = [cameras[0].placed(np.zeros(3), np.eye(3))]
     for c in range(1, len(cameras)):
-        both = np.isfinite(directions[[0, c], ..., 0]).all(axis=0)
+        both = np.asarray(np.isfinite(directions[[0, c], ..., 0]).all(axis=0))
         pixel = 1 / min(cameras[0].K[0, 0], cameras[c].K[0, 0])
         R, r = relative_orientation(directions[0][both], directions[c][both], pixel)
         pair = (placed[0], cameras[c].placed(r, R))
         corners = triangulated(pair, directions[[0, c]])
-        scale = float(np.nanmedian(extents(points[None]) / extents(corners[both.min(axis=1)])))
+        several = np.count_nonzero(both, axis=1) >= LEAST_CORNERS
+        mask = both[several][..., None]
+        apart = extents(np.where(mask, corners[several], np.nan))
+        scale = float(np.median(extents(np.where(mask, points, np.nan)) / apart))
         placed.append(cameras[c].placed(scale * r, R))
+    return tuple(placed)
+
+
+def cameras_from_plates(
+    cameras: tuple[Camera, ...], directions: Array, points: Array
+) -> tuple[PlacedCamera, ...]:
+    """Where cameras stand in the axes of the first, m, by the poses of a plate in each: for those that stand together."""
+    placed = [cameras[0].placed(np.zeros(3), np.eye(3))]
+    r_0, R_0 = plates_of_one(directions[0], points)
+    for c in range(1, len(cameras)):
+        r, R = plates_of_one(directions[c], points)
+        both = np.isfinite(r_0[:, 0]) & np.isfinite(r[:, 0])
+        turn = mean_rotation(R_0[both] @ R[both].transpose(0, 2, 1))
+        placed.append(cameras[c].placed(np.median(r_0[both] - r[both] @ turn.T, axis=0), turn))
     return tuple(placed)
 
 

@@ -21,7 +21,7 @@ ROUNDS = 100
 FIRST, MOST = 1e-9, 1e12  # damping, of the diagonal, once a step without it was in vain
 EASED = 0.1  # damping after a step that gained, and its inverse after one in vain
 ROUNDING = 1e-12  # of the cost
-GAIN = 1e-10  # of the cost: what a last step may still gain
+GAIN = 1e-10  # of the cost, or of one standard deviation: what a last step may still gain
 State = TypeVar("State")
 
 
@@ -89,7 +89,7 @@ def minimised(
             after = rows_of(trial)
             if after.cost <= rows.cost * (1 + ROUNDING):
                 state, rows = trial, after
-                if gain <= GAIN * rows.cost:
+                if gain <= GAIN * max(rows.cost, 1.0):
                     return state, rows, step
                 damping = EASED * damping if damping > FIRST else 0.0
                 continue

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau_optimica.calibration.devices.devices import numbers
 from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
@@ -72,7 +73,7 @@ def spacing_of(given: Any, count: int) -> Spacing:
 
     Raises VisionError for other shapes, for poses that are all at one place, and for lines of one pose each.
     """
-    found = np.asarray(given, dtype=float)
+    found = numbers(given)
     if found.ndim not in (1, 2) or len(found) != count or not found.size:
         raise VisionError(
             f"reconstruct: found spacing of shape {found.shape}, expected ({count},) distances along the guideways or "

@@ -191,3 +191,44 @@ def test_poses_that_one_camera_misses_are_left_out():
     assert len(measured) == len(r) - 1
     assert measured.numbers is not None
     assert 4 not in measured.numbers.tolist()
+
+
+@pytest.mark.parametrize(("corners", "most"), [("plate", 0.2e-3), ("free", 4e-3)])
+def test_corners_that_are_hidden_are_left_out(corners, most):
+    r, q = lines(1, count=5, each=6)
+    images = seen(r, pair())
+    images.corners[np.random.default_rng(0).random(images.corners.shape[:3]) < 0.2] = np.nan
+    found = reconstruct(images, BOTH, spacing=q, corners=corners)
+    error = missed(found, r)
+    assert error.mean < most
+    assert 1 / 2.5 < np.sqrt(np.mean(error.distances**2)) / found.expected < 2.5
+
+
+@pytest.mark.parametrize("base", [0.0, 0.005])
+def test_cameras_that_stand_together_see_like_one(base):
+    r, q = lines(1, count=5, each=6)
+    first = pair()[0]
+    second = LENS.looking(np.add(first.r, [0, base, 0]), [1.3, 3.0, -0.6])
+    found = reconstruct(seen(r, [first, second]), BOTH, spacing=q)
+    error = missed(found, r)
+    assert error.mean < 0.8e-3
+    assert np.linalg.norm(found.cameras[1].r) == pytest.approx(base, abs=2e-3)
+    assert found.expected / 2 < np.sqrt(np.mean(error.distances**2)) < 2 * found.expected
+
+
+def test_three_cameras_see_better_than_two_also_where_one_misses_much():
+    r, q = lines(1, count=5, each=6)
+    third = LENS.looking([4.8, 3.0, 0.2], [1.3, 3.0, -0.6])
+    images = seen(r, [*pair(), third])
+    images.corners[2, ::2], images.steps[2, ::2] = np.nan, "edges"
+    images.corners[0, ::3], images.steps[0, ::3] = np.nan, "edges"
+    found = reconstruct(images, [*BOTH, LENS], spacing=q)
+    assert np.array_equal(found.found, images.found.sum(axis=0) > 1)
+    assert compare(found.r, r).mean < 0.2e-3
+
+
+def test_noisy_corners_are_no_mistake():
+    r, q = lines(1, count=5, each=6)
+    found = reconstruct(seen(r, pair(), noise=2.0), BOTH, spacing=q)
+    assert missed(found, r).mean < 3e-3
+    assert found.findings == ()
