@@ -8,7 +8,8 @@ import casadi as ca
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
-from gantrytau.language.rods import Rods
+from gantrytau.language.self_description.rods import Rods
+from gantrytau.language.self_description.shapes import Shape
 from gantrytau.language.statements import Equation, Requirement
 from gantrytau.language.symbols import Range, derivative_name, split_derivative
 
@@ -167,7 +168,7 @@ class FlatModel:
     as simulations have them; before: symbols of the values of discretes just before an instant, by their names;
     modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from the past;
     ranges: where tables end that are not defined beyond;
-    rods: what a robot says of its links, by name.
+    rods: what a robot says of its links, by name; shapes: what its components look like, by names.
     """
 
     name: str
@@ -194,6 +195,7 @@ class FlatModel:
     ranges: tuple[Range, ...] = ()
     modes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rods: Rods | None = None
+    shapes: tuple[Shape, ...] = ()
 
     @cached_property
     def vectors(self) -> Mapping[str, FlatVariable]:

@@ -1,6 +1,6 @@
 """Writes an instantiated model out as one flat list of variables, parameters and scalar equations."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -34,7 +34,8 @@ from gantrytau.flattening.whens import read_whens, refuse_unassigned, when_sides
 from gantrytau.language.declarations import Parameter
 from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
-from gantrytau.language.rods import rods_of
+from gantrytau.language.self_description.rods import rods_of
+from gantrytau.language.self_description.shapes import Shape, shapes_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
 
@@ -145,7 +146,16 @@ def write_out(instance: Instance) -> FlatModel:
         ranges=_ranges(instance.symbols, spread),
         modes=stated.modes,
         rods=rods_of(instance.root),
+        shapes=_shapes(instance, absent),
     )
+
+
+def _shapes(instance: Instance, absent: Mapping[str, str]) -> tuple[Shape, ...]:
+    """What is seen of the components, but for what hangs on names that this model has no use for."""
+    known = [name for p in instance.quantities for name in (p.name, *p.elements)]
+    found = shapes_of(instance.components, known)
+    gone = {p.name for p in instance.quantities if absent.keys() & set(p.elements)} | set(absent)
+    return tuple(shape for shape in found if not gone & set(shape.names))
 
 
 def _kinds(placed: Sequence[Placed]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from gantrytau.kinematics.rods.configurations import Configuration
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
 from gantrytau.kinematics.workspace.pose_limits import Limits, examine
 from gantrytau.kinematics.workspace.workspace import Workspace, workspace
-from gantrytau.language.rods import RodArm, Rods, RodTurntable, SingleRod
+from gantrytau.language.self_description.rods import RodArm, Rods, RodTurntable, SingleRod
 
 __all__ = [
     "Accuracy",

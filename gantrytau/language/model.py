@@ -130,6 +130,8 @@ class Model(Declared):
                 yield self.m * der(self.v) == -self.c * self.s
     """
 
+    drawn = True  # whether pictures show it and what is in it
+
     def equations(self) -> Iterator[Any]:
         """Equations (`a == b`) and connections (`connect(a, b)`), one per yield."""
         yield from ()

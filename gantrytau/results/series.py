@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.language.self_description.shapes import Shape
 
 Values = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ class Series:
     held: names of scalars that hold their values from one time to the next, as what is sampled does.
     ended: why it ends where it does, "stop" where that was asked for.
     modes: names of the values 0, 1, ... of a scalar, by its name.
+    shapes: what the components of the model look like, by names.
 
     Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
     matrix `R`, (times, 3, 3). `time` is a name, too.
@@ -44,6 +46,7 @@ class Series:
         held: Iterable[str] = (),
         ended: str = "stop",
         modes: Mapping[str, Sequence[str]] | None = None,
+        shapes: Iterable[Shape] = (),
     ):
         self._time = np.array(time, dtype=float)
         if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
@@ -60,6 +63,7 @@ class Series:
         self._held = frozenset(held)
         self._ended = ended
         self._modes = {name: tuple(words) for name, words in (modes or {}).items()}
+        self._shapes = tuple(shapes)
         self._names = (*(name for name in values if name != "time"), *self._aliases)
         self._scalars = frozenset(self._names)
         self._arrays = _arrays(self._names)
@@ -97,6 +101,11 @@ class Series:
     def modes(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the values 0, 1, ... of scalars that are modes, by the names of these."""
         return self._modes
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """What the components of the model look like, by the names of their places."""
+        return self._shapes
 
     def mode(self, name: str) -> np.ndarray:
         """The names of a mode at all times, (times,); ModelError for a variable that is none."""
@@ -199,6 +208,7 @@ class Series:
         words = {name: self.description(name) for name in values}
         own: dict[str, Any] = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
         own["modes"] = {name: words for name, words in self._modes.items() if name in values}
+        own["shapes"] = self._shapes
         return type(self)(self._time, values, units=units, descriptions=words, **own)
 
     def __repr__(self) -> str:

@@ -39,7 +39,7 @@ def result_of(
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
     units, words = labels(dae)
     modes = {n: own for n, own in dae.flat.modes.items() if n in table}
-    own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes)
+    own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes, shapes=dae.flat.shapes)
     return Result(times, table, units=units, descriptions=words, **own)
 
 

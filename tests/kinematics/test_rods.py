@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Array, Model, ModelError, connect, flatten
 from gantrytau.kinematics import Kinematics
-from gantrytau.language.rods import RodArm, Rods, SingleRod
+from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import World
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.gantry_tau import Arm, Cart, Tool

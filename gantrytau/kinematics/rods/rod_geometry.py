@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau.kinematics.rotations import about, cross, of_quaternion
-from gantrytau.language.rods import Rods
+from gantrytau.language.self_description.rods import Rods
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
+from gantrytau.language.self_description.shapes import Ball, Lump
 from gantrytau.mechanics.multibody.frames import Frame, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
 
@@ -23,6 +24,9 @@ class PointMass(Model):
         yield self.v == der(a.r)
         yield self.m * (der(self.v) - self.world.gravity) == a.f
         yield a.t == 0
+
+    def shapes(self):
+        yield Ball(at="frame_a.r", mass="m")
 
 
 class Body(Model):
@@ -81,6 +85,9 @@ class Body(Model):
         # Newton's law for the centre of mass, Euler's in axes fixed to the body
         yield a.f == self.m * (centre - self.world.gravity)
         yield a.t == a.R @ (self.J @ gain + ca.cross(spin, self.J @ spin)) + ca.cross(arm, a.f)
+
+    def shapes(self):
+        yield Lump(at="frame_a.r", R="frame_a.R", mass="m", r_cm="r_cm", J="J")
 
 
 def no_negative_eigenvalue(A: ca.SX, least: float = -1e-12) -> ca.SX:

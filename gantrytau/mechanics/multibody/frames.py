@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, der, root
+from gantrytau.language.self_description.shapes import Stick
 from gantrytau.mechanics.multibody.orientation import about, turning, unit
 
 
@@ -81,6 +82,9 @@ class FixedTranslation(TwoFrames):
         yield b.r == a.r + arm
         yield a.f + b.f == 0
         yield a.t + b.t + ca.cross(arm, b.f) == 0
+
+    def shapes(self):
+        yield Stick(a="frame_a.r", b="frame_b.r")
 
 
 class FixedRotation(TwoFrames):

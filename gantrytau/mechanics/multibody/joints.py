@@ -19,6 +19,7 @@ from gantrytau import (
     require,
 )
 from gantrytau.language.declarations import StateSelect
+from gantrytau.language.self_description.shapes import Ball, Cuboid, ForceArrow, Hinge, Stick, Way
 from gantrytau.language.statements import Branch
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody.frames import Frame, TwoFrames, World
@@ -59,6 +60,11 @@ class Prismatic(TwoFrames):
         yield self.f == -dot(way, b.f)
         yield from _driven_along(self.s, self.f, self.axis, self.support)
 
+    def shapes(self):
+        yield Way(at="frame_a.r", direction="e", coordinate="s", R="frame_a.R")
+        yield Cuboid(at="frame_b.r", size=4.0, R="frame_b.R")
+        yield ForceArrow(at="frame_b.r", force="f", direction="e", R="frame_a.R")
+
 
 class Revolute(TwoFrames):
     """A joint that turns about an axis fixed in both frames, driven through its flange `axis`."""
@@ -92,6 +98,9 @@ class Revolute(TwoFrames):
         yield self.tau == -dot(a.R @ n, b.t)
         yield from _driven_about(self.phi, self.tau, self.axis, self.support)
 
+    def shapes(self):
+        yield Hinge(at="frame_a.r", axis="n", R="frame_a.R")
+
 
 class Cylindrical(TwoFrames):
     """A joint that slides along and turns about an axis fixed in both frames, each driven through its own flange."""
@@ -118,6 +127,10 @@ class Cylindrical(TwoFrames):
         yield self.tau == -dot(a.R @ n, b.t)
         yield from _driven_along(self.s, self.f, self.axis_s, self.support_s)
         yield from _driven_about(self.phi, self.tau, self.axis_phi, self.support_phi)
+
+    def shapes(self):
+        yield Stick(a="frame_a.r", b="frame_b.r")
+        yield Hinge(at="frame_b.r", axis="n", R="frame_a.R")
 
 
 class Universal(TwoFrames):
@@ -170,6 +183,9 @@ class Spherical(TwoFrames):
         yield a.t == 0
         yield b.t == 0
 
+    def shapes(self):
+        yield Ball(at="frame_a.r")
+
 
 class SphericalSpherical(TwoFrames):
     """A rod of constant length with a ball joint at each end and a point mass in its middle."""
@@ -197,6 +213,11 @@ class SphericalSpherical(TwoFrames):
         yield b.f == self.tension * rod + inertial
         yield a.t == 0
         yield b.t == 0
+
+    def shapes(self):
+        yield Stick(a="frame_a.r", b="frame_b.r")
+        yield Ball(at="frame_a.r")
+        yield Ball(at="frame_b.r")
 
 
 def _turned(a: Frame, b: Frame, n: Any, phi: Any, w: Any) -> Branch:

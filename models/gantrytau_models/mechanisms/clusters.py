@@ -6,7 +6,7 @@ Dressler (2012), sections 4.4 and 4.5.
 from collections.abc import Sequence
 
 from gantrytau import Array, Model, Parameter, StateSelect, connect
-from gantrytau.language.rods import RodArm, RodTurntable, SingleRod
+from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, Prismatic, SphericalSpherical
 from gantrytau.mechanics.translational import Flange
 

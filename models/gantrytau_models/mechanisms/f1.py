@@ -11,7 +11,7 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
 from gantrytau.errors import ModelError
-from gantrytau.language.rods import Rods
+from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion
 from gantrytau.mechanics.rotational import Torque

@@ -11,7 +11,8 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
 from gantrytau.errors import ModelError
-from gantrytau.language.rods import RodArm, Rods, SingleRod
+from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
+from gantrytau.language.self_description.shapes import PathLine
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
     Frame,
@@ -86,9 +87,9 @@ class Tool(Model):
     v = Real(3, unit="m/s", description="velocity, resolved in the world", prefer=StateSelect.PREFER)
     world = outer(World)
     body = PointMass(m=m)
-    x = Prismatic(n=[1.0, 0.0, 0.0])
-    y = Prismatic(n=[0.0, 1.0, 0.0])
-    z = Prismatic(n=[0.0, 0.0, 1.0])
+    x = Prismatic(n=[1.0, 0.0, 0.0], drawn=False)
+    y = Prismatic(n=[0.0, 1.0, 0.0], drawn=False)
+    z = Prismatic(n=[0.0, 0.0, 1.0], drawn=False)
     frame = Frame()
 
     def equations(self):
@@ -100,6 +101,9 @@ class Tool(Model):
         yield connect(self.body.frame_a, self.frame)
         yield self.r == self.frame.r
         yield self.v == der(self.r)
+
+    def shapes(self):
+        yield PathLine(at="r")
 
 
 class GantryTau(Model):

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau import Array, Model, Real, StateSelect, connect
 from gantrytau.errors import ModelError
-from gantrytau.language.rods import Rods
+from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.language.self_description.shapes import Shape
 from gantrytau.language.symbols import split_derivative
 
 Signal = Callable[[Any], np.ndarray]
@@ -50,6 +51,11 @@ class Answer(ABC):
     @abstractmethod
     def _rows(self, names: Sequence[str], path: str) -> Callable[[np.ndarray], np.ndarray]:
         """Scalars of a phase as a function of times (n,): (names, n). Raises ModelError for what is not known."""
+
+    @property
+    def shapes(self) -> Sequence[Shape]:
+        """What the components of the model look like; none of an answer that was read from a file."""
+        return ()
 
     @property
     def _only(self) -> Any:
@@ -104,7 +110,9 @@ class Answer(ABC):
             names = self._variables(path)
             rows = dict(zip(names, self._rows(names, path)(phase.time), strict=True))
             title = f"{self.name}.{path}" if path else self.name
-            found[path] = Result(phase.time, rows, units=units, descriptions=words, title=title)
+            found[path] = Result(
+                phase.time, rows, units=units, descriptions=words, title=title, shapes=self.shapes
+            )
         return found
 
     @cached_property

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Dae
+from gantrytau.language.self_description.shapes import Shape
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.built import Built
@@ -37,6 +38,11 @@ class ProgramAnswer(Answer):
     def dae(self) -> Dae:
         """The translated model."""
         return self.built.read.dae
+
+    @property
+    def shapes(self) -> Sequence[Shape]:
+        """What the components of the model look like, by the names of their places."""
+        return self.dae.flat.shapes
 
     @property
     def objective(self) -> float:

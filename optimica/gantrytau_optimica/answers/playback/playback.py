@@ -90,7 +90,8 @@ class Playback:
         units, words = labels(dae)
         table = dict(zip(names, rows[:, keep], strict=True))
         title = f"{self.optimum.name}, played back"
-        return Result(played.times[keep], table, units=units, descriptions=words, title=title)
+        own = dict(title=title, shapes=dae.flat.shapes)
+        return Result(played.times[keep], table, units=units, descriptions=words, **own)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A variable along the motion as played, over `result.time`."""

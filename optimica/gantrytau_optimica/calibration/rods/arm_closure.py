@@ -17,7 +17,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.kinematics.rotations import about, cross, skewed
-from gantrytau.language.rods import RodArm, RodTurntable, SingleRod
+from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
 
 Orientation = Literal["local", "unit", "free"]

@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau import Model, ModelError, flatten
 from gantrytau.compiler.parameters import parameter_table
 from gantrytau.flattening.instantiation import instantiate
-from gantrytau.language.rods import RodArm, Rods, SingleRod, rods_of
+from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod, rods_of
 
 _PARTS = re.compile(r"(\w+)|\[(\d+)\]")
 

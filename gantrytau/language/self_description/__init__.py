@@ -1,0 +1,1 @@
+"""What models say of themselves, by name: rods of robots, shapes of components."""

@@ -1,0 +1,168 @@
+"""What components look like, by the names of their places: for pictures and animations, which know no component.
+
+A model says it in a method `shapes()`, as this rod does:
+
+    def shapes(self):
+        yield Stick("frame_a.r", "frame_b.r")
+
+Names are those of quantities of the component; numbers are places in the world. With `drawn=False` a component is not
+shown, nor what is in it.
+"""
+
+import inspect
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from types import FunctionType
+from typing import Any, ClassVar
+
+from gantrytau.errors import ModelError, did_you_mean
+
+Value = str | float | Sequence[float]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Something to be seen. Its fields that are texts are names of quantities, lengths in m."""
+
+    owner: str = ""  # path of the component that has it; set where a model is written out
+    texts: ClassVar[tuple[str, ...]] = ("owner",)  # fields that are no names
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the quantities that it needs."""
+        values = (getattr(self, field.name) for field in fields(self) if field.name not in self.texts)
+        return tuple(value for value in values if isinstance(value, str))
+
+    def within(self, path: str) -> "Shape":
+        """The same with the names of the whole model, for a component at that path."""
+        found = {
+            field.name: f"{path}.{value}" if path else value
+            for field in fields(self)
+            if field.name not in self.texts and isinstance(value := getattr(self, field.name), str)
+        }
+        return replace(self, owner=path, **found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stick(Shape):
+    """A round bar from one place to another, each (3,) in m; radius: that of all bars of a picture unless given."""
+
+    a: Value
+    b: Value
+    radius: float | str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball(Shape):
+    """A ball at a place. mass: kg, of which its size is taken, as that of a ball of steel, if it has no radius."""
+
+    at: Value
+    radius: float | str | None = None
+    mass: float | str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cuboid(Shape):
+    """A cuboid about a place, its edges along the columns of R (3, 3); size: of its edges, (3,) in m, or one number for a cube
+    that is so many radii of bars long; offset: (3,) in m, of its middle, along R.
+    """
+
+    at: Value
+    size: Value
+    R: str | None = None
+    offset: Value = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lump(Shape):
+    """A rigid body as the cuboid of the same mass (kg) and inertia J (3, 3) in kg.m2 about its centre of mass r_cm, along R."""
+
+    at: Value
+    R: str
+    mass: str
+    r_cm: str
+    J: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hinge(Shape):
+    """A short bar across, about which something turns: at a place, along an axis (3,) in the axes R (3, 3)."""
+
+    at: Value
+    axis: Value
+    R: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Way(Shape):
+    """A straight guideway, from a place along `direction` (3,) in the axes R: as far as `coordinate`, whose unit moves what
+    slides by `direction`, may go, or goes where it has no limits.
+    """
+
+    at: Value
+    direction: Value
+    coordinate: str
+    R: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceArrow(Shape):
+    """A force as an arrow at a place: its value in N along `direction` in the axes R; the largest is as long as all are."""
+
+    at: Value
+    force: str
+    direction: Value
+    R: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathLine(Shape):
+    """The way that a place takes."""
+
+    at: Value
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshFile(Shape):
+    """A mesh of one's own: a file that trimesh reads (STL, OBJ, PLY, GLB), its axes along R (3, 3); scale: m per unit."""
+
+    file: str
+    at: Value
+    R: str | None = None
+    scale: float = 1.0
+    texts: ClassVar[tuple[str, ...]] = ("owner", "file")
+
+
+def shapes_of(components: Iterable[tuple[str, Any]], known: Iterable[str]) -> tuple[Shape, ...]:
+    """The shapes of the components of a model, by their paths; known: names of its quantities.
+
+    Raises ModelError for what is no shape, and for names that do not exist.
+    """
+    names, hidden = set(known), []
+    found: list[Shape] = []
+    for path, component in components:  # whoever holds another comes first
+        if not getattr(component, "drawn", True) or any(path.startswith(f"{above}.") for above in hidden):
+            hidden.append(path)
+            continue
+        for shape in _stated(component, path):
+            placed = shape.within(path)
+            for name in placed.names:
+                if name not in names:
+                    raise ModelError(
+                        f"{path or 'the model'} ({type(component).__name__}).shapes: found '{name}', expected the name of "
+                        f"a quantity{did_you_mean(name, names)}"
+                    )
+            found.append(placed)
+    return tuple(found)
+
+
+def _stated(component: Any, path: str) -> Iterator[Shape]:
+    if not isinstance(inspect.getattr_static(type(component), "shapes", None), FunctionType):
+        return
+    for shape in component.shapes():
+        if not isinstance(shape, Shape):
+            raise ModelError(
+                f"{path or 'the model'} ({type(component).__name__}).shapes: found {shape!r}, expected shapes, as "
+                'Stick(a="frame_a.r", b="frame_b.r")'
+            )
+        yield shape

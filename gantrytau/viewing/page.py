@@ -1,0 +1,196 @@
+"""One page of HTML for any browser, which needs no network: viser's client and what it plays."""
+
+import contextlib
+import html
+import io
+import os
+import webbrowser
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau.errors import ModelError
+from gantrytau.viewing.motion import Motion
+from gantrytau.viewing.solids import COLOURS, Solid, extent, solids
+from gantrytau.whole_files import replacing
+
+SIDES = 24  # of a cone
+VIEW = np.array([0.42, -0.62, 0.3])  # of the camera from the middle, in sizes of what is seen
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """A page that shows a model; in a notebook it shows itself. text: HTML; file: where it stands, None if nowhere."""
+
+    text: str
+    title: str
+    file: Path | None = None
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file and return its path."""
+        with replacing(path) as file:
+            file.write_text(self.text, encoding="utf-8")
+        return Path(path)
+
+    def show(self) -> None:
+        """Open it in the browser; it is saved as robot.html if it stands nowhere yet."""
+        webbrowser.open((self.file or self.save("robot.html")).resolve().as_uri())
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.text, quote=True)}" style="width:100%;height:480px;border:0"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        where = self.file or "not saved"
+        return f"<Page {self.title}: {len(self.text) / 1e6:.2f} MB, {where}>"
+
+
+def page(motions: Sequence[Motion], names: Sequence[str], title: str) -> str:
+    """The HTML of motions beside each other, each under its name."""
+    with _quiet_server() as server:
+        scene, playing = server.scene, []
+        scene.set_up_direction("+z")
+        corners = [extent(motion) for motion in motions]
+        whole = max(float(np.linalg.norm(high - low)) for low, high in corners) or 1.0
+        shift = np.zeros(3)
+        for motion, name, (low, high) in zip(motions, names, corners, strict=True):
+            parent = f"/{name or motion.title or 'model'}".replace(" ", "_")
+            scene.add_frame(parent, show_axes=False, position=shift)
+            if name:
+                scene.add_label(f"{parent}/name", name, position=(low + high) / 2 + [0, 0, 0.6 * whole])
+            scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.004 * whole)
+            playing += [_Player(scene, f"{parent}/{k}", motion, s) for k, s in enumerate(solids(motion))]
+            shift = shift + [0.0, 1.3 * max(high[1] - low[1], 0.5 * whole), 0.0]
+        _stage(server, corners, len(motions), whole)
+        serializer = server.get_scene_serializer()
+        steps = max(len(motion.times) for motion in motions)
+        for k in range(1, steps):
+            serializer.insert_sleep(max(float(motion.step) for motion in motions))
+            for player in playing:
+                player.go(k)
+        return _titled(serializer.as_html(), title)
+
+
+def _titled(text: str, title: str) -> str:
+    return text.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>")
+
+
+def _stage(server: Any, corners: Sequence[Any], count: int, whole: float) -> None:
+    """Floor and camera."""
+    low = np.min([c[0] for c in corners], axis=0)
+    high = np.max([c[1] for c in corners], axis=0)
+    middle = (low + high) / 2 + [0.0, 0.5 * (count - 1) * 1.3 * max(high[1] - low[1], 0.5 * whole), 0.0]
+    cell = float(10.0 ** np.floor(np.log10(whole / 2)))
+    server.scene.add_grid(
+        "/floor",
+        width=3 * whole * count,
+        height=3 * whole * count,
+        cell_size=cell,
+        section_size=5 * cell,
+        position=np.array([middle[0], middle[1], low[2] - 0.05 * whole]),
+    )
+    server.initial_camera.position = middle + VIEW * whole * count**0.7
+    server.initial_camera.look_at = middle
+
+
+class _Player:
+    """A solid on a page, moved from picture to picture where something changes."""
+
+    def __init__(self, scene: Any, name: str, motion: Motion, solid: Solid):
+        from scipy.spatial.transform import Rotation
+
+        self.solid, self.motion = solid, motion
+        self.q = Rotation.from_matrix(solid.R).as_quat()[:, [3, 0, 1, 2]]
+        self.handle = _added(scene, name, solid)
+        self.limited = _at_limits(motion, solid.owner)
+        self.shown: list[Any] = [None] * 4
+        self.go(0)
+
+    def go(self, k: int) -> None:
+        """Show picture k, or the last."""
+        if self.solid.kind == "line":
+            return
+        k = min(k, len(self.q) - 1)
+        limit = bool(self.limited[k])
+        new = [self.solid.r[k], self.q[k], self.solid.size[k], limit]
+        for place, (name, value) in enumerate(zip(("position", "wxyz", "scale", "color"), new, strict=True)):
+            old = self.shown[place]
+            if old is not None and np.allclose(old, value, rtol=0, atol=1e-7):
+                continue
+            self.shown[place] = value
+            if name == "color":
+                if self.solid.kind != "mesh":
+                    self.handle.color = COLOURS["limit" if limit else self.solid.role]
+            elif name == "scale":
+                self.handle.scale = tuple(np.maximum(value, 1e-9).tolist())
+            else:
+                setattr(self.handle, name, value)
+
+
+def _at_limits(motion: Motion, owner: str) -> np.ndarray:
+    """Whether something of a component is at its limit, at each picture."""
+    found = np.zeros(motion.times.size, dtype=bool)
+    for binding in motion.bindings:
+        component = binding.name.rpartition(".")[0]
+        if component and (owner == component or owner.startswith(f"{component}.")):
+            found |= (binding.begin <= motion.times) & (motion.times <= binding.end)
+    return found
+
+
+def _added(scene: Any, name: str, solid: Solid) -> Any:
+    colour = COLOURS[solid.role]
+    if solid.kind == "cylinder":
+        return scene.add_cylinder(name, radius=0.5, height=1.0, color=colour)
+    if solid.kind == "ball":
+        return scene.add_icosphere(name, radius=0.5, color=colour)
+    if solid.kind == "cuboid":
+        return scene.add_box(name, dimensions=(1.0, 1.0, 1.0), color=colour)
+    if solid.kind == "cone":
+        return scene.add_mesh_simple(name, *_cone(), color=colour, side="double")
+    if solid.kind == "line":
+        points = np.stack([solid.r[:-1], solid.r[1:]], axis=1)
+        return scene.add_line_segments(name, points, colour, thickness=3.0, thickness_units="screen")
+    return scene.add_mesh_trimesh(name, _mesh(solid.file))
+
+
+def _cone() -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a cone of diameter and height 1, its base at the origin."""
+    angles = np.arange(SIDES) * 2 * np.pi / SIDES
+    ring = 0.5 * np.stack([np.cos(angles), np.sin(angles), np.zeros(SIDES)], axis=1)
+    vertices = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]])
+    following = (np.arange(SIDES) + 1) % SIDES
+    sides = np.stack([np.arange(SIDES), following, np.full(SIDES, SIDES)], axis=1)
+    base = np.stack([following, np.arange(SIDES), np.full(SIDES, SIDES + 1)], axis=1)
+    return vertices.astype(np.float32), np.vstack([sides, base]).astype(np.uint32)
+
+
+def _mesh(file: Path | None) -> Any:
+    import trimesh
+
+    try:
+        return trimesh.load(str(file), force="mesh")
+    except (OSError, ValueError) as error:
+        raise ModelError(
+            f"{file}: found no mesh ({error}), expected a file of STL, OBJ, PLY or GLB"
+        ) from None
+
+
+@contextlib.contextmanager
+def _quiet_server() -> Iterator[Any]:
+    """A scene of viser. It brings a server along, on a free port of this machine only, which is gone again at once."""
+    try:
+        import viser
+    except ImportError:
+        raise ModelError(
+            "found no viser, which shows models, expected it installed; pip install 'gantrytau[view]'"
+        ) from None
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            yield server
+        finally:
+            server.stop()

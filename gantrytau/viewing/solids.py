@@ -1,0 +1,202 @@
+"""Shapes as solids: unit cylinders, balls, cuboids, cones with a place, an orientation and a size at each picture."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gantrytau.language.self_description.shapes import (
+    Ball,
+    Cuboid,
+    ForceArrow,
+    Hinge,
+    Lump,
+    MeshFile,
+    PathLine,
+    Shape,
+    Stick,
+    Way,
+)
+from gantrytau.viewing.motion import Motion
+
+STEEL = 7800.0  # kg/m3
+THIN = 1 / 130  # of the size of a picture: the radius of bars
+LONGEST = 0.2  # of the size of a picture: the largest force
+COLOURS = dict(
+    bar=(88, 112, 148),
+    ground=(190, 194, 200),
+    ball=(62, 68, 78),
+    body=(120, 150, 190),
+    drive=(226, 140, 46),
+    force=(196, 60, 120),
+    path=(30, 140, 110),
+    limit=(220, 40, 40),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A solid of a kind: cylinder (along z), ball, cuboid, cone (along z, its base at the place), mesh, or line.
+
+    owner: path of its component; r (N, 3) m, R (N, 3, 3), size (N, 3) m: diameters or edges along R; points: of a line, (N, 3).
+    """
+
+    owner: str
+    kind: str
+    role: str
+    r: np.ndarray
+    R: np.ndarray
+    size: np.ndarray
+    file: Path | None = None
+
+    @property
+    def rests(self) -> bool:
+        """Whether it does not move, where anything may."""
+        return len(self.r) > 1 and all(np.ptp(x, axis=0).max() < 1e-9 for x in (self.r, self.R, self.size))
+
+
+def extent(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """The corners (3,) and (3,) in m of the box that holds all places of all times."""
+    names = {v for shape in motion.shapes for key in ("a", "b", "at") if (v := getattr(shape, key, None))}
+    places = np.concatenate([motion.values(name, (3,)) for name in names])
+    return places.min(axis=0), places.max(axis=0)
+
+
+def solids(motion: Motion) -> Iterator[Solid]:
+    """All solids of a motion; what has no extent is left out."""
+    low, high = extent(motion)
+    size = float(np.linalg.norm(high - low)) or 1.0
+    forces = [np.abs(motion.values(s.force)).max() for s in motion.shapes if isinstance(s, ForceArrow)]
+    scene = _Scene(motion, size, size * THIN, max(forces, default=0.0))
+    for shape in motion.shapes:
+        for solid in scene.solids(shape):
+            yield replace(solid, role="ground") if solid.role == "bar" and solid.rests else solid
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    motion: Motion
+    size: float  # m, of the whole
+    thin: float  # m, radius of bars
+    force: float  # N, the largest
+
+    def solids(self, shape: Shape) -> Iterator[Solid]:
+        ways: dict[type, Callable[[Any], Iterator[Solid]]] = {
+            Stick: self._stick,
+            Ball: self._ball,
+            Cuboid: self._cuboid,
+            Lump: self._lump,
+            Hinge: self._hinge,
+            Way: self._way,
+            ForceArrow: self._force,
+            PathLine: self._path,
+            MeshFile: self._mesh,
+        }
+        yield from ways[type(shape)](shape)
+
+    def _stick(self, shape: Stick) -> Iterator[Solid]:
+        a, b = self.motion.values(shape.a, (3,)), self.motion.values(shape.b, (3,))
+        radius = self.thin if shape.radius is None else self.motion.values(shape.radius)
+        yield from self._bar(shape, "bar", a, b, radius)
+
+    def _bar(self, shape: Shape, role: str, a: np.ndarray, b: np.ndarray, radius: Any) -> Iterator[Solid]:
+        """A cylinder from a (N, 3) to b (N, 3), if they are apart."""
+        length = np.linalg.norm(b - a, axis=1)
+        if length.max() > 1e-6 * self.size:
+            yield Solid(
+                shape.owner, "cylinder", role, (a + b) / 2, along(b - a), _sizes(2 * radius, 2 * radius, length)
+            )
+
+    def _ball(self, shape: Ball) -> Iterator[Solid]:
+        r = self.motion.values(shape.at, (3,))
+        if shape.radius is not None:
+            diameter = 2 * self.motion.values(shape.radius)
+        elif shape.mass is not None:
+            diameter = np.cbrt(6 * self.motion.values(shape.mass) / (np.pi * STEEL))
+        else:
+            diameter = np.full(len(r), 3 * self.thin)
+        if diameter.max() > 0:
+            role = "ball" if shape.mass is None else "body"
+            yield Solid(shape.owner, "ball", role, r, _no_turn(r), _sizes(diameter, diameter, diameter))
+
+    def _cuboid(self, shape: Cuboid) -> Iterator[Solid]:
+        whole = isinstance(shape.size, (int, float))
+        size = self.motion.values([self.thin * shape.size] * 3 if whole else shape.size, (3,))
+        r = self.motion.values(shape.at, (3,)) + self.motion.turned(shape.R, shape.offset)
+        yield Solid(
+            shape.owner, "cuboid", "drive" if whole else "body", r, self.motion.rotations(shape.R), size
+        )
+
+    def _lump(self, shape: Lump) -> Iterator[Solid]:
+        mass, J = self.motion.values(shape.mass)[0], self.motion.values(shape.J, (3, 3))[0]
+        if mass <= 0:
+            return
+        moments, axes = np.linalg.eigh(J)
+        axes[:, 2] *= np.linalg.det(axes)
+        # moments of a cuboid: m (b^2 + c^2) / 12 and so on
+        squares = 6 * (moments.sum() - 2 * moments) / mass
+        edges = np.maximum(np.sqrt(np.maximum(squares, 0)), self.thin)
+        R = self.motion.rotations(shape.R)
+        r = self.motion.values(shape.at, (3,)) + self.motion.turned(shape.R, shape.r_cm)
+        yield Solid(shape.owner, "cuboid", "body", r, R @ axes, np.broadcast_to(edges, r.shape))
+
+    def _hinge(self, shape: Hinge) -> Iterator[Solid]:
+        r, axis = self.motion.values(shape.at, (3,)), self.motion.turned(shape.R, shape.axis)
+        half = 3 * self.thin * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        yield from self._bar(shape, "ball", r - half, r + half, 1.6 * self.thin)
+
+    def _way(self, shape: Way) -> Iterator[Solid]:
+        s = self.motion.values(shape.coordinate)
+        margin = 0.05 * self.size
+        r, way = self.motion.values(shape.at, (3,)), self.motion.turned(shape.R, shape.direction)
+        yield from self._bar(
+            shape, "bar", r + (s.min() - margin) * way, r + (s.max() + margin) * way, 0.7 * self.thin
+        )
+
+    def _force(self, shape: ForceArrow) -> Iterator[Solid]:
+        if self.force <= 0:
+            return
+        way = self.motion.turned(shape.R, shape.direction)
+        way = way / np.linalg.norm(way, axis=1, keepdims=True)
+        arrow = way * (self.motion.values(shape.force) / self.force * LONGEST * self.size)[:, None]
+        length = np.linalg.norm(arrow, axis=1)
+        if length.max() <= 1e-3 * self.size:
+            return
+        r, head = self.motion.values(shape.at, (3,)), np.minimum(6 * self.thin, length)
+        towards = arrow / np.maximum(length, 1e-12)[:, None]
+        yield from self._bar(shape, "force", r, r + arrow - towards * head[:, None], 0.5 * self.thin)
+        sizes = _sizes(0.6 * head, 0.6 * head, head)
+        yield Solid(shape.owner, "cone", "force", r + arrow - towards * head[:, None], along(arrow), sizes)
+
+    def _path(self, shape: PathLine) -> Iterator[Solid]:
+        r = self.motion.values(shape.at, (3,))
+        if np.ptp(r, axis=0).max() > 1e-6 * self.size:
+            yield Solid(shape.owner, "line", "path", r, _no_turn(r), np.ones_like(r))
+
+    def _mesh(self, shape: MeshFile) -> Iterator[Solid]:
+        r = self.motion.values(shape.at, (3,))
+        size = np.full_like(r, shape.scale)
+        yield Solid(
+            shape.owner, "mesh", "body", r, self.motion.rotations(shape.R), size, file=Path(shape.file)
+        )
+
+
+def along(way: np.ndarray) -> np.ndarray:
+    """Rotations (N, 3, 3) that turn z into the directions (N, 3), by the shortest way; any where there is none."""
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    z = np.where(length > 1e-12, way / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
+    # an axis across that is far from z
+    least = np.eye(3)[np.argmin(np.abs(z), axis=1)]
+    x = np.cross(least, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def _sizes(x: Any, y: Any, z: Any) -> np.ndarray:
+    return np.stack(np.broadcast_arrays(x, y, z), axis=1).astype(float)
+
+
+def _no_turn(r: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(np.eye(3), (len(r), 3, 3))
