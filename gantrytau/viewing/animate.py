@@ -46,7 +46,9 @@ def animate(
     if not together:
         raise ModelError("animate: found an empty list, expected results of simulate or optimize")
     if names is not None and len(names) != len(together):
-        raise ModelError(f"animate: found {len(names)} names for {len(together)} results, expected one for each")
+        raise ModelError(
+            f"animate: found {len(names)} names for {len(together)} results, expected one for each"
+        )
     motions = [motion_of(one, speed) for one in together]
     titles = list(names) if names is not None else [m.title if len(motions) > 1 else "" for m in motions]
     if len(set(titles)) < len(titles):

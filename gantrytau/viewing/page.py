@@ -40,9 +40,7 @@ class Page:
         webbrowser.open((self.file or self.save("robot.html")).resolve().as_uri())
 
     def _repr_html_(self) -> str:
-        return (
-            f'<iframe srcdoc="{html.escape(self.text, quote=True)}" style="width:100%;height:480px;border:0"></iframe>'
-        )
+        return f'<iframe srcdoc="{html.escape(self.text, quote=True)}" style="width:100%;height:480px;border:0"></iframe>'
 
     def __repr__(self) -> str:
         where = self.file or "not saved"
@@ -142,18 +140,22 @@ def _at_limits(motion: Motion, owner: str) -> np.ndarray:
 
 
 def _added(scene: Any, name: str, solid: Solid) -> Any:
-    colour = COLOURS[solid.role]
+    colour: dict[str, Any] = dict(color=COLOURS[solid.role])
+    if solid.role == "body":  # what hangs on it is seen through it
+        colour["opacity"] = 0.45
     if solid.kind == "cylinder":
-        return scene.add_cylinder(name, radius=0.5, height=1.0, color=colour)
+        return scene.add_cylinder(name, radius=0.5, height=1.0, **colour)
     if solid.kind == "ball":
-        return scene.add_icosphere(name, radius=0.5, color=colour)
+        return scene.add_icosphere(name, radius=0.5, **colour)
     if solid.kind == "cuboid":
-        return scene.add_box(name, dimensions=(1.0, 1.0, 1.0), color=colour)
+        return scene.add_box(name, dimensions=(1.0, 1.0, 1.0), **colour)
     if solid.kind == "cone":
-        return scene.add_mesh_simple(name, *_cone(), color=colour, side="double")
+        return scene.add_mesh_simple(name, *_cone(), **colour, side="double")
     if solid.kind == "line":
         points = np.stack([solid.r[:-1], solid.r[1:]], axis=1)
-        return scene.add_line_segments(name, points, colour, thickness=3.0, thickness_units="screen")
+        return scene.add_line_segments(
+            name, points, COLOURS[solid.role], thickness=3.0, thickness_units="screen"
+        )
     return scene.add_mesh_trimesh(name, _mesh(solid.file))
 
 

@@ -23,7 +23,7 @@ from gantrytau.viewing.motion import Motion
 
 STEEL = 7800.0  # kg/m3
 THIN = 1 / 130  # of the size of a picture: the radius of bars
-LONGEST = 0.2  # of the size of a picture: the largest force
+LONGEST = 0.15  # of the size of a picture: the largest force
 COLOURS = dict(
     bar=(88, 112, 148),
     ground=(190, 194, 200),
@@ -68,8 +68,9 @@ def solids(motion: Motion) -> Iterator[Solid]:
     """All solids of a motion; what has no extent is left out."""
     low, high = extent(motion)
     size = float(np.linalg.norm(high - low)) or 1.0
-    forces = [np.abs(motion.values(s.force)).max() for s in motion.shapes if isinstance(s, ForceArrow)]
-    scene = _Scene(motion, size, size * THIN, max(forces, default=0.0))
+    arrows = (_force(motion, shape) for shape in motion.shapes if isinstance(shape, ForceArrow))
+    largest = max((float(np.linalg.norm(f, axis=1).max()) for f in arrows), default=0.0)
+    scene = _Scene(motion, size, size * THIN, largest)
     for shape in motion.shapes:
         for solid in scene.solids(shape):
             yield replace(solid, role="ground") if solid.role == "bar" and solid.rests else solid
@@ -106,7 +107,12 @@ class _Scene:
         length = np.linalg.norm(b - a, axis=1)
         if length.max() > 1e-6 * self.size:
             yield Solid(
-                shape.owner, "cylinder", role, (a + b) / 2, along(b - a), _sizes(2 * radius, 2 * radius, length)
+                shape.owner,
+                "cylinder",
+                role,
+                (a + b) / 2,
+                along(b - a),
+                _sizes(2 * radius, 2 * radius, length),
             )
 
     def _ball(self, shape: Ball) -> Iterator[Solid]:
@@ -158,13 +164,11 @@ class _Scene:
     def _force(self, shape: ForceArrow) -> Iterator[Solid]:
         if self.force <= 0:
             return
-        way = self.motion.turned(shape.R, shape.direction)
-        way = way / np.linalg.norm(way, axis=1, keepdims=True)
-        arrow = way * (self.motion.values(shape.force) / self.force * LONGEST * self.size)[:, None]
+        arrow = _force(self.motion, shape) / self.force * LONGEST * self.size
         length = np.linalg.norm(arrow, axis=1)
         if length.max() <= 1e-3 * self.size:
             return
-        r, head = self.motion.values(shape.at, (3,)), np.minimum(6 * self.thin, length)
+        r, head = self.motion.values(shape.at, (3,)), np.minimum(5 * self.thin, length)
         towards = arrow / np.maximum(length, 1e-12)[:, None]
         yield from self._bar(shape, "force", r, r + arrow - towards * head[:, None], 0.5 * self.thin)
         sizes = _sizes(0.6 * head, 0.6 * head, head)
@@ -181,6 +185,14 @@ class _Scene:
         yield Solid(
             shape.owner, "mesh", "body", r, self.motion.rotations(shape.R), size, file=Path(shape.file)
         )
+
+
+def _force(motion: Motion, shape: ForceArrow) -> np.ndarray:
+    """A force in the world, (N, 3) in N."""
+    if shape.direction is None:
+        return motion.turned(shape.R, shape.force)
+    way = motion.turned(shape.R, shape.direction)
+    return way / np.linalg.norm(way, axis=1, keepdims=True) * motion.values(shape.force)[:, None]
 
 
 def along(way: np.ndarray) -> np.ndarray:

@@ -107,11 +107,11 @@ class Way(Shape):
 
 @dataclass(frozen=True, kw_only=True)
 class ForceArrow(Shape):
-    """A force as an arrow at a place: its value in N along `direction` in the axes R; the largest is as long as all are."""
+    """A force as an arrow at a place, along the axes R: its elements (3,) in N, or its value along `direction` (3,)."""
 
     at: Value
     force: str
-    direction: Value
+    direction: Value | None = None
     R: str | None = None
 
 

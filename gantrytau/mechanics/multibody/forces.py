@@ -1,6 +1,7 @@
 """Forces and torques that act on frames."""
 
 from gantrytau import Input, Model, Real, norm_2
+from gantrytau.language.self_description.shapes import ForceArrow
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.multibody.frames import Frame, TwoFrames
 
@@ -14,6 +15,9 @@ class WorldForce(Model):
     def equations(self):
         yield self.frame_b.f == -self.f
         yield self.frame_b.t == 0
+
+    def shapes(self):
+        yield ForceArrow(at="frame_b.r", force="f")
 
 
 class WorldTorque(Model):
@@ -36,6 +40,9 @@ class FrameForce(Model):
     def equations(self):
         yield self.frame_b.f == -(self.frame_b.R @ self.f)
         yield self.frame_b.t == 0
+
+    def shapes(self):
+        yield ForceArrow(at="frame_b.r", force="f", R="frame_b.R")
 
 
 class FrameTorque(Model):

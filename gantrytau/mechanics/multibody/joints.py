@@ -61,6 +61,7 @@ class Prismatic(TwoFrames):
         yield from _driven_along(self.s, self.f, self.axis, self.support)
 
     def shapes(self):
+        yield Stick(a="frame_a.r", b="frame_b.r")
         yield Way(at="frame_a.r", direction="e", coordinate="s", R="frame_a.R")
         yield Cuboid(at="frame_b.r", size=4.0, R="frame_b.R")
         yield ForceArrow(at="frame_b.r", force="f", direction="e", R="frame_a.R")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau import Array, Model, Parameter, Real, connect, der, dot, norm_2, outer, require
 from gantrytau.errors import ModelError
+from gantrytau.language.self_description.shapes import Ball, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
 from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction
 from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, WrongRecord, driven_carts, in_words
@@ -45,6 +46,11 @@ class ElasticRod(TwoFrames):
         yield b.f == self.f * rod / length + inertial
         yield a.t == 0
         yield b.t == 0
+
+    def shapes(self):
+        yield Stick(a="frame_a.r", b="frame_b.r")
+        yield Ball(at="frame_a.r")
+        yield Ball(at="frame_b.r")
 
 
 class ElasticArm(Model):
@@ -85,7 +91,7 @@ class SwayingFrame(Model):
     rail = Prismatic(n=[1.0, 0.0, 0.0])
     feet = SpringDamper(c=c, d=d)
     floor = Fixed()
-    body = PointMass(m=m)
+    body = PointMass(m=m, drawn=False)
     frame_b = Frame()
 
     def equations(self):

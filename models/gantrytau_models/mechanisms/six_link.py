@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau import Array, Model, Real, StateSelect, connect
 from gantrytau.errors import ModelError
 from gantrytau.language.self_description.rods import Rods
+from gantrytau.language.self_description.shapes import PathLine
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
@@ -25,6 +26,10 @@ class Plate(Body):
     def equations(self):
         yield from super().equations()
         yield self.R == self.frame_a.R
+
+    def shapes(self):
+        yield from super().shapes()
+        yield PathLine(at="r")
 
 
 class SixLinkGantryTau(Model):
