@@ -79,6 +79,7 @@ from gantrytau.language.tables.tables import table
 from gantrytau.results.figures import has_windows
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
+from gantrytau.viewing.animate import animate, view
 from gantrytau.whole_files import replacing
 
 __all__ = [
@@ -116,6 +117,7 @@ __all__ = [
     "StructureError",
     "Study",
     "acos",
+    "animate",
     "asin",
     "atan",
     "atan2",
@@ -181,6 +183,7 @@ __all__ = [
     "time",
     "transition",
     "translate",
+    "view",
     "when",
     "white_noise",
     "with_setting",

@@ -8,8 +8,8 @@ import casadi as ca
 
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
+from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.self_description.rods import Rods
-from gantrytau.language.self_description.shapes import Shape
 from gantrytau.language.statements import Equation, Requirement
 from gantrytau.language.symbols import Range, derivative_name, split_derivative
 

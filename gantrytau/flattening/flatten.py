@@ -34,8 +34,8 @@ from gantrytau.flattening.whens import read_whens, refuse_unassigned, when_sides
 from gantrytau.language.declarations import Parameter
 from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
+from gantrytau.language.self_description.appearance import Shape, shapes_of
 from gantrytau.language.self_description.rods import rods_of
-from gantrytau.language.self_description.shapes import Shape, shapes_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.self_description.shapes import Shape
+from gantrytau.language.self_description.appearance import Shape
 
 Values = NDArray[np.float64]
 

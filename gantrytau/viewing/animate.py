@@ -1,9 +1,9 @@
 """`view` and `animate`: a model in a pose, or a motion, as one page for any browser."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,37 +11,56 @@ from gantrytau.dae import Dae, translate
 from gantrytau.errors import ModelError
 from gantrytau.language.model import Model
 from gantrytau.results.result import Result
-from gantrytau.viewing.motion import motion_of
-from gantrytau.viewing.page import Page, page
+
+if TYPE_CHECKING:
+    from gantrytau.viewing.film import Film
+    from gantrytau.viewing.page import Page
 
 FileName = str | os.PathLike[str]
+Shown = Model | type[Model] | Dae
 
 
 def view(
-    model: Model | type[Model] | Dae, pose: Mapping[str, Any] | None = None, *, file: FileName | None = None
-) -> Page:
+    model: Shown,
+    pose: Mapping[str, Any] | None = None,
+    *,
+    file: FileName | None = None,
+    around: Sequence[Any] = (),
+) -> "Page":
     """A model in a pose, as one page that needs no network and shows itself in a notebook.
 
     pose: values of variables, as of `Dae.evaluate`, `{"tool.r": [0.5, 2.8, -0.8]}`; what it leaves open is as at the start.
-    file: where the page is saved, too. Components of `mechanics.multibody` are seen; a method `shapes()` says of one's own what
-    they look like. Raises ModelError for what cannot be shown, InitializationError for a pose that cannot be.
+    file: where the page is saved, too; around: obstacles, as `Box` of `gantrytau.kinematics`, and a workspace. Components of
+    `mechanics.multibody` are seen; a method `shapes()` says of one's own what they look like.
+    Raises ModelError for what cannot be shown, InitializationError for a pose that cannot be.
     """
-    dae = model if isinstance(model, Dae) else translate(model)
+    from gantrytau.viewing.film import film_of
+
+    dae = _translated(model)
     values = dae.evaluate(dict(pose or {}))
     constants = {name: float(value) for name, value in dae.parameter_values.items()}
-    pose_only = Result([0.0], {**constants, **_scalars(values)}, title=dae.name, shapes=dae.flat.shapes)
-    return _kept(Page(page([motion_of(pose_only)], [""], dae.name), dae.name), file)
+    pose_only = Result([0.0], {**constants, **dict(_scalars(values))}, title=dae.name, shapes=dae.flat.shapes)
+    return _page([film_of(pose_only, around=around)], [""], dae.name, file)
 
 
 def animate(
-    shown: Any, *, file: FileName | None = None, speed: float = 1.0, names: Sequence[str] | None = None
-) -> Page:
+    shown: Any,
+    *,
+    file: FileName | None = None,
+    speed: float = 1.0,
+    names: Sequence[str] | None = None,
+    around: Sequence[Any] = (),
+    model: Shown | None = None,
+) -> "Page":
     """A result of `simulate`, or an optimum, in motion; a list of them stands side by side, under `names`.
 
-    file: where the page is saved, too; speed: seconds of the motion in one second. Forces of joints that slide are arrows, the
-    way of the tool is a line, and a part turns red while something of it is at its limit, which optima tell. Pictures follow one
-    another 60 times a second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
+    file: where the page is saved, too; speed: seconds of the motion in one second; around: obstacles and a workspace, as of
+    `view`; model: whose motion it is, of a result that was read from a file. Actuator forces are arrows, the way of the tool is
+    a line, and a part turns red while something of it is at its limit, which optima tell. Pictures follow one another 60 times
+    a second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
     """
+    from gantrytau.viewing.film import film_of
+
     together = list(shown) if isinstance(shown, (list, tuple)) else [shown]
     if not together:
         raise ModelError("animate: found an empty list, expected results of simulate or optimize")
@@ -49,33 +68,48 @@ def animate(
         raise ModelError(
             f"animate: found {len(names)} names for {len(together)} results, expected one for each"
         )
-    motions = [motion_of(one, speed) for one in together]
-    titles = list(names) if names is not None else [m.title if len(motions) > 1 else "" for m in motions]
+    dae = None if model is None else _translated(model)
+    films = [film_of(one, speed, dae, around) for one in together]
+    titles = list(names) if names is not None else [f.title if len(films) > 1 else "" for f in films]
     if len(set(titles)) < len(titles):
         titles = [f"{title} ({k + 1})" for k, title in enumerate(titles)]
-    if len(motions) > 1:  # at one clock
-        step = min(motion.step for motion in motions)
-        motions = [replace(m, step=step, times=_at_clock(m.times, step * speed)) for m in motions]
-    title = ", ".join(dict.fromkeys(motion.title for motion in motions))
-    return _kept(Page(page(motions, titles, title), title), file)
+    title = ", ".join(dict.fromkeys(film.title for film in films))
+    return _page(_at_one_clock(films, speed), titles, title, file)
 
 
-def _at_clock(times: np.ndarray, step: float) -> np.ndarray:
-    """Times (N,) of pictures from the first to the last, `step` s apart."""
+def _translated(model: Shown) -> Dae:
+    if isinstance(model, Dae):
+        return model
+    if not (isinstance(model, Model) or (isinstance(model, type) and issubclass(model, Model))):
+        raise ModelError(
+            f"view: found {type(model).__name__}, expected a model, or what translate made of it; animate(...) shows results"
+        )
+    return translate(model, events=True)
+
+
+def _at_one_clock(films: "Sequence[Film]", speed: float) -> "list[Film]":
+    """Motions whose pictures follow one another at the same rate, the fastest of theirs; what ends earlier waits."""
+    step = min((film.step for film in films if film.step > 0), default=0.0)
+    if len(films) == 1 or step == 0:
+        return list(films)
+    return [replace(film, step=step, times=_every(step * speed, film.times)) for film in films]
+
+
+def _every(step: float, times: np.ndarray) -> np.ndarray:
+    """Times (N,) from the first to the last, `step` s apart."""
     return np.append(np.arange(times[0], times[-1] - 1e-3 * step, step), times[-1])
 
 
-def _scalars(values: Mapping[str, Any]) -> dict[str, float]:
+def _scalars(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Scalars by name of values that may be arrays."""
-    found = {}
     for name, value in values.items():
         array = np.asarray(value, dtype=float)
-        if array.ndim == 0:
-            found[name] = float(array)
-        for index in np.ndindex(*array.shape) if array.ndim else ():
-            found[f"{name}[{','.join(map(str, index))}]"] = float(array[index])
-    return found
+        for index in np.ndindex(*array.shape):
+            yield (f"{name}[{','.join(map(str, index))}]" if index else name), float(array[index])
 
 
-def _kept(made: Page, file: FileName | None) -> Page:
+def _page(films: "Sequence[Film]", names: Sequence[str], title: str, file: FileName | None) -> "Page":
+    from gantrytau.viewing.page import Page, page
+
+    made = Page(page(films, names, title), title)
     return made if file is None else replace(made, file=made.save(file))

@@ -4,7 +4,6 @@ import contextlib
 import html
 import io
 import os
-import webbrowser
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.viewing.motion import Motion
+from gantrytau.viewing.film import Film
 from gantrytau.viewing.solids import COLOURS, Solid, extent, solids
 from gantrytau.whole_files import replacing
 
 SIDES = 24  # of a cone
+AMBIENT = 2.0  # of the light that comes from everywhere, beside that which casts shadows
+PARTS = ("bar", "ball", "body", "drive", "ground")  # what turns red at a limit
 VIEW = np.array([0.42, -0.62, 0.3])  # of the camera from the middle, in sizes of what is seen
 
 
@@ -37,6 +38,8 @@ class Page:
 
     def show(self) -> None:
         """Open it in the browser; it is saved as robot.html if it stands nowhere yet."""
+        import webbrowser
+
         webbrowser.open((self.file or self.save("robot.html")).resolve().as_uri())
 
     def _repr_html_(self) -> str:
@@ -47,27 +50,28 @@ class Page:
         return f"<Page {self.title}: {len(self.text) / 1e6:.2f} MB, {where}>"
 
 
-def page(motions: Sequence[Motion], names: Sequence[str], title: str) -> str:
+def page(films: Sequence[Film], names: Sequence[str], title: str) -> str:
     """The HTML of motions beside each other, each under its name."""
     with _quiet_server() as server:
         scene, playing = server.scene, []
-        scene.set_up_direction("+z")
-        corners = [extent(motion) for motion in motions]
-        whole = max(float(np.linalg.norm(high - low)) for low, high in corners) or 1.0
-        shift = np.zeros(3)
-        for motion, name, (low, high) in zip(motions, names, corners, strict=True):
-            parent = f"/{name or motion.title or 'model'}".replace(" ", "_")
+        corners = np.array([extent(film) for film in films])  # (films, 2, 3)
+        whole = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max()) or 1.0
+        shifts = np.zeros((len(films), 3))
+        widths = np.maximum(corners[:, 1, 0] - corners[:, 0, 0], 0.3 * whole) + 0.25 * whole
+        shifts[1:, 0] = np.cumsum((widths[1:] + widths[:-1]) / 2)
+        shifts[:, 0] += corners[0].mean(axis=0)[0] - corners.mean(axis=1)[:, 0]
+        for film, name, (low, high), shift in zip(films, names, corners, shifts, strict=True):
+            parent = f"/{name or film.title or 'model'}".replace(" ", "_")
             scene.add_frame(parent, show_axes=False, position=shift)
             if name:
-                scene.add_label(f"{parent}/name", name, position=(low + high) / 2 + [0, 0, 0.6 * whole])
-            scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.004 * whole)
-            playing += [_Player(scene, f"{parent}/{k}", motion, s) for k, s in enumerate(solids(motion))]
-            shift = shift + [0.0, 1.3 * max(high[1] - low[1], 0.5 * whole), 0.0]
-        _stage(server, corners, len(motions), whole)
+                above = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 0.12 * whole]
+                scene.add_label(f"{parent}/name", name, position=np.array(above))
+            scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.0025 * whole)
+            playing += [_Player(scene, f"{parent}/{k}", film, s) for k, s in enumerate(solids(film))]
+        _stage(server, corners + shifts[:, None], whole)
         serializer = server.get_scene_serializer()
-        steps = max(len(motion.times) for motion in motions)
-        for k in range(1, steps):
-            serializer.insert_sleep(max(float(motion.step) for motion in motions))
+        for k in range(1, max(len(film.times) for film in films)):
+            serializer.insert_sleep(max(float(film.step) for film in films))
             for player in playing:
                 player.go(k)
         return _titled(serializer.as_html(), title)
@@ -77,40 +81,43 @@ def _titled(text: str, title: str) -> str:
     return text.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>")
 
 
-def _stage(server: Any, corners: Sequence[Any], count: int, whole: float) -> None:
-    """Floor and camera."""
-    low = np.min([c[0] for c in corners], axis=0)
-    high = np.max([c[1] for c in corners], axis=0)
-    middle = (low + high) / 2 + [0.0, 0.5 * (count - 1) * 1.3 * max(high[1] - low[1], 0.5 * whole), 0.0]
-    cell = float(10.0 ** np.floor(np.log10(whole / 2)))
-    server.scene.add_grid(
+def _stage(server: Any, corners: np.ndarray, whole: float) -> None:
+    """Light, floor and camera, which sees all of the boxes (films, 2, 3)."""
+    scene = server.scene
+    scene.set_up_direction("+z")
+    scene.configure_environment_map(None)  # it bleaches colours
+    scene.add_light_ambient("/light", intensity=AMBIENT)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) or whole
+    cell = float(10.0 ** np.floor(np.log10(whole / 1.5)))
+    scene.add_grid(
         "/floor",
-        width=3 * whole * count,
-        height=3 * whole * count,
+        width=3 * size,
+        height=3 * size,
         cell_size=cell,
         section_size=5 * cell,
         position=np.array([middle[0], middle[1], low[2] - 0.05 * whole]),
     )
-    server.initial_camera.position = middle + VIEW * whole * count**0.7
+    server.initial_camera.position = middle + VIEW * size
     server.initial_camera.look_at = middle
 
 
 class _Player:
     """A solid on a page, moved from picture to picture where something changes."""
 
-    def __init__(self, scene: Any, name: str, motion: Motion, solid: Solid):
+    def __init__(self, scene: Any, name: str, film: Film, solid: Solid):
         from scipy.spatial.transform import Rotation
 
-        self.solid, self.motion = solid, motion
+        self.solid, self.film = solid, film
         self.q = Rotation.from_matrix(solid.R).as_quat()[:, [3, 0, 1, 2]]
         self.handle = _added(scene, name, solid)
-        self.limited = _at_limits(motion, solid.owner)
+        self.limited = _at_limits(film, solid)
         self.shown: list[Any] = [None] * 4
         self.go(0)
 
     def go(self, k: int) -> None:
         """Show picture k, or the last."""
-        if self.solid.kind == "line":
+        if self.solid.kind in ("line", "dots"):
             return
         k = min(k, len(self.q) - 1)
         limit = bool(self.limited[k])
@@ -121,28 +128,32 @@ class _Player:
                 continue
             self.shown[place] = value
             if name == "color":
-                if self.solid.kind != "mesh":
+                if self.solid.kind not in ("mesh", "axes"):
                     self.handle.color = COLOURS["limit" if limit else self.solid.role]
             elif name == "scale":
+                if self.solid.kind == "axes":
+                    continue
                 self.handle.scale = tuple(np.maximum(value, 1e-9).tolist())
             else:
                 setattr(self.handle, name, value)
 
 
-def _at_limits(motion: Motion, owner: str) -> np.ndarray:
-    """Whether something of a component is at its limit, at each picture."""
-    found = np.zeros(motion.times.size, dtype=bool)
-    for binding in motion.bindings:
+def _at_limits(film: Film, solid: Solid) -> np.ndarray:
+    """Whether something of the component of a solid is at its limit, at each picture; forces keep their colour."""
+    found = np.zeros(film.times.size, dtype=bool)
+    for binding in film.bindings if solid.role in PARTS else ():
         component = binding.name.rpartition(".")[0]
-        if component and (owner == component or owner.startswith(f"{component}.")):
-            found |= (binding.begin <= motion.times) & (motion.times <= binding.end)
+        if component and (solid.owner == component or solid.owner.startswith(f"{component}.")):
+            found |= (binding.begin <= film.times) & (film.times <= binding.end)
     return found
 
 
 def _added(scene: Any, name: str, solid: Solid) -> Any:
     colour: dict[str, Any] = dict(color=COLOURS[solid.role])
-    if solid.role == "body":  # what hangs on it is seen through it
-        colour["opacity"] = 0.45
+    if (
+        solid.kind == "cuboid" and solid.role == "body"
+    ) or solid.role == "around":  # what hangs on it is seen through it
+        colour["opacity"] = 0.4
     if solid.kind == "cylinder":
         return scene.add_cylinder(name, radius=0.5, height=1.0, **colour)
     if solid.kind == "ball":
@@ -151,6 +162,15 @@ def _added(scene: Any, name: str, solid: Solid) -> Any:
         return scene.add_box(name, dimensions=(1.0, 1.0, 1.0), **colour)
     if solid.kind == "cone":
         return scene.add_mesh_simple(name, *_cone(), **colour, side="double")
+    if solid.kind == "axes":
+        long = 0.06 * float(solid.size[0, 0])
+        return scene.add_frame(name, axes_length=long, axes_radius=0.05 * long)
+    if solid.kind == "dots":
+        points, colours = (
+            solid.r.astype(np.float32),
+            np.tile(np.uint8(COLOURS[solid.role]), (len(solid.r), 1)),
+        )
+        return scene.add_point_cloud(name, points, colours, point_size=float(solid.size[0, 0]))
     if solid.kind == "line":
         points = np.stack([solid.r[:-1], solid.r[1:]], axis=1)
         return scene.add_line_segments(
@@ -173,12 +193,16 @@ def _cone() -> tuple[np.ndarray, np.ndarray]:
 def _mesh(file: Path | None) -> Any:
     import trimesh
 
+    why = "no faces"
     try:
-        return trimesh.load(str(file), force="mesh")
-    except (OSError, ValueError) as error:
-        raise ModelError(
-            f"{file}: found no mesh ({error}), expected a file of STL, OBJ, PLY or GLB"
-        ) from None
+        found = trimesh.load_mesh(str(file))
+        if len(getattr(found, "faces", ())):
+            return found
+    except Exception as error:  # each format has a reader of its own, with errors of its own
+        why = f"{type(error).__name__}: {error}"
+    raise ModelError(
+        f"{file}: found no mesh ({why}), expected a file of STL, OBJ, PLY or GLB; name such a file in MeshFile(file=...)"
+    )
 
 
 @contextlib.contextmanager

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.language.self_description.shapes import (
+from gantrytau.language.self_description.appearance import (
     Ball,
+    Cloud,
     Cuboid,
     ForceArrow,
     Hinge,
@@ -16,31 +17,35 @@ from gantrytau.language.self_description.shapes import (
     MeshFile,
     PathLine,
     Shape,
+    Slideway,
     Stick,
-    Way,
+    Triad,
 )
-from gantrytau.viewing.motion import Motion
+from gantrytau.viewing.film import Film
 
 STEEL = 7800.0  # kg/m3
 THIN = 1 / 130  # of the size of a picture: the radius of bars
-LONGEST = 0.15  # of the size of a picture: the largest force
+LONGEST = 0.22  # of the size of a picture: the largest force
 COLOURS = dict(
-    bar=(88, 112, 148),
-    ground=(190, 194, 200),
-    ball=(62, 68, 78),
-    body=(120, 150, 190),
-    drive=(226, 140, 46),
-    force=(196, 60, 120),
-    path=(30, 140, 110),
-    limit=(220, 40, 40),
+    bar=(70, 100, 150),
+    ground=(150, 156, 164),
+    ball=(40, 46, 56),
+    body=(86, 128, 196),
+    drive=(230, 120, 10),
+    force=(190, 20, 110),
+    path=(0, 130, 90),
+    limit=(225, 20, 20),
+    around=(176, 150, 100),
 )
+DOTS = 20_000  # of a cloud, at most
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A solid of a kind: cylinder (along z), ball, cuboid, cone (along z, its base at the place), mesh, or line.
+    """A solid of a kind: cylinder (along z), ball, cuboid, cone (along z, its base at the place), axes, mesh, or a line
+    or dots at all its places.
 
-    owner: path of its component; r (N, 3) m, R (N, 3, 3), size (N, 3) m: diameters or edges along R; points: of a line, (N, 3).
+    owner: path of its component; r (N, 3) m, R (N, 3, 3), size (N, 3) m: diameters or edges along R.
     """
 
     owner: str
@@ -57,28 +62,40 @@ class Solid:
         return len(self.r) > 1 and all(np.ptp(x, axis=0).max() < 1e-9 for x in (self.r, self.R, self.size))
 
 
-def extent(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def extent(film: Film) -> tuple[np.ndarray, np.ndarray]:
     """The corners (3,) and (3,) in m of the box that holds all places of all times."""
-    names = {v for shape in motion.shapes for key in ("a", "b", "at") if (v := getattr(shape, key, None))}
-    places = np.concatenate([motion.values(name, (3,)) for name in names])
-    return places.min(axis=0), places.max(axis=0)
+    places = []
+    for shape in (*film.shapes, *film.around):
+        places += [
+            film.values(v, (3,)) for key in ("a", "b", "at") if (v := getattr(shape, key, None)) is not None
+        ]
+        if isinstance(shape, Cloud):
+            places.append(shape.places)
+        if isinstance(shape, Cuboid) and not isinstance(shape.size, (int, float)):
+            half = np.abs(film.rotations(shape.R)) @ film.values(shape.size, (3,))[..., None] / 2
+            places += [places[-1] - half[..., 0], places[-1] + half[..., 0]]
+    every = np.concatenate(places)
+    return every.min(axis=0), every.max(axis=0)
 
 
-def solids(motion: Motion) -> Iterator[Solid]:
-    """All solids of a motion; what has no extent is left out."""
-    low, high = extent(motion)
+def solids(film: Film) -> Iterator[Solid]:
+    """All solids that are seen; what has no extent is left out."""
+    low, high = extent(film)
     size = float(np.linalg.norm(high - low)) or 1.0
-    arrows = (_force(motion, shape) for shape in motion.shapes if isinstance(shape, ForceArrow))
+    arrows = (_force(film, shape) for shape in film.shapes if isinstance(shape, ForceArrow))
     largest = max((float(np.linalg.norm(f, axis=1).max()) for f in arrows), default=0.0)
-    scene = _Scene(motion, size, size * THIN, largest)
-    for shape in motion.shapes:
+    scene = _Scene(film, size, size * THIN, largest)
+    for shape in film.shapes:
         for solid in scene.solids(shape):
             yield replace(solid, role="ground") if solid.role == "bar" and solid.rests else solid
+    for shape in film.around:
+        for solid in scene.solids(shape):
+            yield replace(solid, role="around")
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    motion: Motion
+    film: Film
     size: float  # m, of the whole
     thin: float  # m, radius of bars
     force: float  # N, the largest
@@ -90,16 +107,18 @@ class _Scene:
             Cuboid: self._cuboid,
             Lump: self._lump,
             Hinge: self._hinge,
-            Way: self._way,
+            Slideway: self._slideway,
             ForceArrow: self._force,
             PathLine: self._path,
+            Triad: self._axes,
+            Cloud: self._cloud,
             MeshFile: self._mesh,
         }
         yield from ways[type(shape)](shape)
 
     def _stick(self, shape: Stick) -> Iterator[Solid]:
-        a, b = self.motion.values(shape.a, (3,)), self.motion.values(shape.b, (3,))
-        radius = self.thin if shape.radius is None else self.motion.values(shape.radius)
+        a, b = self.film.values(shape.a, (3,)), self.film.values(shape.b, (3,))
+        radius = self.thin if shape.radius is None else self.film.values(shape.radius)
         yield from self._bar(shape, "bar", a, b, radius)
 
     def _bar(self, shape: Shape, role: str, a: np.ndarray, b: np.ndarray, radius: Any) -> Iterator[Solid]:
@@ -116,11 +135,11 @@ class _Scene:
             )
 
     def _ball(self, shape: Ball) -> Iterator[Solid]:
-        r = self.motion.values(shape.at, (3,))
+        r = self.film.values(shape.at, (3,))
         if shape.radius is not None:
-            diameter = 2 * self.motion.values(shape.radius)
+            diameter = 2 * self.film.values(shape.radius)
         elif shape.mass is not None:
-            diameter = np.cbrt(6 * self.motion.values(shape.mass) / (np.pi * STEEL))
+            diameter = np.cbrt(6 * self.film.values(shape.mass) / (np.pi * STEEL))
         else:
             diameter = np.full(len(r), 3 * self.thin)
         if diameter.max() > 0:
@@ -129,14 +148,14 @@ class _Scene:
 
     def _cuboid(self, shape: Cuboid) -> Iterator[Solid]:
         whole = isinstance(shape.size, (int, float))
-        size = self.motion.values([self.thin * shape.size] * 3 if whole else shape.size, (3,))
-        r = self.motion.values(shape.at, (3,)) + self.motion.turned(shape.R, shape.offset)
+        size = self.film.values([self.thin * shape.size] * 3 if whole else shape.size, (3,))
+        r = self.film.values(shape.at, (3,)) + self.film.turned(shape.R, shape.offset)
         yield Solid(
-            shape.owner, "cuboid", "drive" if whole else "body", r, self.motion.rotations(shape.R), size
+            shape.owner, "cuboid", "drive" if whole else "body", r, self.film.rotations(shape.R), size
         )
 
     def _lump(self, shape: Lump) -> Iterator[Solid]:
-        mass, J = self.motion.values(shape.mass)[0], self.motion.values(shape.J, (3, 3))[0]
+        mass, J = self.film.values(shape.mass)[0], self.film.values(shape.J, (3, 3))[0]
         if mass <= 0:
             return
         moments, axes = np.linalg.eigh(J)
@@ -144,55 +163,63 @@ class _Scene:
         # moments of a cuboid: m (b^2 + c^2) / 12 and so on
         squares = 6 * (moments.sum() - 2 * moments) / mass
         edges = np.maximum(np.sqrt(np.maximum(squares, 0)), self.thin)
-        R = self.motion.rotations(shape.R)
-        r = self.motion.values(shape.at, (3,)) + self.motion.turned(shape.R, shape.r_cm)
+        R = self.film.rotations(shape.R)
+        r = self.film.values(shape.at, (3,)) + self.film.turned(shape.R, shape.r_cm)
         yield Solid(shape.owner, "cuboid", "body", r, R @ axes, np.broadcast_to(edges, r.shape))
 
     def _hinge(self, shape: Hinge) -> Iterator[Solid]:
-        r, axis = self.motion.values(shape.at, (3,)), self.motion.turned(shape.R, shape.axis)
+        r, axis = self.film.values(shape.at, (3,)), self.film.turned(shape.R, shape.axis)
         half = 3 * self.thin * axis / np.linalg.norm(axis, axis=1, keepdims=True)
         yield from self._bar(shape, "ball", r - half, r + half, 1.6 * self.thin)
 
-    def _way(self, shape: Way) -> Iterator[Solid]:
-        s = self.motion.values(shape.coordinate)
+    def _slideway(self, shape: Slideway) -> Iterator[Solid]:
+        s = self.film.values(shape.coordinate)
         margin = 0.05 * self.size
-        r, way = self.motion.values(shape.at, (3,)), self.motion.turned(shape.R, shape.direction)
-        yield from self._bar(
-            shape, "bar", r + (s.min() - margin) * way, r + (s.max() + margin) * way, 0.7 * self.thin
-        )
+        r, way = self.film.values(shape.at, (3,)), self.film.turned(shape.R, shape.direction)
+        if shape.slides:
+            r = r - s[:, None] * way
+        ends = r + (s.min() - margin) * way, r + (s.max() + margin) * way
+        yield from self._bar(shape, "bar", *ends, 0.7 * self.thin)
 
     def _force(self, shape: ForceArrow) -> Iterator[Solid]:
         if self.force <= 0:
             return
-        arrow = _force(self.motion, shape) / self.force * LONGEST * self.size
+        arrow = _force(self.film, shape) / self.force * LONGEST * self.size
         length = np.linalg.norm(arrow, axis=1)
         if length.max() <= 1e-3 * self.size:
             return
-        r, head = self.motion.values(shape.at, (3,)), np.minimum(5 * self.thin, length)
+        r, head = self.film.values(shape.at, (3,)), np.minimum(7 * self.thin, length)
         towards = arrow / np.maximum(length, 1e-12)[:, None]
-        yield from self._bar(shape, "force", r, r + arrow - towards * head[:, None], 0.5 * self.thin)
+        yield from self._bar(shape, "force", r, r + arrow - towards * head[:, None], 0.9 * self.thin)
         sizes = _sizes(0.6 * head, 0.6 * head, head)
         yield Solid(shape.owner, "cone", "force", r + arrow - towards * head[:, None], along(arrow), sizes)
 
     def _path(self, shape: PathLine) -> Iterator[Solid]:
-        r = self.motion.values(shape.at, (3,))
+        r = self.film.values(shape.at, (3,))
         if np.ptp(r, axis=0).max() > 1e-6 * self.size:
             yield Solid(shape.owner, "line", "path", r, _no_turn(r), np.ones_like(r))
 
+    def _axes(self, shape: Triad) -> Iterator[Solid]:
+        r = self.film.values(shape.at, (3,))
+        yield Solid(shape.owner, "axes", "bar", r, self.film.rotations(shape.R), np.full_like(r, self.size))
+
+    def _cloud(self, shape: Cloud) -> Iterator[Solid]:
+        r = shape.places[:: -(-len(shape.places) // DOTS) or 1]
+        if len(r):
+            yield Solid(shape.owner, "dots", "path", r, _no_turn(r), np.full_like(r, shape.size))
+
     def _mesh(self, shape: MeshFile) -> Iterator[Solid]:
-        r = self.motion.values(shape.at, (3,))
+        r = self.film.values(shape.at, (3,))
         size = np.full_like(r, shape.scale)
-        yield Solid(
-            shape.owner, "mesh", "body", r, self.motion.rotations(shape.R), size, file=Path(shape.file)
-        )
+        yield Solid(shape.owner, "mesh", "body", r, self.film.rotations(shape.R), size, file=Path(shape.file))
 
 
-def _force(motion: Motion, shape: ForceArrow) -> np.ndarray:
+def _force(film: Film, shape: ForceArrow) -> np.ndarray:
     """A force in the world, (N, 3) in N."""
     if shape.direction is None:
-        return motion.turned(shape.R, shape.force)
-    way = motion.turned(shape.R, shape.direction)
-    return way / np.linalg.norm(way, axis=1, keepdims=True) * motion.values(shape.force)[:, None]
+        return film.turned(shape.R, shape.force)
+    way = film.turned(shape.R, shape.direction)
+    return way / np.linalg.norm(way, axis=1, keepdims=True) * film.values(shape.force)[:, None]
 
 
 def along(way: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """A grid of places of the tool, each with the first limit that is broken there: sizes, parts and sections of it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import real
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Limits
+from gantrytau.language.self_description.appearance import Cloud, Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,12 @@ class Cells:
     def places(self) -> np.ndarray:
         """The places inside, (k, 3) in m."""
         return self.examined.r[self.examined.inside]
+
+    def shapes(self) -> Iterator[Shape]:
+        """How pictures show it: the places at its border as dots."""
+        at_border = border(self.inside) & self.inside
+        sides = [np.ptp(axis) / (len(axis) - 1) for axis in (self.x, self.y, self.z) if len(axis) > 1]
+        yield Cloud(places=self.examined.r[at_border.ravel()], size=0.2 * min(sides, default=0.1))
 
     @property
     def extent(self) -> np.ndarray:

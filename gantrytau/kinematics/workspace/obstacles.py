@@ -5,6 +5,7 @@ a segment is a convex function of the place on it, and its minimum is found by g
 cylinders and capsules know most of these minima in closed form.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import floats, real, shown
+from gantrytau.language.self_description.appearance import Ball, Cuboid, Shape, Stick
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _SECTIONS = 30  # of a segment, which leave 0.5e-6 of it
@@ -47,6 +49,10 @@ class Box:
             raise ModelError(f"Box.R: found {shown(self.R)}, expected a rotation matrix (3, 3)")
         for name, value in (("low", low), ("high", high), ("R", R)):
             object.__setattr__(self, name, value)
+
+    def shapes(self) -> Iterator[Shape]:
+        """How pictures show it."""
+        yield Cuboid(at=(self.low + self.high) / 2, size=self.high - self.low, R=self.R)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """See Obstacle."""
@@ -113,6 +119,10 @@ class Cylinder:
                 f"Cylinder: found start and end at {self.start.tolist()}, expected a length; {_REMEDY}"
             )
 
+    def shapes(self) -> Iterator[Shape]:
+        """How pictures show it."""
+        yield Stick(a=self.start, b=self.end, radius=self.radius)
+
     def distance(self, points: np.ndarray) -> np.ndarray:
         """See Obstacle."""
         axis = self.end - self.start
@@ -141,6 +151,12 @@ class Capsule:
 
     def __post_init__(self):
         _hold_segment(self, "Capsule")
+
+    def shapes(self) -> Iterator[Shape]:
+        """How pictures show it."""
+        yield Stick(a=self.start, b=self.end, radius=self.radius)
+        yield Ball(at=self.start, radius=self.radius)
+        yield Ball(at=self.end, radius=self.radius)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """See Obstacle."""

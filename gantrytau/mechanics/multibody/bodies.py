@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
-from gantrytau.language.self_description.shapes import Ball, Lump
+from gantrytau.language.self_description.appearance import Ball, Lump
 from gantrytau.mechanics.multibody.frames import Frame, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
 

@@ -1,7 +1,7 @@
 """Forces and torques that act on frames."""
 
 from gantrytau import Input, Model, Real, norm_2
-from gantrytau.language.self_description.shapes import ForceArrow
+from gantrytau.language.self_description.appearance import ForceArrow
 from gantrytau.mechanics import translational
 from gantrytau.mechanics.multibody.frames import Frame, TwoFrames
 

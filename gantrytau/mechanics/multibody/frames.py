@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Connector, Flow, Model, Parameter, Propagated, Real, branch, der, root
-from gantrytau.language.self_description.shapes import Stick
+from gantrytau.language.self_description.appearance import Stick
 from gantrytau.mechanics.multibody.orientation import about, turning, unit
 
 

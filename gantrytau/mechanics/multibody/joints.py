@@ -19,7 +19,7 @@ from gantrytau import (
     require,
 )
 from gantrytau.language.declarations import StateSelect
-from gantrytau.language.self_description.shapes import Ball, Cuboid, ForceArrow, Hinge, Stick, Way
+from gantrytau.language.self_description.appearance import Ball, Cuboid, ForceArrow, Hinge, Slideway, Stick
 from gantrytau.language.statements import Branch
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody.frames import Frame, TwoFrames, World
@@ -62,7 +62,7 @@ class Prismatic(TwoFrames):
 
     def shapes(self):
         yield Stick(a="frame_a.r", b="frame_b.r")
-        yield Way(at="frame_a.r", direction="e", coordinate="s", R="frame_a.R")
+        yield Slideway(at="frame_a.r", direction="e", coordinate="s", R="frame_a.R")
         yield Cuboid(at="frame_b.r", size=4.0, R="frame_b.R")
         yield ForceArrow(at="frame_b.r", force="f", direction="e", R="frame_a.R")
 

@@ -6,6 +6,7 @@ Dressler (2012), sections 4.4 and 4.5.
 from collections.abc import Sequence
 
 from gantrytau import Array, Model, Parameter, StateSelect, connect
+from gantrytau.language.self_description.appearance import Slideway
 from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, Prismatic, SphericalSpherical
 from gantrytau.mechanics.translational import Flange
@@ -39,6 +40,8 @@ class Arm(Model):
     The links hang on frame_links, which is frame_cart itself or the frame of a turntable on it.
     """
 
+    seat = "frame_cart.r"  # where pictures show the cart
+
     offset = Parameter([0.0, 0.0, 0.0], unit="m", description="cart at s = 0, A_i of (4.20)")
     direction = Parameter(
         shape=3, unit="1", description="axis of the guideway; its length is the transmission factor"
@@ -47,9 +50,13 @@ class Arm(Model):
     frame_cart = Frame()
     frame_links = Frame()
     frame_b = Frame()
-    base = FixedTranslation(r=offset)
+    base = FixedTranslation(r=offset, drawn=False)
     rail = Prismatic(
-        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
+        drawn=False,
+        n=direction,
+        e=direction,
+        s=dict(prefer=StateSelect.DEFAULT),
+        v=dict(prefer=StateSelect.DEFAULT),
     )
     links = Array(Link, 1)
     axis = Flange()
@@ -62,6 +69,9 @@ class Arm(Model):
         for link in self.links:
             yield connect(self.frame_links, link.frame_cart)
             yield connect(link.frame_plate, self.frame_b)
+
+    def shapes(self):
+        yield Slideway(at=self.seat, slides=True, direction="direction", coordinate="rail.s", R="frame_a.R")
 
 
 class TwoLinks(Arm):

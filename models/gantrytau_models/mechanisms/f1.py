@@ -11,6 +11,7 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
 from gantrytau.errors import ModelError
+from gantrytau.language.self_description.appearance import ForceArrow
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion
@@ -134,6 +135,13 @@ class F1GantryTau(Model):
         yield connect(three.frame_cart, q5.frame_a)
         yield connect(q5.frame_b, q6.frame_a)
         yield connect(q6.frame_b, three.frame_links)
+
+    def shapes(self):
+        for i in range(3):
+            arm, cart = f"arms[{i}]", f"carts[{i}]"
+            yield ForceArrow(
+                owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"{arm}.direction"
+            )
 
     def rods(self) -> Rods:
         """The links and the turntables that carry them. Where the joint on cart 1 (4.20) and the turntables on carts 2 and 3

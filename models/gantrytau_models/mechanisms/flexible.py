@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau import Array, Model, Parameter, Real, connect, der, dot, norm_2, outer, require
 from gantrytau.errors import ModelError
-from gantrytau.language.self_description.shapes import Ball, Stick
+from gantrytau.language.self_description.appearance import Ball, ForceArrow, Slideway, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
 from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction
 from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, WrongRecord, driven_carts, in_words
@@ -65,8 +65,8 @@ class ElasticArm(Model):
     frame_a = Frame()
     frame_cart = Frame()
     frame_b = Frame()
-    base = FixedTranslation(r=offset)
-    rail = Prismatic(n=direction, e=direction)
+    base = FixedTranslation(r=offset, drawn=False)
+    rail = Prismatic(n=direction, e=direction, drawn=False)
     link = ElasticRod(L=length, m=link_mass, c=c, d=d)
     axis = Flange()
 
@@ -78,6 +78,10 @@ class ElasticArm(Model):
         yield connect(self.link.frame_b, self.frame_b)
         yield connect(self.rail.axis, self.axis)
 
+    def shapes(self):
+        yield Slideway(at="rail.frame_a.r", direction="direction", coordinate="rail.s", R="frame_a.R")
+        yield ForceArrow(at="frame_cart.r", force="rail.f", direction="direction")
+
 
 class SwayingFrame(Model):
     """The frame of the robot: a mass that sways along x of the world on a spring, and carries the guideways."""
@@ -88,7 +92,7 @@ class SwayingFrame(Model):
     s = Real(unit="m", description="sway along x of the world")
     v = Real(unit="m/s", description="speed of the sway")
     world = outer(World)
-    rail = Prismatic(n=[1.0, 0.0, 0.0])
+    rail = Prismatic(n=[1.0, 0.0, 0.0], drawn=False)
     feet = SpringDamper(c=c, d=d)
     floor = Fixed()
     body = PointMass(m=m, drawn=False)

@@ -11,8 +11,8 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
 from gantrytau.errors import ModelError
+from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Slideway
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
-from gantrytau.language.self_description.shapes import PathLine
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
     Frame,
@@ -39,9 +39,13 @@ class Arm(Model):
     frame_a = Frame()
     frame_cart = Frame()
     frame_b = Frame()
-    base = FixedTranslation(r=offset)
+    base = FixedTranslation(r=offset, drawn=False)
     rail = Prismatic(
-        n=direction, e=direction, s=dict(prefer=StateSelect.DEFAULT), v=dict(prefer=StateSelect.DEFAULT)
+        drawn=False,
+        n=direction,
+        e=direction,
+        s=dict(prefer=StateSelect.DEFAULT),
+        v=dict(prefer=StateSelect.DEFAULT),
     )
     link = SphericalSpherical(L=length, m=link_mass)
     axis = Flange()
@@ -54,6 +58,9 @@ class Arm(Model):
         yield connect(self.link.frame_b, self.frame_b)
         yield connect(self.rail.axis, self.axis)
 
+    def shapes(self):
+        yield Slideway(at="rail.frame_a.r", direction="direction", coordinate="rail.s", R="frame_a.R")
+
 
 class Cart(Model):
     """Cart and motor of one guideway: the actuator pushes, friction holds back."""
@@ -63,7 +70,7 @@ class Cart(Model):
     v = Real(unit="m/s", description="speed along the guideway")
     f = Input(unit="N", description="actuator force along the guideway, before friction", start=0.0)
     friction = Real(unit="N", description="friction force, positive against positive speed")
-    body = PointMass(m=m)
+    body = PointMass(m=m, drawn=False)
     actuator = Force()
     law = TanhFriction()
     frame = Frame()
@@ -77,6 +84,9 @@ class Cart(Model):
         yield self.s == self.axis.s
         yield self.v == der(self.s)
         yield self.friction == self.law.f
+
+    def shapes(self):
+        yield Cuboid(at="frame.r", size=6.0, R="frame.R")
 
 
 class Tool(Model):
@@ -143,6 +153,13 @@ class GantryTau(Model):
             yield connect(arm.frame_cart, cart.frame)
             yield connect(arm.axis, cart.axis)
             yield connect(arm.frame_b, self.tool.frame)
+
+    def shapes(self):
+        for i in range(3):
+            arm, cart = f"arms[{i}]", f"carts[{i}]"
+            yield ForceArrow(
+                owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"{arm}.direction"
+            )
 
     def rods(self) -> Rods:
         """The links, one on each arm: their joints on the plate are in its tool point, as offsets say (4.7)."""

@@ -1,6 +1,7 @@
 """The pendulum in Cartesian coordinates: the smallest mechanism with a constraint (index three)."""
 
 from gantrytau import Model, Parameter, Real, der
+from gantrytau.language.self_description.appearance import Ball, PathLine, Stick
 
 
 class Pendulum(Model):
@@ -26,3 +27,8 @@ class Pendulum(Model):
         yield self.x**2 + self.y**2 == self.L**2
         yield self.kinetic_energy == self.m / 2 * (self.v_x**2 + self.v_y**2)
         yield self.potential_energy == self.m * self.g * self.y
+
+    def shapes(self):
+        yield Stick(a=(0.0, 0.0, 0.0), b=("x", 0.0, "y"))
+        yield Ball(at=("x", 0.0, "y"), mass="m")
+        yield PathLine(at=("x", 0.0, "y"))

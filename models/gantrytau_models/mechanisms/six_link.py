@@ -8,14 +8,16 @@ import numpy as np
 
 from gantrytau import Array, Model, Real, StateSelect, connect
 from gantrytau.errors import ModelError
+from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Stick, Triad
 from gantrytau.language.self_description.rods import Rods
-from gantrytau.language.self_description.shapes import PathLine
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
 from gantrytau_models.prototypes import Arm as Record
 from gantrytau_models.prototypes import Prototype
+
+SEAT = "links[0].on_cart.frame_b.r"  # the first joint on a cart
 
 
 class Plate(Body):
@@ -30,6 +32,7 @@ class Plate(Body):
     def shapes(self):
         yield from super().shapes()
         yield PathLine(at="r")
+        yield Triad(at="r", R="R")
 
 
 class SixLinkGantryTau(Model):
@@ -58,7 +61,7 @@ class SixLinkGantryTau(Model):
             )
         defaults = dict(
             arms=[_arm(arm) for arm in prototype.arms],
-            carts=carts,
+            carts=[{**cart, "drawn": False} for cart in carts],
             tool=dict(
                 m=prototype.plate_mass,
                 J=np.array(prototype.plate_inertia),
@@ -78,6 +81,15 @@ class SixLinkGantryTau(Model):
             yield connect(arm.axis, cart.axis)
             yield connect(arm.frame_b, self.tool.frame_a)
 
+    def shapes(self):
+        # offsets of the links are from the origin: carts are shown where their joints are
+        for i in range(3):
+            arm, cart, seat = f"arms[{i}]", f"carts[{i}]", f"arms[{i}].{SEAT}"
+            yield Cuboid(owner=cart, at=seat, size=6.0, R=f"{arm}.frame_cart.R")
+            yield ForceArrow(owner=cart, at=seat, force=f"{cart}.f", direction=f"{arm}.direction")
+            for j in range(1, i + 1):
+                yield Stick(owner=cart, a=seat, b=f"{arm}.links[{j}].on_cart.frame_b.r")
+
     def rods(self) -> Rods:
         """The links; joints on a cart have places of their own, so that of the cart is given (4.14)."""
         arms = [arm_of_rods(i, i + 1) for i in range(3)]
@@ -91,10 +103,11 @@ def _arm(arm: Record) -> dict:
             offset=list(link.offset),
             plate_offset=list(link.plate_offset),
             mass=link.mass,
+            on_cart=dict(drawn=False),
         )
         for link in arm.links
     ]
-    return dict(offset=[0.0, 0.0, 0.0], direction=list(arm.direction), links=links)
+    return dict(offset=[0.0, 0.0, 0.0], direction=list(arm.direction), links=links, seat=SEAT)
 
 
 def quaternion(R: np.ndarray) -> list[float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.language.self_description.shapes import Shape
+from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.symbols import split_derivative
 
 Signal = Callable[[Any], np.ndarray]

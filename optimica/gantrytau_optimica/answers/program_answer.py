@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Dae
-from gantrytau.language.self_description.shapes import Shape
+from gantrytau.language.self_description.appearance import Shape
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.built import Built

@@ -5,8 +5,8 @@ A model says it in a method `shapes()`, as this rod does:
     def shapes(self):
         yield Stick("frame_a.r", "frame_b.r")
 
-Names are those of quantities of the component; numbers are places in the world. With `drawn=False` a component is not
-shown, nor what is in it.
+Names are those of quantities of the component; numbers are places in the world, in m; a place is also three of either,
+`("x", 0.0, "y")`. With `drawn=False` a component is not shown, nor what is in it. z is up.
 """
 
 import inspect
@@ -15,32 +15,50 @@ from dataclasses import dataclass, fields, replace
 from types import FunctionType
 from typing import Any, ClassVar
 
+import numpy as np
+
 from gantrytau.errors import ModelError, did_you_mean
 
-Value = str | float | Sequence[float]
+Value = str | float | Sequence[float | str] | np.ndarray
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Something to be seen. Its fields that are texts are names of quantities, lengths in m."""
+    """Something to be seen. Its fields that are texts are names of quantities, lengths in m.
 
-    owner: str = ""  # path of the component that has it; set where a model is written out
+    owner: path of the component that it belongs to, from the one that says it; it turns red while that is at a limit.
+    """
+
+    owner: str = ""
     texts: ClassVar[tuple[str, ...]] = ("owner",)  # fields that are no names
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the quantities that it needs."""
-        values = (getattr(self, field.name) for field in fields(self) if field.name not in self.texts)
-        return tuple(value for value in values if isinstance(value, str))
+        fields_of_names = (
+            getattr(self, field.name) for field in fields(self) if field.name not in self.texts
+        )
+        parts = (part for value in fields_of_names for part in (value if _several(value) else [value]))
+        return tuple(part for part in parts if isinstance(part, str))
 
     def within(self, path: str) -> "Shape":
         """The same with the names of the whole model, for a component at that path."""
-        found = {
-            field.name: f"{path}.{value}" if path else value
-            for field in fields(self)
-            if field.name not in self.texts and isinstance(value := getattr(self, field.name), str)
-        }
-        return replace(self, owner=path, **found)
+        kept = set(self.texts) - {"owner"}
+        found = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in kept}
+        return replace(self, **{name: _placed(value, path) for name, value in found.items()})
+
+
+def _several(value: Any) -> bool:
+    return isinstance(value, (list, tuple))
+
+
+def _placed(value: Any, path: str) -> Any:
+    """A name, or names in a list, as seen from outside of the component at that path."""
+    if _several(value):
+        return tuple(_placed(part, path) for part in value)
+    if not isinstance(value, str) or not path:
+        return value
+    return f"{path}.{value}" if value else path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,19 +81,19 @@ class Ball(Shape):
 
 @dataclass(frozen=True, kw_only=True)
 class Cuboid(Shape):
-    """A cuboid about a place, its edges along the columns of R (3, 3); size: of its edges, (3,) in m, or one number for a cube
-    that is so many radii of bars long; offset: (3,) in m, of its middle, along R.
+    """A cuboid about a place, its edges along the columns of R (3, 3), a name or numbers; size: of its edges, (3,) in m, or
+    one number for a cube that is so many radii of bars long; offset: (3,) in m, of its middle, along R.
     """
 
     at: Value
     size: Value
-    R: str | None = None
+    R: str | np.ndarray | None = None
     offset: Value = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lump(Shape):
-    """A rigid body as the cuboid of the same mass (kg) and inertia J (3, 3) in kg.m2 about its centre of mass r_cm, along R."""
+    """A rigid body as the cuboid of the same mass (kg) and inertia J (3, 3) in kg.m2 about its centre r_cm, along R."""
 
     at: Value
     R: str
@@ -94,15 +112,16 @@ class Hinge(Shape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Way(Shape):
-    """A straight guideway, from a place along `direction` (3,) in the axes R: as far as `coordinate`, whose unit moves what
-    slides by `direction`, may go, or goes where it has no limits.
+class Slideway(Shape):
+    """A straight guideway through a place, along `direction` (3,) in the axes R, as far as `coordinate` goes, whose unit
+    moves what slides by `direction`. slides: whether the place is what slides, or where the coordinate is 0.
     """
 
     at: Value
     direction: Value
     coordinate: str
     R: str | None = None
+    slides: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +139,22 @@ class PathLine(Shape):
     """The way that a place takes."""
 
     at: Value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Triad(Shape):
+    """The axes R (3, 3) of a frame at a place: x red, y green, z blue."""
+
+    at: Value
+    R: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloud(Shape):
+    """Places, (k, 3) in m, as dots of that size in m."""
+
+    places: np.ndarray
+    size: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +176,8 @@ def shapes_of(components: Iterable[tuple[str, Any]], known: Iterable[str]) -> tu
     names, hidden = set(known), []
     found: list[Shape] = []
     for path, component in components:  # whoever holds another comes first
-        if not getattr(component, "drawn", True) or any(path.startswith(f"{above}.") for above in hidden):
+        beneath = any(path.startswith(f"{above}." if above else "") for above in hidden)
+        if beneath or getattr(component, "drawn", True) is False:
             hidden.append(path)
             continue
         for shape in _stated(component, path):

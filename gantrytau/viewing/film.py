@@ -1,0 +1,145 @@
+"""What is shown: the values of a result at the instants of the pictures."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gantrytau.dae import Dae
+from gantrytau.errors import ModelError
+from gantrytau.language.self_description.appearance import Shape, Value
+from gantrytau.results.result import Result
+from gantrytau.results.series import Series
+
+Rotations = str | np.ndarray | None  # a name, numbers (3, 3), or the axes of the world
+
+RATE = 60.0  # Hz, of pictures
+MOST = 1800  # pictures; slower where there would be more
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A variable at its limit from `begin` to `end`, s."""
+
+    name: str
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A result, or a pose, at times (N,) in s: those of the pictures, which follow one another by `step` s of the page.
+
+    constants: numbers that the result does not hold, by name; shapes: what is seen, by the names of places; around: what
+    stands around it, in numbers.
+    """
+
+    series: Series
+    times: np.ndarray
+    step: float
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    bindings: tuple[Binding, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+    around: tuple[Shape, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """What was computed."""
+        return self.series.title
+
+    def values(self, what: Value, shape: tuple[int, ...] = ()) -> np.ndarray:
+        """A quantity, a number, or a vector of either, at all times, (N, *shape)."""
+        if isinstance(what, (list, tuple)):
+            return np.stack([self.values(part) for part in what], axis=-1).reshape(-1, *shape)
+        if not isinstance(what, str):
+            return np.broadcast_to(np.asarray(what, dtype=float), (self.times.size, *shape))
+        if what not in self.series:
+            return np.broadcast_to(self._constant(what, shape), (self.times.size, *shape))
+        known, found = self.series.time, self._known(what).reshape(self.series.time.size, -1)
+        columns = [np.interp(self.times, known, column) for column in found.T]
+        return np.stack(columns, axis=1).reshape(self.times.size, *shape)
+
+    def _known(self, name: str) -> np.ndarray:
+        """A quantity at the times of the result; ModelError where it is not finite."""
+        found = self.series[name]
+        wrong = ~np.isfinite(found.reshape(len(found), -1)).all(axis=1)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise ModelError(
+                f"{self.title or 'result'}: found {name} = {found[row].tolist()} at {self.series.time[row]:g} s, expected "
+                "finite numbers; show the part before, or mend the model"
+            )
+        return found
+
+    def turned(self, R: Rotations, vector: Value) -> np.ndarray:
+        """A vector given along the axes R, or those of the world, in the world, (N, 3)."""
+        found = self.values(vector, (3,))
+        return found if R is None else np.einsum("nij,nj->ni", self.rotations(R), found)
+
+    def rotations(self, R: Rotations) -> np.ndarray:
+        """Orientations at all times, (N, 3, 3): between those of the result by turning about one axis."""
+        from scipy.spatial.transform import Rotation, Slerp
+
+        if not isinstance(R, str) or R not in self.series:
+            found = np.eye(3) if R is None else self._constant(R, (3, 3)) if isinstance(R, str) else R
+            return np.broadcast_to(found, (self.times.size, 3, 3))
+        known, rows = np.unique(self.series.time, return_index=True)
+        given = Rotation.from_matrix(self._known(R)[rows])
+        if known.size == 1:
+            return np.broadcast_to(given.as_matrix()[0], (self.times.size, 3, 3))
+        return Slerp(known, given)(np.clip(self.times, known[0], known[-1])).as_matrix()
+
+    def _constant(self, name: str, shape: tuple[int, ...]) -> np.ndarray:
+        names = [f"{name}[{','.join(map(str, index))}]" for index in np.ndindex(*shape)] if shape else [name]
+        try:
+            return np.array([float(self.constants[one]) for one in names]).reshape(shape)
+        except KeyError as error:
+            raise ModelError(
+                f"{self.title or 'result'}: found no {error.args[0]}, expected what its shapes hang on; simulate with all "
+                "outputs, without outputs=[...]"
+            ) from None
+
+
+def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Sequence[Any] = ()) -> Film:
+    """What is to be shown of a Result or an optimum. speed: seconds of the motion in a second of the page; model: whose
+    motion it is, where that does not say it; around: obstacles and whatever else has `shapes()` in numbers.
+
+    Raises ModelError for what has no motion in it, or nothing that could be seen, and for a speed that is not positive.
+    """
+    if not (isinstance(speed, (int, float)) and 0 < speed < np.inf):
+        raise ModelError(f"animate: found speed={speed!r}, expected a positive number, 1 for real time")
+    series = shown if isinstance(shown, Series) else getattr(shown, "result", None)
+    if not isinstance(series, Result):
+        raise ModelError(
+            f"animate: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"
+        )
+    constants = dict(getattr(shown, "parameters", {}))
+    shapes = series.shapes or (model.flat.shapes if model else ())
+    if model:
+        constants = {**model.parameter_values, **constants}
+    if not shapes:
+        raise ModelError(
+            f"{series.title or 'result'}: found nothing that could be shown, expected components of mechanics.multibody, or "
+            "a method shapes() of the model; of a result that was read from a file, say whose it is, animate(..., model=...)"
+        )
+    first, last = series.time[0], series.time[-1]
+    pictures = int(np.clip(np.ceil((last - first) / speed * RATE), 1, MOST)) if last > first else 0
+    step = (last - first) / speed / max(pictures, 1)
+    arcs: Sequence[Any] = getattr(shown, "arcs", ())
+    bindings = tuple(Binding(arc.name, arc.begin, arc.end) for arc in arcs if arc.side in ("max", "min"))
+    times = np.linspace(first, last, pictures + 1)
+    return Film(series, times, step, constants, bindings, shapes, tuple(_surroundings(around)))
+
+
+def _surroundings(around: Sequence[Any]) -> Iterator[Shape]:
+    for one in around:
+        if isinstance(one, Shape):
+            yield one
+        elif callable(getattr(one, "shapes", None)) and not isinstance(one, type):
+            yield from one.shapes()
+        else:
+            raise ModelError(
+                f"around: found {type(one).__name__}, expected obstacles, as Box(low, high) of gantrytau.kinematics, "
+                "a workspace, or shapes in numbers"
+            )
