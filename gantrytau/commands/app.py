@@ -18,6 +18,7 @@ from gantrytau.commands.optimize_command import optimize
 from gantrytau.commands.printing.reporting import Commands
 from gantrytau.commands.simulate_command import simulate
 from gantrytau.commands.study_command import study
+from gantrytau.commands.view_command import view
 
 app = typer.Typer(
     cls=Commands,
@@ -67,6 +68,9 @@ app.command(
 app.command(
     epilog="Example: gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s"
 )(equations)
+app.command(epilog="Example: gantrytau view 'GantryTau(L1)' --pose 'tool.r=[0.5, 3, -0.6]' -o robot.html")(
+    view
+)
 app.command(epilog="Example: gantrytau library --json")(library)
 app.add_typer(fmu.app, name="fmu")
 app.add_typer(controller.app, name="controller")

@@ -15,7 +15,7 @@ from gantrytau.commands.arguments import solver_options
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
 from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
-from gantrytau.commands.arguments.saved_guesses import FORMATS, read_result
+from gantrytau.commands.arguments.saved_results import FORMATS, read_result
 from gantrytau.commands.printing import optimum_summary, picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     FAULT,

@@ -40,7 +40,7 @@ def view(
     values = dae.evaluate(dict(pose or {}))
     constants = {name: float(value) for name, value in dae.parameter_values.items()}
     pose_only = Result([0.0], {**constants, **dict(_scalars(values))}, title=dae.name, shapes=dae.flat.shapes)
-    return _page([film_of(pose_only, around=around)], [""], dae.name, file)
+    return _page([film_of(pose_only, model=dae, around=around)], [""], dae.name, file)
 
 
 def animate(
@@ -55,9 +55,9 @@ def animate(
     """A result of `simulate`, or an optimum, in motion; a list of them stands side by side, under `names`.
 
     file: where the page is saved, too; speed: seconds of the motion in one second; around: obstacles and a workspace, as of
-    `view`; model: whose motion it is, of a result that was read from a file. Actuator forces are arrows, the way of the tool is
-    a line, and a part turns red while something of it is at its limit, which optima tell. Pictures follow one another 60 times
-    a second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
+    `view`; model: whose motion it is, of a result that was read from a file. Actuator forces are arrows, the way of the tool
+    is a line, and a part turns red while something of it is at its limit, which optima tell. Pictures follow one another 60
+    times a second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
     """
     from gantrytau.viewing.film import film_of
 

@@ -96,8 +96,8 @@ class Film:
             return np.array([float(self.constants[one]) for one in names]).reshape(shape)
         except KeyError as error:
             raise ModelError(
-                f"{self.title or 'result'}: found no {error.args[0]}, expected what its shapes hang on; simulate with all "
-                "outputs, without outputs=[...]"
+                f"{self.title or 'result'}: found no {error.args[0]}, expected all that its shapes hang on; simulate the "
+                "same model with all outputs, without outputs=[...]"
             ) from None
 
 
@@ -108,20 +108,30 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     Raises ModelError for what has no motion in it, or nothing that could be seen, and for a speed that is not positive.
     """
     if not (isinstance(speed, (int, float)) and 0 < speed < np.inf):
-        raise ModelError(f"animate: found speed={speed!r}, expected a positive number, 1 for real time")
+        raise ModelError(
+            f"animate: found speed={speed!r}, expected a positive number, 1 for real time", argument="speed"
+        )
     series = shown if isinstance(shown, Series) else getattr(shown, "result", None)
     if not isinstance(series, Result):
         raise ModelError(
             f"animate: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"
         )
     constants = dict(getattr(shown, "parameters", {}))
-    shapes = series.shapes or (model.flat.shapes if model else ())
-    if model:
-        constants = {**model.parameter_values, **constants}
+    shapes = series.shapes
+    if model is not None and not shapes:
+        root = _root(series, model.flat.shapes)
+        shapes = tuple(shape.within(root) if root else shape for shape in model.flat.shapes)
+        own = {f"{root}.{name}" if root else name: value for name, value in model.parameter_values.items()}
+        constants = {**own, **constants}
     if not shapes:
+        whose = (
+            ""
+            if model is not None
+            else "; of a result that was read from a file, say whose it is, animate(..., model=...)"
+        )
         raise ModelError(
             f"{series.title or 'result'}: found nothing that could be shown, expected components of mechanics.multibody, or "
-            "a method shapes() of the model; of a result that was read from a file, say whose it is, animate(..., model=...)"
+            f"a method shapes() of the model{whose}"
         )
     first, last = series.time[0], series.time[-1]
     pictures = int(np.clip(np.ceil((last - first) / speed * RATE), 1, MOST)) if last > first else 0
@@ -130,6 +140,15 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     bindings = tuple(Binding(arc.name, arc.begin, arc.end) for arc in arcs if arc.side in ("max", "min"))
     times = np.linspace(first, last, pictures + 1)
     return Film(series, times, step, constants, bindings, shapes, tuple(_surroundings(around)))
+
+
+def _root(series: Series, shapes: Sequence[Shape]) -> str:
+    """Where a model stands in what the result is of: `robot` of an optimum of it, or nowhere."""
+    names = [name for shape in shapes for name in shape.names]
+    ends = sorted(name for name in series.names if any(name.endswith(f".{end}") for end in names))
+    if any(name in series for name in names) or not ends:
+        return ""
+    return next(one[: -len(end) - 1] for one in ends for end in names if one.endswith(f".{end}"))
 
 
 def _surroundings(around: Sequence[Any]) -> Iterator[Shape]:

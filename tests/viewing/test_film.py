@@ -146,7 +146,7 @@ def test_a_model_without_anything_to_be_seen_is_told():
 def test_a_result_of_few_variables_says_what_is_left_out():
     some = simulate(GantryTau(prototypes.L1), stop=0.01, points=3, outputs=["tool.v"])
     message = refused(lambda: animate(some))
-    assert "expected what its shapes hang on; simulate with all outputs" in message
+    assert "expected all that its shapes hang on; simulate the same model with all outputs" in message
 
 
 def test_values_that_are_not_finite_are_told():

@@ -1,4 +1,4 @@
-"""A result that was saved before, read again: where the search for an optimum starts."""
+"""A result that was saved before, read again: where the search for an optimum starts, or a motion to be seen."""
 
 import csv
 from collections.abc import Iterator
@@ -15,26 +15,26 @@ if TYPE_CHECKING:
 FORMATS = (".csv", ".nc")
 
 
-def read_result(file: Path) -> "Result":
-    """The variables of a CSV or netCDF file as `Result.save` writes it; CommandError for another one."""
+def read_result(file: Path, option: str = "--guess") -> "Result":
+    """The variables of a CSV or netCDF file as `Result.save` writes it; CommandError naming the option for another."""
     from gantrytau import ModelError, Result
 
     if file.suffix.lower() not in FORMATS:
         raise CommandError(
-            f"--guess {file}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
+            f"{option} {file}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
         )
     if not file.is_file():
-        raise CommandError(f"--guess {file}: there is no such file; check its path")
+        raise CommandError(f"{option} {file}: there is no such file; check its path")
     try:
-        values = _csv(file) if file.suffix.lower() == ".csv" else _netcdf(file)
+        values = _csv(file) if file.suffix.lower() == ".csv" else _netcdf(file, option)
         time = values.pop("time")
         if time.size < 2 or not np.ptp(time) > 0:
-            raise CommandError(f"--guess {file}: found {time.size} times, expected a motion over some time")
+            raise CommandError(f"{option} {file}: found {time.size} times, expected a motion over some time")
         return Result(time, values, title=file.name)
     except KeyError as error:
-        raise CommandError(f"--guess {file}: found no {error}, expected a result over time") from error
+        raise CommandError(f"{option} {file}: found no {error}, expected a result over time") from error
     except (OSError, ValueError, csv.Error, ModelError) as error:
-        raise CommandError(f"--guess {file}: cannot be read as a result ({error})") from error
+        raise CommandError(f"{option} {file}: cannot be read as a result ({error})") from error
 
 
 def _csv(file: Path) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def _csv(file: Path) -> dict[str, Any]:
     return dict(zip(names, table.T, strict=True))
 
 
-def _netcdf(file: Path) -> dict[str, Any]:
+def _netcdf(file: Path, option: str) -> dict[str, Any]:
     """Scalar by name; vectors and matrices are written whole."""
     try:
         import xarray
@@ -55,7 +55,7 @@ def _netcdf(file: Path) -> dict[str, Any]:
             values = {str(name): np.asarray(array.values, float) for name, array in opened.variables.items()}
     except ImportError as error:
         raise CommandError(
-            f"--guess {file}: netCDF needs what is not installed; pip install 'gantrytau[results]'"
+            f"{option} {file}: netCDF needs what is not installed; pip install 'gantrytau[results]'"
         ) from error
     return dict(pair for name, array in values.items() for pair in _scalars(name, array))
 
