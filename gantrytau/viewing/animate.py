@@ -84,7 +84,8 @@ def _translated(model: Shown) -> Dae:
         raise ModelError(
             f"view: found {type(model).__name__}, expected a model, or what translate made of it; animate(...) shows results"
         )
-    return translate(model, events=True)
+    found: Any = model  # a class is instantiated there
+    return translate(found, events=True)
 
 
 def _at_one_clock(films: "Sequence[Film]", speed: float) -> "list[Film]":

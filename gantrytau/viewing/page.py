@@ -168,7 +168,7 @@ def _added(scene: Any, name: str, solid: Solid) -> Any:
     if solid.kind == "dots":
         points, colours = (
             solid.r.astype(np.float32),
-            np.tile(np.uint8(COLOURS[solid.role]), (len(solid.r), 1)),
+            np.tile(np.array(COLOURS[solid.role], dtype=np.uint8), (len(solid.r), 1)),
         )
         return scene.add_point_cloud(name, points, colours, point_size=float(solid.size[0, 0]))
     if solid.kind == "line":

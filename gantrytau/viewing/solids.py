@@ -147,11 +147,11 @@ class _Scene:
             yield Solid(shape.owner, "ball", role, r, _no_turn(r), _sizes(diameter, diameter, diameter))
 
     def _cuboid(self, shape: Cuboid) -> Iterator[Solid]:
-        whole = isinstance(shape.size, (int, float))
-        size = self.film.values([self.thin * shape.size] * 3 if whole else shape.size, (3,))
+        cube = shape.size if isinstance(shape.size, (int, float)) else None
+        size = self.film.values(shape.size if cube is None else [self.thin * cube] * 3, (3,))
         r = self.film.values(shape.at, (3,)) + self.film.turned(shape.R, shape.offset)
         yield Solid(
-            shape.owner, "cuboid", "drive" if whole else "body", r, self.film.rotations(shape.R), size
+            shape.owner, "cuboid", "body" if cube is None else "drive", r, self.film.rotations(shape.R), size
         )
 
     def _lump(self, shape: Lump) -> Iterator[Solid]:

@@ -1,5 +1,7 @@
 """Solids at the instants of the pictures, against the results that they are of."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -128,9 +130,10 @@ def test_what_cannot_be_shown_is_told(fall):
     )
     assert "found an empty list" in refused(lambda: animate([]))
     assert "found 1 names for 2 results" in refused(lambda: animate([fall, fall], names=["a"]))
-    for speed in (0, -1.0, np.inf, np.nan, "fast"):
-        message = refused(lambda speed=speed: animate(fall, speed=speed))
-        assert f"found speed={speed!r}, expected a positive number" in message
+    wrong: Any
+    for wrong in (0, -1.0, np.inf, np.nan, "fast"):
+        message = refused(lambda speed=wrong: animate(fall, speed=speed))
+        assert f"found speed={wrong!r}, expected a positive number" in message
     assert "around: found float, expected obstacles" in refused(lambda: animate(fall, around=[1.0]))
     assert "view: found Result, expected a model" in refused(lambda: view(fall))
 

@@ -33,6 +33,7 @@ def fastest():
 def test_the_page_of_a_fastest_motion_is_small_and_whole(fastest, tmp_path):
     page = animate(fastest, file=tmp_path / "move.html")
     assert page.file == tmp_path / "move.html"
+    assert page.file is not None
     assert page.file.read_text(encoding="utf-8") == page.text
     assert len(page.text.encode()) < LARGEST
     assert "<title>SixLinks</title>" in page.text

@@ -1,10 +1,12 @@
 """Masses: a point, and a rigid body that may move freely."""
 
+from collections.abc import Iterator
+
 import casadi as ca
 import numpy as np
 
 from gantrytau import Model, Parameter, Real, der, dot, outer, require, root
-from gantrytau.language.self_description.appearance import Ball, Lump
+from gantrytau.language.self_description.appearance import Ball, Lump, Shape
 from gantrytau.mechanics.multibody.frames import Frame, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
 
@@ -86,7 +88,7 @@ class Body(Model):
         yield a.f == self.m * (centre - self.world.gravity)
         yield a.t == a.R @ (self.J @ gain + ca.cross(spin, self.J @ spin)) + ca.cross(arm, a.f)
 
-    def shapes(self):
+    def shapes(self) -> Iterator[Shape]:
         yield Lump(at="frame_a.r", R="frame_a.R", mass="m", r_cm="r_cm", J="J")
 
 

@@ -4,11 +4,13 @@ Dressler (2012), section 4.4. Where the links of an arm are exactly parallel and
 keeps its orientation; offsets and lengths of their own make this the kinematic error model of (4.14).
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gantrytau import Array, Model, Real, StateSelect, connect
 from gantrytau.errors import ModelError
-from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Stick, Triad
+from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Shape, Stick, Triad
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau.mechanics.translational import Friction, TanhFriction
@@ -29,7 +31,7 @@ class Plate(Body):
         yield from super().equations()
         yield self.R == self.frame_a.R
 
-    def shapes(self):
+    def shapes(self) -> Iterator[Shape]:
         yield from super().shapes()
         yield PathLine(at="r")
         yield Triad(at="r", R="R")

@@ -90,7 +90,7 @@ class Playback:
         units, words = labels(dae)
         table = dict(zip(names, rows[:, keep], strict=True))
         title = f"{self.optimum.name}, played back"
-        own = dict(title=title, shapes=dae.flat.shapes)
+        own: dict[str, Any] = dict(title=title, shapes=dae.flat.shapes)
         return Result(played.times[keep], table, units=units, descriptions=words, **own)
 
     def __getitem__(self, name: str) -> np.ndarray:
