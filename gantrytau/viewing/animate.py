@@ -37,6 +37,11 @@ def view(
     from gantrytau.viewing.film import film_of
 
     dae = _translated(model)
+    if not isinstance(pose, Mapping | None):
+        raise ModelError(
+            f"view: found pose={pose!r}, expected values by name, {{'tool.r': [0.5, 2.8, -0.8]}}",
+            argument="pose",
+        )
     values = dae.evaluate(dict(pose or {}))
     constants = {name: float(value) for name, value in dae.parameter_values.items()}
     pose_only = Result([0.0], {**constants, **dict(_scalars(values))}, title=dae.name, shapes=dae.flat.shapes)
@@ -64,13 +69,19 @@ def animate(
     together = list(shown) if isinstance(shown, (list, tuple)) else [shown]
     if not together:
         raise ModelError("animate: found an empty list, expected results of simulate or optimize")
+    if isinstance(names, str):
+        raise ModelError(f"animate: found names={names!r}, expected a list of texts", argument="names")
     if names is not None and len(names) != len(together):
         raise ModelError(
             f"animate: found {len(names)} names for {len(together)} results, expected one for each"
         )
     dae = None if model is None else _translated(model)
     films = [film_of(one, speed, dae, around) for one in together]
-    titles = list(names) if names is not None else [f.title if len(films) > 1 else "" for f in films]
+    titles = (
+        [str(name) for name in names]
+        if names is not None
+        else [f.title if len(films) > 1 else "" for f in films]
+    )
     if len(set(titles)) < len(titles):
         titles = [f"{title} ({k + 1})" for k, title in enumerate(titles)]
     title = ", ".join(dict.fromkeys(film.title for film in films))

@@ -50,15 +50,37 @@ class Film:
 
     def values(self, what: Value, shape: tuple[int, ...] = ()) -> np.ndarray:
         """A quantity, a number, or a vector of either, at all times, (N, *shape)."""
-        if isinstance(what, (list, tuple)):
-            return np.stack([self.values(part) for part in what], axis=-1).reshape(-1, *shape)
+        if isinstance(what, (list, tuple)) and (len(what),) == shape:
+            return np.stack([self.values(part) for part in what], axis=-1)
         if not isinstance(what, str):
-            return np.broadcast_to(np.asarray(what, dtype=float), (self.times.size, *shape))
+            return np.broadcast_to(self._numbers(what, shape), (self.times.size, *shape))
         if what not in self.series:
             return np.broadcast_to(self._constant(what, shape), (self.times.size, *shape))
-        known, found = self.series.time, self._known(what).reshape(self.series.time.size, -1)
+        known, found = self.series.time, self._known(what)
+        self._check(what, found[0], shape)
+        found = found.reshape(known.size, -1)
         columns = [np.interp(self.times, known, column) for column in found.T]
         return np.stack(columns, axis=1).reshape(self.times.size, *shape)
+
+    def _numbers(self, what: Value, shape: tuple[int, ...]) -> np.ndarray:
+        """Numbers of a shape; ModelError for what has another one, or is not finite."""
+        try:
+            found = np.asarray(what, dtype=float)
+        except (TypeError, ValueError):
+            found = np.array(np.nan)
+        self._check(what, found, shape)
+        if not np.isfinite(found).all():
+            raise ModelError(
+                f"{self.title or 'result'}: found {what!r} in shapes(), expected names or finite numbers"
+            )
+        return found
+
+    def _check(self, what: Value, found: np.ndarray, shape: tuple[int, ...]) -> None:
+        if found.shape != shape and np.isfinite(found).all():
+            raise ModelError(
+                f"{self.title or 'result'}: found {what!r} of shape {found.shape} in shapes(), expected one of shape "
+                f"{shape}; a place is the name of a vector of three, or three of names and numbers"
+            )
 
     def _known(self, name: str) -> np.ndarray:
         """A quantity at the times of the result; ModelError where it is not finite."""
@@ -82,9 +104,10 @@ class Film:
         from scipy.spatial.transform import Rotation, Slerp
 
         if not isinstance(R, str) or R not in self.series:
-            found = np.eye(3) if R is None else self._constant(R, (3, 3)) if isinstance(R, str) else R
+            found = np.eye(3) if R is None else self.values(R, (3, 3))
             return np.broadcast_to(found, (self.times.size, 3, 3))
         known, rows = np.unique(self.series.time, return_index=True)
+        self._check(R, self._known(R)[0], (3, 3))
         given = Rotation.from_matrix(self._known(R)[rows])
         if known.size == 1:
             return np.broadcast_to(given.as_matrix()[0], (self.times.size, 3, 3))
@@ -152,7 +175,7 @@ def _root(series: Series, shapes: Sequence[Shape]) -> str:
 
 
 def _surroundings(around: Sequence[Any]) -> Iterator[Shape]:
-    for one in around:
+    for one in around if isinstance(around, (list, tuple)) else [around]:
         if isinstance(one, Shape):
             yield one
         elif callable(getattr(one, "shapes", None)) and not isinstance(one, type):

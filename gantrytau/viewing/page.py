@@ -32,6 +32,8 @@ class Page:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write it to a file and return its path."""
+        if Path(path).is_dir():
+            raise ModelError(f"{path}: found a folder, expected the name of a file in it, such as robot.html")
         with replacing(path) as file:
             file.write_text(self.text, encoding="utf-8")
         return Path(path)

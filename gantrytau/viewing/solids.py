@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.errors import ModelError
 from gantrytau.language.self_description.appearance import (
     Ball,
     Cloud,
@@ -118,7 +119,7 @@ class _Scene:
 
     def _stick(self, shape: Stick) -> Iterator[Solid]:
         a, b = self.film.values(shape.a, (3,)), self.film.values(shape.b, (3,))
-        radius = self.thin if shape.radius is None else self.film.values(shape.radius)
+        radius = self.thin if shape.radius is None else _not_negative(shape, self.film.values(shape.radius))
         yield from self._bar(shape, "bar", a, b, radius)
 
     def _bar(self, shape: Shape, role: str, a: np.ndarray, b: np.ndarray, radius: Any) -> Iterator[Solid]:
@@ -137,9 +138,9 @@ class _Scene:
     def _ball(self, shape: Ball) -> Iterator[Solid]:
         r = self.film.values(shape.at, (3,))
         if shape.radius is not None:
-            diameter = 2 * self.film.values(shape.radius)
+            diameter = 2 * _not_negative(shape, self.film.values(shape.radius))
         elif shape.mass is not None:
-            diameter = np.cbrt(6 * self.film.values(shape.mass) / (np.pi * STEEL))
+            diameter = np.cbrt(6 * _not_negative(shape, self.film.values(shape.mass)) / (np.pi * STEEL))
         else:
             diameter = np.full(len(r), 3 * self.thin)
         if diameter.max() > 0:
@@ -169,7 +170,7 @@ class _Scene:
 
     def _hinge(self, shape: Hinge) -> Iterator[Solid]:
         r, axis = self.film.values(shape.at, (3,)), self.film.turned(shape.R, shape.axis)
-        half = 3 * self.thin * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        half = 3 * self.thin * _unit(shape, axis)
         yield from self._bar(shape, "ball", r - half, r + half, 1.6 * self.thin)
 
     def _slideway(self, shape: Slideway) -> Iterator[Solid]:
@@ -219,7 +220,27 @@ def _force(film: Film, shape: ForceArrow) -> np.ndarray:
     if shape.direction is None:
         return film.turned(shape.R, shape.force)
     way = film.turned(shape.R, shape.direction)
-    return way / np.linalg.norm(way, axis=1, keepdims=True) * film.values(shape.force)[:, None]
+    return _unit(shape, way) * film.values(shape.force)[:, None]
+
+
+def _unit(shape: Shape, way: np.ndarray) -> np.ndarray:
+    """Directions (N, 3) of length 1; ModelError where there is none."""
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    if length.min() <= 0:
+        raise ModelError(
+            f"{shape.owner or 'the model'}: found the direction [0, 0, 0] of a {type(shape).__name__}, expected another"
+        )
+    return way / length
+
+
+def _not_negative(shape: Shape, size: np.ndarray) -> np.ndarray:
+    """Radii or masses; ModelError where one is below 0."""
+    if size.min() < 0:
+        kind, place = type(shape).__name__, shape.owner or "the model"
+        raise ModelError(
+            f"{place}: found the radius or mass {size.min():g} of a {kind}, expected none below 0"
+        )
+    return size
 
 
 def along(way: np.ndarray) -> np.ndarray:

@@ -8,11 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, Result, animate, simulate, translate, view
 from gantrytau.kinematics import Box, Capsule, Cylinder
-from gantrytau.language.self_description.appearance import Ball, Cuboid, Lump, Stick
+from gantrytau.language.self_description.appearance import Ball, Cuboid, Hinge, Lump, Stick
 from gantrytau.viewing.film import MOST, film_of
 from gantrytau.viewing.solids import along, extent, solids
 from gantrytau_models import GantryTau, Pendulum, SixLinkGantryTau, prototypes
 
+NOTHING: Any = None
+AT_X = ("x", 0.0, 0.0)
 ROUND = 1e-9  # m, of places that are computed from others of some metres, and of unit vectors
 
 
@@ -136,6 +138,11 @@ def test_what_cannot_be_shown_is_told(fall):
         assert f"found speed={wrong!r}, expected a positive number" in message
     assert "around: found float, expected obstacles" in refused(lambda: animate(fall, around=[1.0]))
     assert "view: found Result, expected a model" in refused(lambda: view(fall))
+    pose: Any = "tool.r"
+    assert "view: found pose='tool.r', expected values by name" in refused(lambda: view(Pendulum, pose))
+    assert "animate: found names='ab', expected a list of texts" in refused(
+        lambda: animate([fall, fall], names="ab")
+    )
 
 
 def test_a_model_without_anything_to_be_seen_is_told():
@@ -157,6 +164,31 @@ def test_values_that_are_not_finite_are_told():
         [0.0, 1.0, 2.0], {"x": [0.0, np.nan, 1.0]}, title="Odd", shapes=[Ball(at=("x", 0.0, 0.0))]
     )
     assert "Odd: found x = nan at 1 s, expected finite numbers" in refused(lambda: animate(result))
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"),
+    [
+        (
+            Stick(a=(0.0, 0.0, 0.0), b=(0.0, 0.0)),
+            "found (0.0, 0.0) of shape (2,) in shapes(), expected one of shape (3,)",
+        ),
+        (Ball(at="x"), "found 'x' of shape () in shapes(), expected one of shape (3,); a place is the name"),
+        (Ball(at=(np.nan, 0.0, 0.0)), "found nan in shapes(), expected names or finite numbers"),
+        (Stick(a=(0.0, 0.0, 0.0), b=NOTHING), "found None in shapes(), expected names or finite"),
+        (
+            Ball(at=AT_X, radius=-1.0),
+            "the model: found the radius or mass -1 of a Ball, expected none below 0",
+        ),
+        (Hinge(at=AT_X, axis=(0.0, 0.0, 0.0)), "found the direction [0, 0, 0] of a Hinge"),
+        (
+            Cuboid(at=AT_X, size=(1.0, 1.0, 1.0), R="x"),
+            "of shape () in shapes(), expected one of shape (3, 3)",
+        ),
+    ],
+)
+def test_shapes_that_cannot_be_are_told(shape, words):
+    assert words in refused(lambda: animate(Result([0.0, 1.0], {"x": [0.0, 1.0]}, shapes=[shape])))
 
 
 def test_results_of_one_point_and_of_one_instant_are_pictures():

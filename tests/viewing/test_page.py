@@ -130,7 +130,11 @@ def test_making_a_page_leaves_no_server_and_prints_nothing(swing, capfd):
     assert capfd.readouterr().out == ""
 
 
+def test_a_folder_is_no_file(swing, tmp_path):
+    with pytest.raises(ModelError, match=r"found a folder, expected the name of a file in it"):
+        animate(swing, file=tmp_path)
+
+
 def test_a_folder_that_is_not_there_is_told(swing, tmp_path):
-    with pytest.raises((ModelError, OSError)) as error:
+    with pytest.raises(ModelError, match="none' does not exist; create it"):
         animate(swing, file=tmp_path / "none" / "move.html")
-    assert "none" in str(error.value)

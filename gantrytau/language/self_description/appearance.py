@@ -195,7 +195,8 @@ def shapes_of(components: Iterable[tuple[str, Any]], known: Iterable[str]) -> tu
 def _stated(component: Any, path: str) -> Iterator[Shape]:
     if not isinstance(inspect.getattr_static(type(component), "shapes", None), FunctionType):
         return
-    for shape in component.shapes():
+    found = component.shapes()
+    for shape in found if isinstance(found, Iterable) else [found]:
         if not isinstance(shape, Shape):
             raise ModelError(
                 f"{path or 'the model'} ({type(component).__name__}).shapes: found {shape!r}, expected shapes, as "
