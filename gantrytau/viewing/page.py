@@ -178,7 +178,12 @@ def _added(scene: Any, name: str, solid: Solid) -> Any:
         return scene.add_line_segments(
             name, points, COLOURS[solid.role], thickness=3.0, thickness_units="screen"
         )
-    return scene.add_mesh_trimesh(name, _mesh(solid.file))
+    mesh = _mesh(solid.file)
+    if mesh.visual.kind is None:  # a file without colours
+        return scene.add_mesh_simple(
+            name, mesh.vertices, mesh.faces, color=COLOURS[solid.role], flat_shading=True
+        )
+    return scene.add_mesh_trimesh(name, mesh)
 
 
 def _cone() -> tuple[np.ndarray, np.ndarray]:
