@@ -174,7 +174,7 @@ def _root(series: Series, shapes: Sequence[Shape]) -> str:
     return next(one[: -len(end) - 1] for one in ends for end in names if one.endswith(f".{end}"))
 
 
-def _surroundings(around: Sequence[Any]) -> Iterator[Shape]:
+def _surroundings(around: Any) -> Iterator[Shape]:
     for one in around if isinstance(around, (list, tuple)) else [around]:
         if isinstance(one, Shape):
             yield one
