@@ -16,6 +16,8 @@ HEAVY = [
     "typer",
     "rich",
     "IPython",
+    "viser",
+    "trimesh",
     "scipy.optimize",
     "scipy.io",
     "scipy.integrate",
