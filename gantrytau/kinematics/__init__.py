@@ -3,6 +3,7 @@
 from gantrytau.kinematics.accuracy.accuracy import Accuracy, accuracy
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
+from gantrytau.kinematics.modes.assembly_study import AssemblyStudy, assembly_study
 from gantrytau.kinematics.rods.configurations import Configuration
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
 from gantrytau.kinematics.workspace.pose_limits import Limits, examine
@@ -12,6 +13,7 @@ from gantrytau.language.self_description.rods import RodArm, Rods, RodTurntable,
 __all__ = [
     "Accuracy",
     "AssemblyModes",
+    "AssemblyStudy",
     "Box",
     "Capsule",
     "Configuration",
@@ -25,6 +27,7 @@ __all__ = [
     "Workspace",
     "accuracy",
     "assembly_modes",
+    "assembly_study",
     "examine",
     "workspace",
 ]

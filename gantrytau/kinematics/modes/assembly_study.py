@@ -1,0 +1,245 @@
+"""The assembly modes of robots with six links over many poses: how many are real, how far apart, and what they look like.
+
+|r + R B_j - A_j(q)| = L_j, j = 1..6, has 40 solutions in complex poses, of which the real ones are the ways in which the
+robot could be put together with its actuators at q. Dressler (2012), section 4.5 and Figures 4.16 to 4.18.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.kinematics.kinematics import Kinematics
+from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
+from gantrytau.kinematics.modes.figures import draw_histogram, draw_modes, mode_scene
+from gantrytau.kinematics.poses import real, vectors
+from gantrytau.kinematics.rods.rod_geometry import RodGeometry
+from gantrytau.language.model import Model
+from gantrytau.results.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gantrytau.viewing.page import Page
+
+FileName = str | os.PathLike[str]
+SAME = 1e-6  # m, of the joints on the plate in a mode that the robot's own kinematics answers
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyStudy:
+    """The modes of each row, a robot at actuator coordinates; prints itself as a table.
+
+    names: of the robots; robot: (N,), which of them a row is of; q: (N, n), m and rad; modes: the record of
+    `assembly_modes` of each row, real modes first; branch: (N,), which mode `Kinematics.fk` answers, -1 where it answers
+    none. Rows are all poses of the first robot, then those of the next one.
+    """
+
+    names: tuple[str, ...]
+    robot: np.ndarray
+    q: np.ndarray
+    modes: tuple[AssemblyModes, ...]
+    branch: np.ndarray
+    _geometries: tuple[RodGeometry, ...] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    def __str__(self) -> str:
+        words = ", ".join(dict.fromkeys(self.names))
+        lines = [
+            f"Assembly modes of {words}, {len(self)} poses: {self.counts.min()} to {self.counts.max()} real ones, "
+            f"{self.counts.mean():.3g} in the mean",
+            "  real modes  poses  without crossed links",
+        ]
+        for number, poses in self.histogram.items():
+            free = self.feasible[self.counts == number]
+            lines.append(f"  {number:10d}  {poses:5d}  {_span(free)}")
+        lines.append(f"all 40 found in {int(self.complete.sum())} of {len(self)} poses")
+        if np.isfinite(self.nearest).any():
+            least, far = np.nanmin(self.nearest), np.nanmax(self.nearest)
+            lines.append(f"the two nearest modes are {least:.3g} to {far:.3g} m apart")
+        if np.isfinite(self.to_next).any():
+            row = int(np.nanargmin(self.to_next))
+            lines.append(
+                f"another mode is {self.to_next[row]:.3g} m from that of the robot, at the nearest (row {row})"
+            )
+        return "\n".join(lines)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """How many modes are real, (N,)."""
+        return np.array([int(found.real.sum()) for found in self.modes])
+
+    @cached_property
+    def feasible(self) -> np.ndarray:
+        """How many of them have no crossed links, and links as far apart as `diameter` asks, (N,)."""
+        return np.array([int(found.feasible.sum()) for found in self.modes])
+
+    @cached_property
+    def complete(self) -> np.ndarray:
+        """Whether all 40 modes were found, (N,)."""
+        return np.array([found.complete for found in self.modes])
+
+    @cached_property
+    def groups(self) -> np.ndarray:
+        """How many real modes lie on the one side of the plane through the joints on the carts, and on the other, (N, 2)."""
+        return np.array([[int((found.group == side).sum()) for side in (1, -1)] for found in self.modes])
+
+    @property
+    def histogram(self) -> dict[int, int]:
+        """How many poses have so many real modes, by the number of modes."""
+        numbers, poses = np.unique(self.counts, return_counts=True)
+        return dict(zip(numbers.tolist(), poses.tolist(), strict=True))
+
+    @cached_property
+    def nearest(self) -> np.ndarray:
+        """Between the two real modes of a pose that are nearest to each other, (N,) in m, see `distances`; NaN below two."""
+        return np.array([_least(self.distances(row)) for row in range(len(self))])
+
+    @cached_property
+    def to_next(self) -> np.ndarray:
+        """From the mode that the robot is in to the nearest other one, (N,) in m; NaN where either is not there."""
+        return np.array([
+            np.nan if self.branch[row] < 0 else _least(self.distances(row)[self.branch[row]][None])
+            for row in range(len(self))
+        ])  # fmt: skip
+
+    def distances(self, row: int) -> np.ndarray:
+        """Between the real modes of a row, (k, k) in m: the root of the mean square way of the joints on the plate."""
+        r, R = self.modes[self._row(row)].poses
+        joints = r[:, None] + self._geometries[self.robot[row]].on_plate @ np.swapaxes(R, 1, 2)
+        return np.sqrt(((joints[:, None] - joints) ** 2).sum(-1).mean(-1))
+
+    def plot(self, *, file: FileName | None = None) -> "Figure":
+        """Histograms of the numbers of real modes, and of how far apart the two nearest ones are (Figure 4.17)."""
+        return draw_histogram(self.counts, self.feasible, self.nearest, file)
+
+    def plot_modes(self, row: int = 0, *, file: FileName | None = None) -> "Figure":
+        """The robot in each real mode of a row, links that cross in red (Figure 4.18).
+
+        Raises ModelError for a row that there is not, or that has no real mode.
+        """
+        modes = self._with_modes(row)
+        return draw_modes(self._geometries[self.robot[row]], self.q[row], modes, int(self.branch[row]), file)
+
+    def motion(self, row: int = 0) -> Result:
+        """The real modes of a row one after the other, from the second k on that of number k, for `animate`.
+
+        Raises ModelError as `plot_modes`.
+        """
+        modes = self._with_modes(row)
+        return mode_scene(self._geometries[self.robot[row]], self.q[row], modes, self.names[self.robot[row]])
+
+    def view(self, row: int = 0, *, file: FileName | None = None) -> "Page":
+        """`motion` as a page for a browser, whose slider goes from mode to mode (extra `view`)."""
+        from gantrytau.viewing.animate import animate
+
+        return animate(self.motion(row), file=file)
+
+    def _with_modes(self, row: int) -> AssemblyModes:
+        found = self.modes[self._row(row)]
+        if not found.real.any():
+            raise ModelError(
+                f"assembly_study: found no real mode in row {row}, expected one to show; {found.findings[-1]}"
+            )
+        return found
+
+    def _row(self, row: int) -> int:
+        if not (isinstance(row, int | np.integer) and 0 <= row < len(self)):
+            raise ModelError(
+                f"assembly_study: found row {row!r}, expected 0 to {len(self) - 1}, as there are poses",
+                argument="row",
+            )
+        return int(row)
+
+
+def assembly_study(
+    robot: Model | Kinematics | Sequence[Model | Kinematics], q: Any, *, diameter: float = 0.0
+) -> AssemblyStudy:
+    """All assembly modes of a robot with six links at many actuator coordinates, or of several robots at the same ones.
+
+        study = assembly_study(F1GantryTau(prototypes.F1), q)
+        print(study)
+        study.plot(file="modes.png")
+
+    robot: an instance such as F1GantryTau(prototypes.F1), its Kinematics, or a list of them: `Kinematics.replaced` gives
+    other geometries; q: (N, n) or (n,) in m and rad; diameter: of the links, which feasible modes keep, in m.
+    Raises ModelError for robots without six links, shapes and numbers that do not fit, StructureError where modes are no
+    separate poses.
+    """
+    given = list(robot) if isinstance(robot, (list, tuple)) else [robot]
+    if not given:
+        raise ModelError("assembly_study: found no robot, expected one or several; give instances")
+    if not 0 <= real(diameter) < np.inf:
+        raise ModelError(f"assembly_study: found diameter={diameter!r}, expected 0 or more, in m")
+    robots = [_with_six_links(one) for one in given]
+    places = [_coordinates(one, q) for one in robots]
+    modes, branch = [], []
+    for one, rows in zip(robots, places, strict=True):
+        geometry = one.linked("assembly_study").geometry
+        r, R = one.fk(rows)
+        for k, base in enumerate(geometry.cart_joints(rows)):
+            try:
+                found = assembly_modes(base, geometry.on_plate, geometry.length, diameter=diameter)
+            except StructureError as error:
+                raise StructureError(f"row {k} of {one.dae.name}: {error}") from error
+            modes.append(found)
+            branch.append(_own(found, geometry, r[k], R[k]))
+    return AssemblyStudy(
+        names=tuple(one.dae.name for one in robots),
+        robot=np.repeat(np.arange(len(robots)), [len(rows) for rows in places]),
+        q=np.concatenate(places),
+        modes=tuple(modes),
+        branch=np.array(branch),
+        _geometries=tuple(one.linked().geometry for one in robots),
+    )
+
+
+def _with_six_links(robot: Any) -> Kinematics:
+    """The kinematics of a robot; ModelError unless it has six links."""
+    found = robot if isinstance(robot, Kinematics) else Kinematics(robot)
+    links = len(found.linked("assembly_study").geometry.length)
+    if links != 6:
+        raise ModelError(
+            f"assembly_study: found {found.dae.name} with {links} links, expected six; a robot with three has two poses, "
+            "Kinematics.configurations(q=...)"
+        )
+    return found
+
+
+def _coordinates(robot: Kinematics, q: Any) -> np.ndarray:
+    """Actuator coordinates (N, n), N above 0, all finite."""
+    rows, _ = vectors(q, len(robot.joints), "q", "assembly_study")
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if wrong.size or not len(rows):
+        found = f"numbers that are not finite in row {wrong[0]} of q" if wrong.size else "no rows of q"
+        raise ModelError(
+            f"assembly_study: found {found}, expected coordinates in m and rad; leave out what is unknown"
+        )
+    return rows
+
+
+def _own(modes: AssemblyModes, geometry: RodGeometry, r: np.ndarray, R: np.ndarray) -> int:
+    """Which real mode is the pose r (3,), R (3, 3), -1 if none is."""
+    if np.isnan(r).any() or not modes.real.any():
+        return -1
+    here, turn = modes.poses
+    joints = here[:, None] + geometry.on_plate @ np.swapaxes(turn, 1, 2)
+    away = np.abs(joints - (r + geometry.on_plate @ R.T)).max(axis=(1, 2))
+    return int(away.argmin()) if away.min() < SAME else -1
+
+
+def _least(distances: np.ndarray) -> float:
+    """The least above zero of distances, of which those of a mode from itself are zero; NaN if there is none."""
+    others = distances[distances > 0]
+    return float(others.min()) if others.size else np.nan
+
+
+def _span(numbers: np.ndarray) -> str:
+    least, most = int(numbers.min()), int(numbers.max())
+    return str(least) if least == most else f"{least} to {most}"
