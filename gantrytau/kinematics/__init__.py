@@ -1,6 +1,7 @@
 """Kinematics of robots: poses from joints and joints from poses, one or many at a time."""
 
 from gantrytau.kinematics.accuracy.accuracy import Accuracy, accuracy
+from gantrytau.kinematics.cart_joints import CartJoints, cart_joints
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
 from gantrytau.kinematics.modes.assembly_study import AssemblyStudy, assembly_study
@@ -16,6 +17,7 @@ __all__ = [
     "AssemblyStudy",
     "Box",
     "Capsule",
+    "CartJoints",
     "Configuration",
     "Cylinder",
     "Kinematics",
@@ -28,6 +30,7 @@ __all__ = [
     "accuracy",
     "assembly_modes",
     "assembly_study",
+    "cart_joints",
     "examine",
     "workspace",
 ]

@@ -81,17 +81,25 @@ class RodGeometry:
             A[:, links] = place[:, None] + self.on_cart[links] @ np.swapaxes(R, 1, 2)
         return A
 
-    def frames(self, arm: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, list]:
-        """Origin (N, 3) and orientation (N, 3, 3) of what carries the links of an arm; axis and origin of its turntables."""
+    def carriers(self, arm: int, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Origin (N, 3) and orientation (N, 3, 3) of the cart of an arm, then of each turntable upon it."""
         place = self.offset[arm] + q[:, arm, None] * self.direction[arm]
-        R, turns = np.broadcast_to(np.eye(3), (len(q), 3, 3)), []
+        R = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+        found = [(place, R)]
         for k, turntable in enumerate(self.turntables):
             if turntable.arm == arm:
                 place = place + R @ turntable.offset
-                R = R @ turntable.R
-                turns.append((R @ turntable.axis, place))
-                R = R @ about(turntable.axis, q[:, len(self.arms) + k])
-        return place, R, turns
+                R = R @ turntable.R @ about(turntable.axis, q[:, len(self.arms) + k])
+                found.append((place, R))
+        return found
+
+    def frames(self, arm: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, list]:
+        """Origin (N, 3) and orientation (N, 3, 3) of what carries the links of an arm; axis and origin of its turntables."""
+        _, *turning = carriers = self.carriers(arm, q)
+        tables = [turntable for turntable in self.turntables if turntable.arm == arm]
+        # a turntable leaves its own axis where it is
+        turns = [(R @ table.axis, place) for table, (place, R) in zip(tables, turning, strict=True)]
+        return (*carriers[-1], turns)
 
     def slopes(
         self, q: np.ndarray, r: np.ndarray, R: np.ndarray, *, joints: bool = True
