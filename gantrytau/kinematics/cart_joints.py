@@ -63,7 +63,7 @@ class CartJoints:
     def inside(self, limit: float) -> np.ndarray:
         """Whether all ball joints of a pose keep that largest angle, (N,); False where there is no pose."""
         with np.errstate(invalid="ignore"):
-            return (self.left(limit) >= 0).all(axis=(-2, -1))
+            return np.all(self.left(limit) >= 0, axis=(-2, -1))
 
 
 def cart_joints(
