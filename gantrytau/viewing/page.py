@@ -135,7 +135,7 @@ class _Player:
             elif name == "scale":
                 if self.solid.kind == "axes":
                     continue
-                self.handle.scale = tuple(np.maximum(value, 1e-9).tolist())
+                self.handle.scale = tuple(np.where(np.abs(value) < 1e-9, 1e-9, value).tolist())
             else:
                 setattr(self.handle, name, value)
 

@@ -17,6 +17,7 @@ from gantrytau.language.self_description.appearance import (
     Lump,
     MeshFile,
     PathLine,
+    RoundBar,
     Shape,
     Slideway,
     Stick,
@@ -106,6 +107,7 @@ class _Scene:
             Stick: self._stick,
             Ball: self._ball,
             Cuboid: self._cuboid,
+            RoundBar: self._cylinder,
             Lump: self._lump,
             Hinge: self._hinge,
             Slideway: self._slideway,
@@ -136,7 +138,7 @@ class _Scene:
             )
 
     def _ball(self, shape: Ball) -> Iterator[Solid]:
-        r = self.film.values(shape.at, (3,))
+        r = self._middle(shape)
         if shape.radius is not None:
             diameter = 2 * _not_negative(shape, self.film.values(shape.radius))
         elif shape.mass is not None:
@@ -150,10 +152,22 @@ class _Scene:
     def _cuboid(self, shape: Cuboid) -> Iterator[Solid]:
         cube = shape.size if isinstance(shape.size, (int, float)) else None
         size = self.film.values(shape.size if cube is None else [self.thin * cube] * 3, (3,))
-        r = self.film.values(shape.at, (3,)) + self.film.turned(shape.R, shape.offset)
-        yield Solid(
-            shape.owner, "cuboid", "body" if cube is None else "drive", r, self.film.rotations(shape.R), size
-        )
+        role = "body" if cube is None else "drive"
+        yield Solid(shape.owner, "cuboid", role, self._middle(shape), self._axes_of(shape), size)
+
+    def _cylinder(self, shape: RoundBar) -> Iterator[Solid]:
+        radius, length = (_not_negative(shape, self.film.values(x)) for x in (shape.radius, shape.length))
+        sizes = _sizes(2 * radius, 2 * radius, length)
+        yield Solid(shape.owner, "cylinder", "body", self._middle(shape), self._axes_of(shape), sizes)
+
+    def _middle(self, shape: Ball | Cuboid | RoundBar | MeshFile) -> np.ndarray:
+        """Its place and its offset from there, (N, 3)."""
+        return self.film.values(shape.at, (3,)) + self.film.turned(shape.R, shape.offset)
+
+    def _axes_of(self, shape: Cuboid | RoundBar | MeshFile) -> np.ndarray:
+        """Its own axes in the world, (N, 3, 3)."""
+        R = self.film.rotations(shape.R)
+        return R if shape.turn is None else R @ shape.turn
 
     def _lump(self, shape: Lump) -> Iterator[Solid]:
         mass, J = self.film.values(shape.mass)[0], self.film.values(shape.J, (3, 3))[0]
@@ -210,9 +224,9 @@ class _Scene:
             yield Solid(shape.owner, "dots", "path", r, _no_turn(r), np.full_like(r, shape.size))
 
     def _mesh(self, shape: MeshFile) -> Iterator[Solid]:
-        r = self.film.values(shape.at, (3,))
-        size = np.full_like(r, shape.scale)
-        yield Solid(shape.owner, "mesh", "body", r, self.film.rotations(shape.R), size, file=Path(shape.file))
+        r = self._middle(shape)
+        size = np.broadcast_to(np.asarray(shape.scale, dtype=float), r.shape)
+        yield Solid(shape.owner, "mesh", "body", r, self._axes_of(shape), size, file=Path(shape.file))
 
 
 def _force(film: Film, shape: ForceArrow) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 from gantrytau.commands.arguments.options import listed
 
 _PYTHON = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
+_URDF = re.compile(r"(?P<file>.+\.urdf)(?P<name>)", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(r"(?P<place>.+?)\s*\((?P<arguments>[^()]*)\)", re.DOTALL)
 
 
@@ -20,10 +21,10 @@ class Choice:
 
     @staticmethod
     def read(text: str) -> "Choice":
-        """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`."""
+        """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`, `robot.urdf`."""
         call = _CALL.fullmatch(text.strip())
         place, arguments = (call["place"], call["arguments"]) if call else (text.strip(), "")
-        found = _PYTHON.fullmatch(place)
+        found = _PYTHON.fullmatch(place) or _URDF.fullmatch(place)
         file = Path(found["file"]).absolute() if found else None
         name = (found["name"] or "") if found else place.removeprefix("gantrytau_models.")
         return Choice(name.strip(), file, listed([arguments]))

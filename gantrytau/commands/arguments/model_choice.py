@@ -56,7 +56,10 @@ def build(
     """The model that MODEL, `--prototype` and `--set` describe; CommandError with a remedy if there is none."""
     choice = Choice.read(text)
     wanted = _wanted(choice, text, prototype)
-    found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
+    if choice.file and choice.file.suffix.lower() == ".urdf":
+        found = _in_urdf(choice.file, kind)
+    else:
+        found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
     if isinstance(found, Model):
         if wanted:
             raise CommandError(f"{choice.name} is ready-made and takes no prototype; leave {wanted} out")
@@ -199,6 +202,16 @@ def _in_file(file: Path, name: str, kind: Kind) -> Any:
     if not hasattr(module, name):
         raise CommandError(f"{file.name} has no class '{name}'{similar(name, classes)}")
     return _checked(getattr(module, name), f"{file.name}:{name}", kind)
+
+
+def _in_urdf(file: Path, kind: Kind) -> type[Model]:
+    """The robot of a URDF file, with the loops of `robot.loops.toml` beside `robot.urdf` if that is there."""
+    from gantrytau.mechanics.urdf import read_urdf
+
+    if kind is not MODEL:
+        raise CommandError(f"{file.name} is a robot, expected {kind}")
+    loops = file.with_suffix(".loops.toml")
+    return read_urdf(file, loops if loops.is_file() else None)
 
 
 def _checked(found: Any, name: str, kind: Kind) -> Any:

@@ -72,23 +72,43 @@ class Stick(Shape):
 
 @dataclass(frozen=True, kw_only=True)
 class Ball(Shape):
-    """A ball at a place. mass: kg, of which its size is taken, as that of a ball of steel, if it has no radius."""
+    """A ball at a place. mass: kg, of which its size is taken, as that of a ball of steel, if it has no radius; offset: (3,)
+    in m, of its middle, along R (3, 3).
+    """
 
     at: Value
     radius: float | str | None = None
     mass: float | str | None = None
+    R: str | np.ndarray | None = None
+    offset: Value = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cuboid(Shape):
     """A cuboid about a place, its edges along the columns of R (3, 3), a name or numbers; size: of its edges, (3,) in m, or
-    one number for a cube that is so many radii of bars long; offset: (3,) in m, of its middle, along R.
+    one number for a cube that is so many radii of bars long; offset: (3,) in m, of its middle, along R; turn: (3, 3), its
+    own axes in R.
     """
 
     at: Value
     size: Value
     R: str | np.ndarray | None = None
     offset: Value = (0.0, 0.0, 0.0)
+    turn: np.ndarray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoundBar(Shape):
+    """A round bar whose middle is at a place, along the third axis of R (3, 3): radius and length in m; offset: (3,) in m,
+    of its middle, along R; turn: (3, 3), its own axes in R.
+    """
+
+    at: Value
+    radius: float | str
+    length: float | str
+    R: str | np.ndarray | None = None
+    offset: Value = (0.0, 0.0, 0.0)
+    turn: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,12 +179,16 @@ class Cloud(Shape):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshFile(Shape):
-    """A mesh of one's own: a file that trimesh reads (STL, OBJ, PLY, GLB), its axes along R (3, 3); scale: m per unit."""
+    """A mesh of one's own: a file that trimesh reads (STL, OBJ, PLY, GLB), its axes along R (3, 3); scale: m per unit, one
+    number, or three along its axes; offset: (3,) in m, of its origin, along R; turn: (3, 3), its own axes in R.
+    """
 
     file: str
     at: Value
     R: str | None = None
-    scale: float = 1.0
+    scale: Value = 1.0
+    offset: Value = (0.0, 0.0, 0.0)
+    turn: np.ndarray | None = None
     texts: ClassVar[tuple[str, ...]] = ("owner", "file")
 
 

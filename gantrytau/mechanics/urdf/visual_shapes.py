@@ -1,0 +1,58 @@
+"""<visual>s of links as shapes, and where their meshes are."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gantrytau.language.self_description.appearance import Ball, Cuboid, MeshFile, RoundBar, Shape
+from gantrytau.mechanics.urdf.urdf_file import UrdfLink, Visual
+
+READABLE = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off")  # what a viewer reads without further packages
+PACKAGE, FILE = "package://", "file://"
+
+
+@dataclass(frozen=True)
+class MeshFolders:
+    """Where the meshes of a URDF file are. packages: folders by the names of packages."""
+
+    urdf: str
+    packages: Mapping[str, str | os.PathLike[str]]
+
+    def find(self, name: str) -> Path | None:
+        """The file of a mesh; None if there is none, or none that can be read."""
+        found = next((path for path in self._candidates(name) if path.is_file()), None)
+        return found if found is not None and found.suffix.lower() in READABLE else None
+
+    def _candidates(self, name: str) -> Iterator[Path]:
+        above = Path(self.urdf).resolve().parents
+        if not name.startswith(PACKAGE):
+            yield above[0] / name.removeprefix(FILE)
+            return
+        package, _, rest = name.removeprefix(PACKAGE).partition("/")
+        if package in self.packages:
+            yield Path(self.packages[package]) / rest
+        for folder in above:  # a URDF file usually stands in the package, or beside it
+            if folder.name == package:
+                yield folder / rest
+            yield folder / package / rest
+
+
+def shapes_of_link(link: UrdfLink, folders: MeshFolders) -> tuple[Shape, ...]:
+    """What is seen of a link; none where it says nothing, or no mesh of it is found."""
+    found = (_shape(visual, folders) for visual in link.visuals)
+    return tuple(shape for shape in found if shape is not None)
+
+
+def _shape(visual: Visual, folders: MeshFolders) -> Shape | None:
+    where: dict[str, Any] = dict(at="frame_a.r", R="frame_a.R", offset=visual.placement.xyz)
+    turned = dict(where, turn=visual.placement.R)
+    if visual.kind == "box":
+        return Cuboid(size=visual.size, **turned)
+    if visual.kind == "cylinder":
+        return RoundBar(radius=visual.size[0], length=visual.size[1], **turned)
+    if visual.kind == "sphere":
+        return Ball(radius=visual.size[0], **where)
+    file = folders.find(visual.file)
+    return None if file is None else MeshFile(file=str(file), scale=visual.size, **turned)
