@@ -12,6 +12,7 @@ from gantrytau_optimica.calibration.data.findings import CalibrationError, Findi
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
+from gantrytau_optimica.calibration.design.pose_sensitivities import PoseSensitivities, pose_sensitivities
 from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityTable, sensitivity_table
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
 from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
@@ -163,6 +164,7 @@ __all__ = [
     "Path",
     "PhysicalForm",
     "PlannedCell",
+    "PoseSensitivities",
     "Prepared",
     "Reference",
     "Repetitions",
@@ -232,6 +234,7 @@ __all__ = [
     "plot_estimates",
     "plot_learning",
     "plot_q",
+    "pose_sensitivities",
     "predict",
     "predict_late",
     "prepare",
