@@ -128,7 +128,7 @@ class PoseSensitivities:
                 axis.plot(curve, ".-", markersize=3, linewidth=0.8, label=name)
             axis.set_ylabel("displacement for a unit [m]")
             axis.set_ylim(bottom=0.0)
-            axis.legend(fontsize="small")
+            figure.legend(fontsize="small", loc="outside upper center", ncols=2, frameon=False)
             axis.grid(alpha=0.3)
         else:
             self._colours(figure, axis)
