@@ -117,10 +117,14 @@ def linearize(
         check_period(f"linearize {dae.name}", period)
     if parameters:
         dae = _with_parameters(dae, parameters)
-    columns = dae.inputs if inputs is None else tuple(n for name in names(inputs) for n in dae.expand(name))
+    columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))
     for name in columns:
         if name not in dae.inputs:
-            raise ModelError(f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}")
+            raise ModelError(
+                f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}",
+                argument="inputs",
+            )
+    _expanded(dae, "outputs", names(outputs or ()))
     dae = _with_outputs(dae, names(outputs or ()))
     values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
     slopes = _Slopes(dae, values)
@@ -140,6 +144,14 @@ def linearize(
     units, _ = labels(dae)
     names_of_states = tuple(states[k] for k in kept)
     return Linearization(dae.name, *matrices, names_of_states, columns, rows, point, period, units)
+
+
+def _expanded(dae: Translated, which: str, wanted: Sequence[str]) -> tuple[str, ...]:
+    """The scalars of names that are given for an argument; ModelError that names it."""
+    try:
+        return tuple(n for name in wanted for n in dae.expand(name))
+    except ModelError as error:
+        raise ModelError(f"{which}: {error}", argument=which) from error
 
 
 def _matrices(
@@ -170,10 +182,13 @@ def _matrices(
 
 
 def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translated:
+    _expanded(dae, "parameters", tuple(parameters))
     scalars = given_scalars(dae, parameters)
     for name in scalars:
         if name not in dae.table.symbols:
-            raise ModelError(f"parameters: {name} is a variable of {dae.name}; give it in at=")
+            raise ModelError(
+                f"parameters: {name} is a variable of {dae.name}; give it in at=", argument="parameters"
+            )
     return retranslate(dae, with_values(dae.flat, scalars))
 
 
@@ -188,10 +203,13 @@ def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
 
 
 def _checked(dae: Translated, at: Mapping[str, Any]) -> dict[str, float]:
+    _expanded(dae, "at", tuple(at))
     scalars = given_scalars(dae, at)
     for name in scalars:
         if name in dae.table.symbols:
-            raise ModelError(f"at: {name} is a parameter of {dae.name}; give it in parameters=")
+            raise ModelError(
+                f"at: {name} is a parameter of {dae.name}; give it in parameters=", argument="at"
+            )
     return scalars
 
 
@@ -245,7 +263,9 @@ def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float
             continue
         alias = dae.root(name)
         if alias is None:
-            raise ModelError(f"at: {name} follows from other variables of {dae.name}; give those")
+            raise ModelError(
+                f"at: {name} follows from other variables of {dae.name}; give those", argument="at"
+            )
         offset, still = dae.number(alias.offset), alias.root is None or alias.order > 0
         value = number - offset if alias.root is None else dae.number(alias.root_value(number))
         if still and abs(value) > 1e-9 * max(1.0, abs(number)):

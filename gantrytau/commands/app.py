@@ -11,10 +11,13 @@ from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
 from gantrytau.commands.doctor_command import doctor
 from gantrytau.commands.equations_command import equations
+from gantrytau.commands.estimate.estimate_command import estimate
 from gantrytau.commands.identify.identify_command import identify
 from gantrytau.commands.learn.learn_command import learn
 from gantrytau.commands.library_command import library
+from gantrytau.commands.linearize_command import linearize
 from gantrytau.commands.optimize_command import optimize
+from gantrytau.commands.pareto_command import pareto
 from gantrytau.commands.printing.reporting import Commands
 from gantrytau.commands.simulate_command import simulate
 from gantrytau.commands.study_command import study
@@ -24,7 +27,6 @@ app = typer.Typer(
     cls=Commands,
     help="Acausal models of parallel robots: simulate, optimise, calibrate, identify, learn, export.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_show_locals=False,
 )
 
@@ -51,6 +53,9 @@ app.command(
     epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"
 )(simulate)
 app.command(
+    epilog="Example: gantrytau linearize 'GantryTau(L1)' --outputs tool.r --plot bode.png --output system.json"
+)(linearize)
+app.command(
     epilog="Example: gantrytau study --example > swings.toml && gantrytau study swings.toml --plot x"
 )(study)
 app.command(
@@ -60,11 +65,17 @@ app.command(epilog="Example: gantrytau identify log.csv --robot 'GantryTau(L1)' 
     identify
 )
 app.command(
+    epilog="Example: gantrytau estimate --example > swing.toml; gantrytau estimate swing.toml --plot fit.png"
+)(estimate)
+app.command(
     epilog="Example: gantrytau learn --example > rig.toml && gantrytau learn rig.toml --output learnt"
 )(learn)
 app.command(
     epilog="Example: gantrytau optimize move.py:Fastest --set cart.m=2.5 --plot cart.f --to force.png"
 )(optimize)
+app.command(
+    epilog="Example: gantrytau pareto move.py:Fastest --values 0.001,0.01,0.1 --along final_time --plot curve.png"
+)(pareto)
 app.command(
     epilog="Example: gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s"
 )(equations)

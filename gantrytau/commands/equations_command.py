@@ -7,7 +7,9 @@ import typer
 
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
-from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
+from gantrytau.commands.arguments.shell_offers import words
+from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting, write_text
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -20,7 +22,13 @@ SPELLING = Spelling(("translate",), {"given": "--given", "find": "--find"})
 def equations(
     model: ModelName,
     format: Annotated[
-        str, typer.Option("--format", metavar="text|latex|html|modelica", help="How to write them.")
+        str,
+        typer.Option(
+            "--format",
+            metavar="text|latex|html|modelica",
+            autocompletion=words("text", "latex", "html", "modelica"),
+            help="How to write them.",
+        ),
     ] = "text",
     output: Annotated[
         Path | None, typer.Option(help="Write to this file, else to the terminal.", show_default=False)

@@ -1,9 +1,6 @@
 """`gantrytau optimize`: an optimal-control problem solved, its answer as figures, files and picture_output."""
 
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -14,8 +11,10 @@ from gantrytau import GantryTauError, SolveError
 from gantrytau.commands.arguments import solver_options
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
-from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To, listed
+from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To
+from gantrytau.commands.arguments.problem_name import ProblemName
 from gantrytau.commands.arguments.saved_results import FORMATS, read_result
+from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing import optimum_summary, picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     FAULT,
@@ -27,20 +26,11 @@ from gantrytau.commands.printing.reporting import (
     refusing,
     reporting,
 )
+from gantrytau.commands.printing.solver_line import live
 
 if TYPE_CHECKING:
     from gantrytau import FlatModel
     from gantrytau_optimica import Optimum
-
-ProblemName = Annotated[
-    str,
-    typer.Argument(
-        metavar="PROBLEM",
-        help="A class that inherits from gantrytau_optimica.Optimization, as move.py:Fastest, "
-        "'move.py:Fastest(weight=0.01)' or package.module:Fastest; the file alone where it holds only one.",
-        show_default=False,
-    ),
-]
 
 
 def optimize(
@@ -139,38 +129,8 @@ def _solved(chosen: Chosen, quiet: bool, policy: dict[str, Any]) -> "Optimum":
     import gantrytau_optimica
 
     model: Any = chosen.model
-    with _live(chosen.name, quiet) as progress:
+    with live(chosen.name, quiet) as progress:
         return gantrytau_optimica.optimize(model, progress=progress, **policy)
-
-
-@contextmanager
-def _live(name: str, quiet: bool) -> Iterator[Callable[..., None] | None]:
-    """A line on the terminal that follows the solver; none where nobody would see it."""
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-
-    line = _Line(f"translating and building {name}")
-    with Console(file=sys.stderr).status(line):
-
-        def progress(iteration: int, objective: float, stage: str = "") -> None:
-            place = f"{stage}, " if stage else ""
-            line.words = f"{name}: {place}iteration {iteration}, objective {objective:.6g}"
-
-        yield progress
-
-
-class _Line:
-    """Words and the seconds that it takes already, which go on while nothing is reported."""
-
-    def __init__(self, words: str):
-        self.words, self.begin = words, time.perf_counter()
-
-    def __rich__(self) -> Any:
-        from rich.text import Text
-
-        return Text(f"{self.words}, {time.perf_counter() - self.begin:.1f} s")
 
 
 def _written(optimum: "Optimum", wanted: Wanted, files: list[str]) -> str:

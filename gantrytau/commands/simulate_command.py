@@ -18,9 +18,8 @@ from gantrytau.commands.arguments.options import (
     Seed,
     Settings,
     To,
-    listed,
 )
-from gantrytau.commands.arguments.values import signal
+from gantrytau.commands.arguments.values import listed, signal
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import as_json, busy, noted, reporting
 from gantrytau.commands.printing.spelling import Spelling

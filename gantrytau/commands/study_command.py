@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError
-from gantrytau.commands.arguments.options import Json, Plotted, To, listed
+from gantrytau.commands.arguments.options import Json, Plotted, To
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.arguments.study_file import EXAMPLE, StudyFile, read_study
+from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import (
     INTERRUPTED,
@@ -17,6 +19,7 @@ from gantrytau.commands.printing.reporting import (
     note,
     reporting,
     writable,
+    writable_place,
 )
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -48,6 +51,7 @@ def study(
         str | None,
         typer.Option(
             metavar="processes|dask|ADDRESS",
+            autocompletion=words("processes", "dask"),
             help="All processors of this machine, a Dask cluster on it, or one by its address, tcp://host:8786.",
             show_default="processes",
         ),
@@ -74,7 +78,7 @@ def study(
             )
         drawn = listed(plot)
         place = picture_output.place(drawn, to)
-        _rehearse(output)
+        writable_place("--output", output, ".nc")
         asked = read_study(file)
         keywords = dict(asked.keywords)
         keywords |= {k: v for k, v in (("folder", folder), ("where", where)) if v is not None}
@@ -91,16 +95,6 @@ def study(
             _show(asked.name, found, files)
         if len(found.failures) == len(found):
             raise typer.Exit(1)
-
-
-def _rehearse(output: Path | None) -> None:
-    """CommandError for a place to which no dataset can be written."""
-    if output is None:
-        return
-    if output.suffix != ".nc":
-        raise CommandError(f"--output {output}: found the suffix '{output.suffix}', expected .nc (netCDF)")
-    if not output.absolute().parent.is_dir():
-        raise CommandError(f"--output {output}: the folder '{output.parent}' does not exist; create it first")
 
 
 def _found(asked: StudyFile, keywords: dict[str, Any], json: bool) -> "Study":

@@ -44,5 +44,8 @@ def parameter_names(read: SymbolicProblem, name: str) -> tuple[str, ...]:
     """Scalar names of a parameter; ModelError if it is none."""
     elements = read.dae.expand(name)
     if elements[0] not in read.dae.parameter_symbols:
-        raise ModelError(f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter")
+        raise ModelError(
+            f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter",
+            argument="parameters",
+        )
     return tuple(elements)

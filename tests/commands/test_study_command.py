@@ -83,7 +83,7 @@ def test_wrong_files_are_refused_in_words(run, written, text):
 
 def test_a_place_that_cannot_be_written_is_told_before_the_work(run, written, tmp_path):
     file = written('model = "Pendulum"\nstop = 1.0\n[over]\nL = [1.0]\n')
-    assert "expected .nc (netCDF)" in run("study", file, "--output", "found.csv").stderr
+    assert "expected .nc" in run("study", file, "--output", "found.csv").stderr
     assert "does not exist" in run("study", file, "--output", str(tmp_path / "no" / "found.nc")).stderr
     assert "expected that of a study" in run("study").stderr
     refused = run("study", file, "--where", "proceses")

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gantrytau.answers.linear_systems.poles_and_zeros import (
     transmission_zeros,
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
+from gantrytau.answers.linear_systems.system_files import record, save_system
 from gantrytau.errors import ModelError
 
 if TYPE_CHECKING:
@@ -185,6 +187,17 @@ class LinearSystem:
         systems = bode_and_poles.beside_each_other(self, "plot_poles", beside)
         return bode_and_poles.draw_poles(systems, file)
 
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write names and matrices: .json (with poles), .npz (arrays A, B, C, D by name) or .csv (one table); the path.
+
+        ModelError for another suffix, or a folder that is not there.
+        """
+        return save_system(self, path)
+
+    def record(self) -> dict[str, Any]:
+        """Names, units, matrices as lists of rows, and poles with Hz and damping, as what a .json holds."""
+        return record(self)
+
     def unit(self, name: str) -> str:
         """The unit of a state, input or output; "" where none was declared."""
         return self.units.get(name, "")
@@ -208,7 +221,9 @@ def check_period(place: str, period: Any) -> None:
     """ModelError for what is no sampling period."""
     number = isinstance(period, (int, float, np.number)) and not isinstance(period, bool)
     if not number or not 0 < period < np.inf:
-        raise ModelError(f"{place}: found period={period!r}, expected a finite number above zero, in s")
+        raise ModelError(
+            f"{place}: found period={period!r}, expected a finite number above zero, in s", argument="period"
+        )
 
 
 def check_matrices(place: str, A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> None:

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from gantrytau.commands.arguments.options import listed
+from gantrytau.commands.arguments.values import listed
 
 _PYTHON = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
 _URDF = re.compile(r"(?P<file>.+\.urdf)(?P<name>)", re.IGNORECASE | re.DOTALL)

@@ -250,13 +250,18 @@ def _arguments(found: type[Model]) -> tuple[list[str], bool]:
     return needed, any(parameter.name == "prototype" for parameter in parameters)
 
 
+def takes_prototype(found: type[Model]) -> bool:
+    """Whether a class is made from the measures of a robot."""
+    return _arguments(found)[1]
+
+
 def _first_prototype(found: type[Model]) -> str:
     """The robot that a class gets if none is named: L1, or the first of the kind that it takes."""
-    fitting = _fitting(found)
+    fitting = fitting_prototypes(found)
     return FIRST_PROTOTYPE if FIRST_PROTOTYPE in fitting or not fitting else fitting[0]
 
 
-def _fitting(found: type[Model]) -> tuple[str, ...]:
+def fitting_prototypes(found: type[Model]) -> tuple[str, ...]:
     """The prototypes of the kind that a class takes, by the annotation of its argument; all if it says none."""
     try:
         kind = typing.get_type_hints(found.__init__).get("prototype")
@@ -284,7 +289,7 @@ def _prototype(found: type[Model], name: str) -> Any:
     """The prototype of that name for a class, with what it warns of."""
     from gantrytau_models import prototypes
 
-    names, fitting = prototype_names(), _fitting(found)
+    names, fitting = prototype_names(), fitting_prototypes(found)
     if name not in names:
         raise CommandError(f"--prototype {name}: there is no such robot{similar(name, names)}")
     if name not in fitting:

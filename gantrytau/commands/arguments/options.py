@@ -5,12 +5,15 @@ from typing import Annotated
 
 import typer
 
+from gantrytau.commands.arguments import shell_offers
+
 ModelName = Annotated[
     str,
     typer.Argument(
         metavar="MODEL",
         help="A model of the library (`gantrytau library` lists them), as Pendulum or 'GantryTau(D1)', "
         "or a class in a file of yours, as robot.py:Robot.",
+        autocompletion=shell_offers.models,
         show_default=False,
     ),
 ]
@@ -21,6 +24,7 @@ PrototypeName = Annotated[
         metavar="NAME",
         help="The robot whose measures the model takes, for models that need one.",
         show_default="L1",
+        autocompletion=shell_offers.prototypes,
     ),
 ]
 Settings = Annotated[
@@ -31,6 +35,7 @@ Settings = Annotated[
         help="Set a parameter (m=2.5, 'offset=[1,2,3]'), a start value (x.start=0.1), or all values of a file "
         "(calibrated.toml). Repeatable.",
         show_default=False,
+        autocompletion=shell_offers.settings,
     ),
 ]
 Plotted = Annotated[
@@ -43,6 +48,15 @@ To = Annotated[
     str | None,
     typer.Option(
         "--to", help="Where to draw: a picture (.png, .pdf, .svg) or 'window'.", show_default="window"
+    ),
+]
+Picture = Annotated[
+    str | None,
+    typer.Option(
+        "--plot",
+        metavar="FILE|window",
+        help="Draw it: a picture (.png, .pdf, .svg) or 'window'.",
+        show_default=False,
     ),
 ]
 Kept = Annotated[
@@ -74,17 +88,3 @@ Seed = Annotated[
     typer.Option(help="Of signals that have none: the same numbers for the same seed.", show_default=False),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]
-
-
-def listed(texts: list[str] | None) -> tuple[str, ...]:
-    """Names of a repeatable option, also several in one, separated by commas outside of brackets."""
-    found: list[str] = []
-    for text in texts or ():
-        depth, begin = 0, 0
-        for place, letter in enumerate(text):
-            depth += (letter in "([") - (letter in ")]")
-            if letter == "," and depth == 0:
-                found.append(text[begin:place])
-                begin = place + 1
-        found.append(text[begin:])
-    return tuple(name.strip() for name in found if name.strip())

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.printing.spelling import Spelling
 
 MESH, SOLVER, GUESSES = "Mesh", "Solver", "First guesses"  # headings of the help
@@ -22,7 +23,15 @@ Elements = Annotated[int, typer.Option(min=1, help="Elements of the mesh.", rich
 Points = Annotated[
     int, typer.Option(min=1, max=9, help="Collocation points in each element.", rich_help_panel=MESH)
 ]
-Scheme = Annotated[str, typer.Option(metavar="radau|gauss", help="Kind of points.", rich_help_panel=MESH)]
+Scheme = Annotated[
+    str,
+    typer.Option(
+        metavar="radau|gauss",
+        autocompletion=words("radau", "gauss"),
+        help="Kind of points.",
+        rich_help_panel=MESH,
+    ),
+]
 Refine = Annotated[
     float | None,
     typer.Option(help="Relative accuracy to refine the mesh to.", show_default=False, rich_help_panel=MESH),

@@ -9,6 +9,7 @@ import typer
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.calibrate import calibration_files
 from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
@@ -46,6 +47,7 @@ ErrorModel = Annotated[
     str | None,
     typer.Option(
         metavar="parallel|1..5",
+        autocompletion=words("parallel", "1", "2", "3", "4", "5"),
         help="Error model; 1 to 5 are those of thesis Table 5.2.",
         show_default="straight guideways, each with its direction",
     ),
@@ -79,12 +81,27 @@ def calibrate(
     robot: RobotName = None,
     rails: Rails = None,
     model: ErrorModel = None,
-    method: Annotated[str, typer.Option(metavar="gauss-newton|ipopt", help="How to solve.")] = "gauss-newton",
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="gauss-newton|ipopt", autocompletion=words("gauss-newton", "ipopt"), help="How to solve."
+        ),
+    ] = "gauss-newton",
     start: Annotated[
-        str, typer.Option(metavar="nominal|linear", help="Where to start; linear needs no nominal values.")
+        str,
+        typer.Option(
+            metavar="nominal|linear",
+            autocompletion=words("nominal", "linear"),
+            help="Where to start; linear needs no nominal values.",
+        ),
     ] = "nominal",
     orientation: Annotated[
-        str, typer.Option(metavar="local|unit|free", help="How quaternions of turntables are free.")
+        str,
+        typer.Option(
+            metavar="local|unit|free",
+            autocompletion=words("local", "unit", "free"),
+            help="How quaternions of turntables are free.",
+        ),
     ] = "local",
     prior: Prior = None,
     constraint: Constraints = None,
@@ -93,6 +110,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="second|none",
+            autocompletion=words("second", "none"),
             help="Which poses validate: every second, or those of the fit.",
             show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
         ),
@@ -101,6 +119,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="fitted|base",
+            autocompletion=words("fitted", "base"),
             help="base: poses were measured in the base of the robot, where it is commanded; fitted: in any frame.",
             show_default="as the plan says, else fitted",
         ),

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.printing.spelling import Spelling
 
 TRANSLATION, EXPERIMENT, ABOUT = "Translation", "Experiment", "About the model"  # headings of the help
@@ -31,7 +32,12 @@ def _names(name: str, words: str, default: str | bool = False) -> typer.models.O
     )
 
 
-Version = Annotated[str, typer.Option("--fmi", metavar="2.0|3.0", help="Version of the standard.")]
+Version = Annotated[
+    str,
+    typer.Option(
+        "--fmi", metavar="2.0|3.0", autocompletion=words("2.0", "3.0"), help="Version of the standard."
+    ),
+]
 Platforms = Annotated[
     list[str] | None,
     typer.Option(
@@ -41,7 +47,14 @@ Platforms = Annotated[
         show_default="native",
     ),
 ]
-Interface = Annotated[str, typer.Option(metavar="me|cs|both", help="Model Exchange, Co-Simulation, or both.")]
+Interface = Annotated[
+    str,
+    typer.Option(
+        metavar="me|cs|both",
+        autocompletion=words("me", "cs", "both"),
+        help="Model Exchange, Co-Simulation, or both.",
+    ),
+]
 NoSources = Annotated[bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")]
 
 Given = Annotated[
@@ -57,6 +70,7 @@ SolverName = Annotated[
     str,
     typer.Option(
         metavar="dopri5|rodas4",
+        autocompletion=words("dopri5", "rodas4"),
         help="Of Co-Simulation; rodas4 for stiff models.",
         rich_help_panel=EXPERIMENT,
     ),

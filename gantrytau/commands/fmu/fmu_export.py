@@ -11,7 +11,8 @@ import typer
 from gantrytau import did_you_mean
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
-from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings, listed
+from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
+from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.fmu import export_options
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting

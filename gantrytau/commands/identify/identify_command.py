@@ -10,6 +10,7 @@ import typer
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -58,7 +59,12 @@ def identify(
     files: Logs,
     robot: RobotName,
     friction: Annotated[
-        str, typer.Option(metavar="|".join(LAWS), help="The law of friction; none keeps the model's.")
+        str,
+        typer.Option(
+            metavar="|".join(LAWS),
+            autocompletion=words(*LAWS),
+            help="The law of friction; none keeps the model's.",
+        ),
     ] = "symmetric",
     fixed: FixedValues = None,
     cutoff: Annotated[float, typer.Option(metavar="HZ", help="Of the filter of motion and forces.")] = 10.0,

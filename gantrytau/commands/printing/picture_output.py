@@ -1,7 +1,8 @@
 """Drawing a result on the command line: to a file, or in a window where there is a display."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gantrytau.commands.printing.reporting import CommandError, refusing, writable
 
@@ -20,11 +21,11 @@ def place(drawn: tuple[str, ...], to: str | None) -> str | None:
         )
     if not drawn:
         return None
-    _rehearse(to or WINDOW)
+    rehearse(to or WINDOW)
     return to or WINDOW
 
 
-def _rehearse(to: str) -> None:
+def rehearse(to: str, option: str = "--to") -> None:
     """CommandError if there is no window to draw in, or no picture of that format or in that folder."""
     import matplotlib
 
@@ -35,8 +36,8 @@ def _rehearse(to: str) -> None:
 
         if not has_windows(plt.get_backend()):
             raise CommandError(
-                f"--to window: no window can be opened here (Matplotlib draws with '{plt.get_backend()}'). "
-                "Write a picture with --to picture.png, or work where there is a display (ssh -X) "
+                f"{option} window: no window can be opened here (Matplotlib draws with '{plt.get_backend()}'). "
+                f"Write a picture with {option} picture.png, or work where there is a display (ssh -X) "
                 "and a window toolkit is installed (pip install pyqt6)"
             )
         return
@@ -46,21 +47,26 @@ def _rehearse(to: str) -> None:
     file, formats = Path(to), FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".").lower() not in formats:
         raise CommandError(
-            f"--to {to}: found the suffix '{file.suffix}', expected 'window' or a picture: "
+            f"{option} {to}: found the suffix '{file.suffix}', expected 'window' or a picture: "
             f"{', '.join(f'.{name}' for name in sorted(formats))}"
         )
     if not file.parent.is_dir():
-        raise CommandError(f"--to {to}: the folder '{file.parent}' does not exist; create it first")
+        raise CommandError(f"{option} {to}: the folder '{file.parent}' does not exist; create it first")
 
 
 def draw(result: "Result | Optimum | Study", names: tuple[str, ...], to: str) -> list[str]:
     """Draw the variables; the files written."""
+    return shown(lambda file: result.plot(*names, file=file), to)
+
+
+def shown(plot: Callable[[str | None], Any], to: str, option: str = "--plot") -> list[str]:
+    """Draw by a function of the file, which is None for a window; the files written."""
     if to != WINDOW:
-        with writable(Path(to)), refusing("--plot "):
-            result.plot(*names, file=to)
+        with writable(Path(to)), refusing(f"{option} "):
+            plot(to)
         return [to]
     import matplotlib.pyplot as plt
 
-    result.plot(*names)
+    plot(None)
     plt.show()
     return []

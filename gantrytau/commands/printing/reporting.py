@@ -77,7 +77,8 @@ def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN
     try:
         yield
     except CommandError as error:
-        fail(str(error), MISUSE, json)
+        told = isinstance(error.__cause__, GantryTauError)  # in the words of the library
+        fail(spelling.words(str(error)) if told else str(error), MISUSE, json)
     except GantryTauError as error:
         place = "".join(f"\n  {line}" for line in places(error, source)[-1:])
         code = MISUSE if error.argument in spelling.options else FAULT
@@ -169,6 +170,20 @@ def write_text(text: str, file: Path) -> None:
 
     with writable(file), replacing(file) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def writable_place(option: str, file: Path | None, *suffixes: str) -> None:
+    """CommandError, before the work, for a file of another suffix or in a folder that is not there; None is none."""
+    if file is None:
+        return
+    if file.suffix.lower() not in suffixes:
+        raise CommandError(
+            f"{option} {file}: found the suffix '{file.suffix}', expected {' or '.join(suffixes)}"
+        )
+    if not file.absolute().parent.is_dir():
+        raise CommandError(f"{option} {file}: the folder '{file.parent}' does not exist; create it first")
+    if file.is_dir():
+        raise CommandError(f"{option} {file}: found a folder, expected the name of a file in it")
 
 
 @contextmanager

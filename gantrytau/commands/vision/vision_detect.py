@@ -7,6 +7,7 @@ import numpy as np
 import typer
 
 from gantrytau.commands.arguments.options import Json
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
 from gantrytau.commands.vision.vision_options import SPELLING
 
@@ -27,7 +28,9 @@ def detect(
         ),
     ],
     side: Annotated[float, typer.Option(metavar="M", help="Of a cell of the pattern.", show_default=False)],
-    pattern: Annotated[str, typer.Option(metavar="|".join(PATTERNS), help="The pattern.")] = "quincunx",
+    pattern: Annotated[
+        str, typer.Option(metavar="|".join(PATTERNS), autocompletion=words(*PATTERNS), help="The pattern.")
+    ] = "quincunx",
     columns: Annotated[int, typer.Option(help="Cells of a charuco board.")] = 5,
     rows: Annotated[int, typer.Option(help="Cells of a charuco board.")] = 4,
     background: Annotated[

@@ -7,6 +7,7 @@ import numpy as np
 import typer
 
 from gantrytau.commands.arguments.options import Json
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
 from gantrytau.commands.vision.vision_detect import Report
 from gantrytau.commands.vision.vision_options import SPELLING
@@ -38,7 +39,12 @@ def reconstruct(
     estimate: Annotated[bool, typer.Option("--estimate", help="Fit the lenses, too.")] = False,
     scale: Annotated[
         str | None,
-        typer.Option(metavar="|".join(SCALES), help="What tells lengths.", show_default="what there is"),
+        typer.Option(
+            metavar="|".join(SCALES),
+            autocompletion=words(*SCALES),
+            help="What tells lengths.",
+            show_default="what there is",
+        ),
     ] = None,
     turning: Annotated[bool, typer.Option("--turning", help="The plate turns from pose to pose.")] = False,
     free: Annotated[

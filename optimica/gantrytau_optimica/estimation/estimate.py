@@ -100,7 +100,7 @@ def _check(parameters: Any, loss: Any, policy: Policy) -> None:
     if not isinstance(parameters, Mapping):
         raise ModelError(f"estimate: found parameters={parameters!r}, expected {{name: Free(guess)}}")
     if loss not in ("squares", "robust"):
-        raise ModelError(f"estimate: found loss={loss!r}, expected 'squares' or 'robust'")
+        raise ModelError(f"estimate: found loss={loss!r}, expected 'squares' or 'robust'", argument="loss")
 
 
 def _check_amount(read: Plan, known: bool) -> None:

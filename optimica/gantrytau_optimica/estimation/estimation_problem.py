@@ -314,7 +314,8 @@ def _check_inputs(read: SymbolicProblem, experiments: Sequence[Experiment]) -> N
     if missing:
         where, name = missing[0].split(".model.", 1)
         raise ModelError(
-            f"{read.name}: the input {name} of {where} is not known, expected it in Experiment(inputs={{'{name}': ...}})"
+            f"{read.name}: the input {name} of {where} is not known, expected it in Experiment(inputs={{'{name}': ...}})",
+            argument="inputs",
         )
     for experiment in experiments:
         for name, value in experiment.inputs.items():

@@ -98,10 +98,15 @@ def _numbers(weight: str, values: Any) -> list[float]:
     except (TypeError, ValueError):
         numbers = np.array(np.nan)
     if numbers.ndim != 1 or numbers.size == 0 or not np.all(np.isfinite(numbers)):
-        raise ModelError(f"{weight}: found the values {values!r}, expected a list of finite numbers")
+        raise ModelError(
+            f"{weight}: found the values {values!r}, expected a list of finite numbers", argument="values"
+        )
     seen, count = np.unique(numbers, return_counts=True)
     if np.any(count > 1):
-        raise ModelError(f"{weight}: the value {seen[count > 1][0]:g} is repeated, expected each one once")
+        raise ModelError(
+            f"{weight}: the value {seen[count > 1][0]:g} is repeated, expected each one once",
+            argument="values",
+        )
     return numbers.tolist()
 
 
@@ -109,10 +114,14 @@ def _check_weight(prepared: Prepared, weight: str) -> None:
     held = [n.name for n in prepared.built.problem.free if n.held]
     name = prepared.built.read.name
     if not held:
-        raise ModelError(f"{name}: {weight} is chosen by the optimiser, expected a Parameter with a value")
+        raise ModelError(
+            f"{name}: {weight} is chosen by the optimiser, expected a Parameter with a value",
+            argument="weight",
+        )
     if held != [weight]:
         raise ModelError(
-            f"{name}: {weight} has {len(held)} elements, expected one number; name one of {held}"
+            f"{name}: {weight} has {len(held)} elements, expected one number; name one of {held}",
+            argument="weight",
         )
 
 
@@ -123,7 +132,9 @@ def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, 
     if along is None:
         return {"unweighed": lambda o: _parts(o, weight)[0], "weighed": lambda o: _parts(o, weight)[1]}, {}
     if isinstance(along, str) or not isinstance(along, (Sequence, Mapping)) or not len(along):
-        raise ModelError(f"along={along!r}: expected a list of quantities or {{label: quantity}}")
+        raise ModelError(
+            f"along={along!r}: expected a list of quantities or {{label: quantity}}", argument="along"
+        )
     pairs = dict(along) if isinstance(along, Mapping) else {text: text for text in along}
     known, found, units = labels(prepared.built.read.dae)[0], {}, {}
     for label, what in pairs.items():
@@ -139,7 +150,9 @@ def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, 
 def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str]) -> tuple[Quantity, str]:
     name, dae = prepared.built.read.name, prepared.built.read.dae
     if not isinstance(what, str):
-        raise ModelError(f"along {label}: found {what!r}, expected a name or a function of an Optimum")
+        raise ModelError(
+            f"along {label}: found {what!r}, expected a name or a function of an Optimum", argument="along"
+        )
     free = {n.name for n in prepared.built.problem.free if not n.held}
     if what in free:
         return (lambda o: o.free[what]), known.get(what, "")
@@ -149,17 +162,23 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
     if kind in ("integral", "final") and what == f"{kind}({inner})":
         elements = dae.expand(inner)
         if len(elements) != 1:
-            raise ModelError(f"along {label}: {inner} has {len(elements)} elements, expected one; name it")
+            raise ModelError(
+                f"along {label}: {inner} has {len(elements)} elements, expected one; name it",
+                argument="along",
+            )
         if kind == "integral":
             return (lambda o: o.integral(elements[0])), f"{known[inner]}.s" if inner in known else ""
         return (lambda o: float(o.final(elements[0]))), known.get(inner, "")
     if what in dae.variables or what in dae.vectors:
         raise ModelError(
-            f"along {label}: {what} varies over time, expected a number; write 'final({what})' or 'integral({what})'"
+            f"along {label}: {what} varies over time, expected a number; write 'final({what})' or 'integral({what})'",
+            argument="along",
         )
     over_time = (f"{k}({n})" for n in dae.variables for k in ("integral", "final"))
     choices = [*free, "final_time", "objective", *over_time]
-    raise ModelError(f"along {label}: {name} has no quantity '{what}'{did_you_mean(what, choices)}")
+    raise ModelError(
+        f"along {label}: {name} has no quantity '{what}'{did_you_mean(what, choices)}", argument="along"
+    )
 
 
 def _value(label: str, quantity: Quantity, optimum: Optimum) -> float:
@@ -167,7 +186,8 @@ def _value(label: str, quantity: Quantity, optimum: Optimum) -> float:
         value = float(quantity(optimum))
     except Exception as error:  # of a function that is not ours
         raise ModelError(
-            f"along {label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number"
+            f"along {label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number",
+            argument="along",
         ) from error
     return value
 

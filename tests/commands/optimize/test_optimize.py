@@ -351,11 +351,11 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_line_of_the_terminal_follows_the_solver(answer, move, monkeypatch, quiet):
-    from gantrytau.commands.optimize_command import _live
+    from gantrytau.commands.printing.solver_line import live
 
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     monkeypatch.setenv("TERM", "xterm")
-    with _live("Fastest", quiet) as progress:
+    with live("Fastest", quiet) as progress:
         assert (progress is None) == quiet
         if progress:
             progress(7, 1.25)

@@ -1,0 +1,1 @@
+"""`gantrytau estimate`: parameters from measured data."""
