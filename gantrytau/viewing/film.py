@@ -134,7 +134,10 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
         raise ModelError(
             f"animate: found speed={speed!r}, expected a positive number, 1 for real time", argument="speed"
         )
-    series = shown if isinstance(shown, Series) else getattr(shown, "result", None)
+    moved = getattr(shown, "motion", None)  # of a plan
+    series = (
+        shown if isinstance(shown, Series) else moved() if callable(moved) else getattr(shown, "result", None)
+    )
     if not isinstance(series, Result):
         raise ModelError(
             f"animate: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"

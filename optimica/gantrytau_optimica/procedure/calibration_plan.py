@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import Model, ModelError
+from gantrytau import Model, ModelError, Result
 from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
@@ -16,6 +16,7 @@ from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
 from gantrytau_optimica.procedure.fleet import build_fleet
 from gantrytau_optimica.procedure.pose_plan import PlanBasis, PosePlan
 from gantrytau_optimica.procedure.trials import matched, placed
+from gantrytau_optimica.procedure.ways.plan_motion import plan_motion
 from gantrytau_optimica.procedure.ways.tours import Roadmap, find_tour
 
 
@@ -43,6 +44,25 @@ class CalibrationPlan(PosePlan):
         return rapid_program(
             self, name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
         )
+
+    def motion(self, *, speed: float = 0.1, rest: float = 3.0) -> Result:
+        """The nominal robot on its way through the poses, which `animate(plan)` shows, with obstacles and places to measure.
+
+        speed: of the tool, m/s; rest: s at each pose that is measured. Forces are not in it. Raises ModelError for a speed
+        or a rest that cannot be, and for a plan that was loaded without its robot.
+        """
+        if self.cell is None:
+            raise ModelError(
+                f"motion: found a plan of {self.robot_name} that was loaded without it, expected its robot; "
+                "load_plan(folder, robot, limits)"
+            )
+        for name, value, least in (("speed", speed, 1e-3), ("rest", rest, 0.0)):
+            if not (isinstance(value, (int, float)) and least <= value < np.inf):
+                raise ModelError(
+                    f"motion.{name}: found {value!r}, expected a number from {least:g}", argument=name
+                )
+        fleet = self.cell.fleet.with_limits(self.cell.limits)
+        return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, float(speed), float(rest))
 
     def write(self, folder: str | Path, **program: Any) -> Path:
         """Write workspace.png, poses.csv, measurements-template.csv, plan.json, plan.html and the program into a folder.
