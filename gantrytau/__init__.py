@@ -71,6 +71,7 @@ from gantrytau.language.functions import (
 )
 from gantrytau.language.model import Connector, Declared, Model, check_member, outer
 from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
+from gantrytau.language.scales import in_unit, si
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time
@@ -146,6 +147,7 @@ __all__ = [
     "has_windows",
     "heeding_interrupts",
     "if_else",
+    "in_unit",
     "limit",
     "linearize",
     "log",
@@ -168,6 +170,7 @@ __all__ = [
     "require",
     "root",
     "sampled",
+    "si",
     "sign",
     "simulate",
     "sin",

@@ -23,7 +23,8 @@ class FmuVariable:
     name: in the structured naming convention; reference: its value reference; start: None if it has none, a tuple for
     arrays; unit: "" if none is named, "1" if it has none, which a file does not tell apart; type: Float64, Int32,
     Boolean, ... (FMI 2: Real, Integer, Boolean, String, Enumeration); shape: () for scalars, by the start values of the
-    sizes; derivative: the name of the state whose derivative it is.
+    sizes; derivative: the name of the state whose derivative it is; display: the unit in which tools show it, "" if its
+    declaration names none.
     """
 
     name: str
@@ -40,6 +41,7 @@ class FmuVariable:
     type: str = "Float64"
     shape: tuple[int, ...] = ()
     derivative: str | None = None
+    display: str = ""
 
     @property
     def real(self) -> bool:

@@ -13,6 +13,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
 from gantrytau.errors import InitializationError, ModelError
 from gantrytau.flattening.shapes import elements_of
+from gantrytau.language.scales import given as in_si
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 STEP = 0.3  # m or rad between stops on the way to given positions
@@ -21,6 +22,7 @@ MOST_STEPS = 40
 
 def evaluate(dae: Translated, given: dict[str, Any]) -> dict[str, Any]:
     """See Dae.evaluate."""
+    given = {name: in_si(name, value, dae.flat.unit(name)) for name, value in given.items()}
     scalars = given_scalars(dae, given)
     parameters = {n: v for n, v in scalars.items() if n in dae.table.symbols}
     if parameters:
@@ -115,7 +117,7 @@ def given_scalars(dae: Translated, given: Mapping[str, Any]) -> dict[str, float]
     """Values by scalar name; ModelError for unknown names, wrong shapes and numbers that are not finite."""
     found: dict[str, float] = {}
     for name, value in given.items():
-        elements = dae.expand(name)
+        elements, value = dae.expand(name), in_si(name, value, dae.flat.unit(name))
         found.update(zip(elements, elements_of(name, value, dae.flat.shape(name)), strict=True))
     return found
 

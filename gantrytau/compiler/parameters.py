@@ -10,6 +10,7 @@ from gantrytau.compiler.alphabets import values_at
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 from gantrytau.flattening.shapes import fits
+from gantrytau.language.scales import given
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +71,13 @@ def _remedy(flat: FlatModel, name: str, known: list[str]) -> str:
 def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:
     elements = list(parameter.value)
     if parameter.name in values:
-        array = _numbers(parameter.name, values[parameter.name])
+        array = _numbers(parameter.name, values[parameter.name], parameter.unit)
         if not fits(array.shape, parameter.shape):
             raise ModelError(f"{parameter.name}: value has shape {array.shape}, expected {parameter.shape}")
         elements = [ca.SX(float(x)) for x in array.ravel(order="F")]
     for index, name in enumerate(parameter.elements):
         if name in values and name != parameter.name:
-            number = _numbers(name, values[name])
+            number = _numbers(name, values[name], parameter.unit)
             if not fits(number.shape, ()):
                 raise ModelError(f"{name}: value has shape {number.shape}, expected ()")
             elements[index] = ca.SX(float(number.item()))
@@ -86,7 +87,8 @@ def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatP
     return replace(parameter, value=tuple(elements))
 
 
-def _numbers(name: str, value: object) -> np.ndarray:
+def _numbers(name: str, value: object, unit: str | None) -> np.ndarray:
+    value = given(f"parameters: {name}", value, unit)
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):

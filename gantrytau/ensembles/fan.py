@@ -1,7 +1,7 @@
 """Figures of studies: a variable of all cases over time, as lines or as bands."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau.ensembles.cases import Case, spoken
 from gantrytau.ensembles.labelled_array import common_times, on_times
 from gantrytau.errors import ModelError
+from gantrytau.results.display_units import DECLARED, Display, Shown, shown_units
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau.results.result import Result
 
@@ -25,6 +26,7 @@ def draw_fan(
     names: Sequence[str],
     file: str | os.PathLike[str] | None,
     title: str,
+    display: Display = None,
 ) -> "Figure":
     """The figure of the named variables of all cases, an axis for each, saved to `file` if one is named."""
     import matplotlib.pyplot as plt
@@ -39,6 +41,7 @@ def draw_fan(
     ]
     if not scalars:
         raise ModelError(f"{title}: plot() found no names, expected those of variables, as plot('x')")
+    shown = shown_units(first, ("time", *scalars), display, DECLARED, "plot")
     figure, axes = plt.subplots(
         len(scalars),
         sharex=True,
@@ -47,11 +50,10 @@ def draw_fan(
         layout="constrained",
     )
     for axis, name in zip(axes[:, 0], scalars, strict=True):
-        (_lines if len(cases) <= LINES else _bands)(axis, cases, name)
-        unit = first.unit(name)
-        axis.set_ylabel(f"{name} [{unit}]" if unit else name)
+        (_lines if len(cases) <= LINES else _bands)(axis, cases, name, shown)
+        axis.set_ylabel(shown[name].heading(name))
         axis.grid(alpha=0.3)
-    axes[-1, 0].set_xlabel("time [s]")
+    axes[-1, 0].set_xlabel(shown["time"].heading("time"))
     told = {label: line for line, label in zip(*axes[0, 0].get_legend_handles_labels(), strict=True)}
     if 0 < len(told) <= LABELS:
         axes[0, 0].legend(told.values(), told.keys(), fontsize="small")
@@ -59,7 +61,7 @@ def draw_fan(
     return finished(figure, file)
 
 
-def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
+def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str, shown: Mapping[str, Shown]) -> None:
     """One line for each case; where they are many, one colour for each value of the name that was given first."""
     import matplotlib.pyplot as plt
 
@@ -70,13 +72,15 @@ def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
     colours = dict(zip(groups, plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(groups))), strict=True))
     for text, (_, result) in zip(words, cases, strict=True):
         label = text if len(groups) <= LABELS or text in (groups[0], groups[-1]) else None
-        axis.plot(result.time, result[name], color=colours[text], linewidth=1.0, label=label)
+        times, values = shown["time"].of(result.time), shown[name].of(result[name])
+        axis.plot(times, values, color=colours[text], linewidth=1.0, label=label)
 
 
-def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str) -> None:
+def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str, shown: Mapping[str, Shown]) -> None:
     """The median of all cases, and bands that hold half and nine tenths of those that have not ended."""
     times = common_times([result for _, result in cases])
-    table = np.array([on_times(result, name, times) for _, result in cases])
+    table = shown[name].of(np.array([on_times(result, name, times) for _, result in cases]))
+    times = shown["time"].of(times)
     for low, high, alpha in BANDS:
         below, above = np.nanpercentile(table, (low, high), axis=0)
         axis.fill_between(

@@ -11,6 +11,7 @@ from gantrytau.compiler.translation import translate_model
 from gantrytau.ensembles.cases import SEED, Axes, Case
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.model import Model
+from gantrytau.language.scales import given
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
 
@@ -78,6 +79,15 @@ def model_task(
         dae.expand(name)
     fixed = {"stop": stop, "inputs": inputs, "outputs": outputs, **policy}
     return ModelTask(dae, places, fixed)
+
+
+def over_in_si(task: ModelTask, axes: Axes) -> dict[str, list[Any]]:
+    """What varies, with texts such as "700 mm" brought to SI; ModelError for those of another kind."""
+    flat = task.dae.flat
+    return {
+        name: [given(f"study: over: {name}", value, flat.unit(name)) for value in values]
+        for name, values in axes.over.items()
+    }
 
 
 def labels(task: ModelTask) -> dict[str, str]:

@@ -11,7 +11,7 @@ from gantrytau.ensembles.cases import Axes, Case, read_axes
 from gantrytau.ensembles.digests import digest
 from gantrytau.ensembles.function_cases import FunctionTask, function_task
 from gantrytau.ensembles.kept_cases import KeptCases
-from gantrytau.ensembles.model_cases import ModelTask, SimulationKeywords, labels, model_task
+from gantrytau.ensembles.model_cases import ModelTask, SimulationKeywords, labels, model_task, over_in_si
 from gantrytau.ensembles.study_record import Study
 from gantrytau.ensembles.workers.places import Place, outcomes, read_place
 from gantrytau.errors import SolveError
@@ -50,7 +50,7 @@ def study(
     task: ModelTask | FunctionTask
     if isinstance(model, (Model, Translated)):
         task = model_task(model, axes, stop, inputs, outputs, policy)
-        title, axes = task.dae.name, replace(axes, labels=labels(task))
+        title, axes = task.dae.name, replace(axes, over=over_in_si(task, axes), labels=labels(task))
     else:
         task = function_task(model, axes, {"stop": stop, "inputs": inputs, "outputs": outputs, **policy})
         title = task.name

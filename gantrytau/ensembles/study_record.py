@@ -11,6 +11,7 @@ from gantrytau.ensembles.fan import draw_fan
 from gantrytau.ensembles.labelled_array import labelled
 from gantrytau.ensembles.workers.worker import Outcome
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.results.display_units import Display
 from gantrytau.results.result import Result
 from gantrytau.whole_files import replacing
 
@@ -92,12 +93,15 @@ class Study:
             table.to_netcdf(partial, engine="h5netcdf")
         return path
 
-    def plot(self, *names: str, file: str | os.PathLike[str] | None = None) -> "Figure":
+    def plot(
+        self, *names: str, file: str | os.PathLike[str] | None = None, display: Display = None
+    ) -> "Figure":
         """Draw variables of all cases over time: a line for each, or the middle and bands that hold 50 and 90 % of many.
 
-        names: scalars or vectors. file: also save the figure there, in the format that its suffix names.
+        names: scalars or vectors. file: also save the figure there, in the format that its suffix names. display: units, as
+        of `Result.plot`.
         """
-        return draw_fan(self._results(), names, file, self.title)
+        return draw_fan(self._results(), names, file, self.title, display)
 
     def _results(self) -> list[tuple[Case, Result]]:
         found = [(case, value) for case, value in self if isinstance(value, Result)]

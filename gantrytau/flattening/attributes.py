@@ -11,6 +11,7 @@ from gantrytau.flattening.instantiation import Leaf, Placed
 from gantrytau.flattening.shapes import fits, joined, numpy_shape
 from gantrytau.language.declarations import Formula, Parameter, StateSelect, evaluate
 from gantrytau.language.instructions import refuse_calls
+from gantrytau.language.scales import given, known_scale
 
 
 def flat_variable(placed: Placed) -> FlatVariable:
@@ -42,7 +43,7 @@ def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
             "no model whose parameters it could name, expected numbers; declare it in the body of a subclass"
         )
     try:
-        found = joined(evaluate(value, leaf.scope))
+        found = joined(given(f"{placed.name}: {attribute}", evaluate(value, leaf.scope), _unit(placed)))
     except (RuntimeError, TypeError, NotImplementedError, AttributeError, ValueError, IndexError) as error:
         why = "" if isinstance(error, NotImplementedError) else f": {in_words(error)}"
         raise ModelError(
@@ -73,7 +74,10 @@ def _allowed(value: float, attribute: str) -> bool:
 
 
 def _common(placed: Placed) -> dict[str, Any]:
-    attributes = placed.attributes
+    attributes, unit = placed.attributes, _unit(placed)
+    display = attributes["display"].value if "display" in attributes else ""
+    if display != "":
+        known_scale(f"{placed.name}: display", display, unit)
     limits = {key: expression(placed, key) for key in ("min", "max", "nominal") if key in attributes}
     return dict(
         name=placed.name,
@@ -81,7 +85,8 @@ def _common(placed: Placed) -> dict[str, Any]:
         shape=placed.shape,
         elements=tuple(placed.elements),
         symbol=placed.symbol,
-        unit=attributes["unit"].value if "unit" in attributes else None,
+        unit=unit,
+        display=display,
         description=attributes["description"].value if "description" in attributes else "",
         start=expression(placed, "start") if "start" in attributes else None,
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
@@ -91,6 +96,10 @@ def _common(placed: Placed) -> dict[str, Any]:
         undetermined=attributes["undetermined"].value,
         **limits,
     )
+
+
+def _unit(placed: Placed) -> str | None:
+    return placed.attributes["unit"].value if "unit" in placed.attributes else None
 
 
 def _prefer(attributes: Mapping[str, Leaf]) -> StateSelect:

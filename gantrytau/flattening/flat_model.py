@@ -12,6 +12,7 @@ from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.language.statements import Equation, Requirement
 from gantrytau.language.symbols import Range, derivative_name, split_derivative
+from gantrytau.language.units import per_second
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +22,8 @@ class FlatVariable:
     name: dotted path; shape: (), (n,) or (n, m); elements: names of its scalars, column after column;
     symbol: its SX; start, min, max: SX expressions of parameters per scalar, or None (no opinion);
     chosen: whether its start is said by whoever uses the model, not by its author; owner: path of the component or
-    connector that holds it; undetermined: the likely cause where the equations do not determine it.
+    connector that holds it; undetermined: the likely cause where the equations do not determine it; display: the unit in
+    which it is shown, "" for its own.
     """
 
     name: str
@@ -41,6 +43,7 @@ class FlatVariable:
     owner: str = ""
     free: bool = False
     undetermined: str = ""
+    display: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,6 +225,18 @@ class FlatModel:
             raise ModelError(f"{self.name}: {base} does not exist: {self.absent[base]}")
         known = dict.fromkeys(n for v in self.vectors.values() for n in (v.name, *v.elements))
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
+
+    def unit(self, name: str) -> str | None:
+        """The unit of what `expand` lists, None where none is declared."""
+        base, order = split_derivative(name)
+        if base == self.time.name():
+            return "s"
+        unit = self._units.get(base)
+        return per_second(unit, order) if unit else None
+
+    @cached_property
+    def _units(self) -> Mapping[str, str | None]:
+        return {n: v.unit for v in self.vectors.values() for n in (v.name, *v.elements)}
 
     def shape(self, name: str) -> tuple[int, ...]:
         """Shape of what `expand` lists: of a whole quantity or a derivative of it, () of a scalar."""

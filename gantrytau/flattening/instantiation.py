@@ -24,7 +24,8 @@ from gantrytau.language.model import (
 from gantrytau.language.symbols import Symbols, element_names, time
 
 ATTRIBUTES = (
-    "start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "description", "undetermined",
+    "start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "display", "description",
+    "undetermined",
 )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.flattening.shapes import fits
+from gantrytau.language.scales import known_scale, scale
 
 LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, across which nothing is known
 SMALL = 1e-9  # of a run, by which samples may fail to cover it: ends of times are sums
@@ -21,9 +22,10 @@ class Samples:
     times: (n,) in s, rising; values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of what they are given
     for; they are kept as columns, (n, k). kind: between samples "linear", or "constant": each value holds from its time
     until the next, and the last from then on. deviation: standard deviation of one measured value, a number or of the
-    shape of one or of all samples; 1 where it is not known, which `weighted` tells. largest_gap: s, distance of two
-    samples beyond which an estimation takes the course between them for unknown (default: ten times the median distance).
-    Raises ModelError for NaN, for repeated or unsorted times, and for shapes that do not fit.
+    shape of one or of all samples; 1 where it is not known, which `weighted` tells. unit: of values and deviation, as
+    "mm"; they are kept in SI, and what they are given for has to be measured in it. largest_gap: s, distance of two samples
+    beyond which an estimation takes the course between them for unknown (default: ten times the median distance).
+    Raises ModelError for a unit that is none, for NaN, for repeated or unsorted times, and for shapes that do not fit.
     """
 
     times: Any
@@ -32,12 +34,15 @@ class Samples:
     kind: Literal["linear", "constant"] = "linear"
     deviation: Any = None
     largest_gap: float | None = None
+    unit: str | None = None
     shape: tuple[int, ...] = field(init=False)
 
     def __post_init__(self):
         times, values = _numbers("times", self.times), _numbers("values", self.values)
         if values.ndim == 1:
             values = values[:, None]
+        if self.unit is not None:
+            values = self._in_si(values)
         if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[0] != times.size or not times.size:
             raise ModelError(
                 f"Samples: found times of shape {np.shape(self.times)} and values of shape {np.shape(self.values)}, "
@@ -65,6 +70,23 @@ class Samples:
 
     def __repr__(self) -> str:
         return f"<Samples: {self.times.size} of {self.values.shape[1]}, {self.times[0]:g} to {self.times[-1]:g} s>"
+
+    def _in_si(self, values: np.ndarray) -> np.ndarray:
+        """Values in SI; unit and deviation become those of them."""
+        try:
+            written = scale(self.unit or "")
+            values = written.si(values)
+        except ModelError as error:
+            raise ModelError(f"Samples: {error}", argument="unit") from None
+        object.__setattr__(self, "unit", written.coherent)
+        if self.deviation is not None:
+            object.__setattr__(self, "deviation", _numbers("deviation", self.deviation) * written.slope)
+        return values
+
+    def check_unit(self, place: str, unit: str | None) -> None:
+        """ModelError unless they can be values of a quantity in a unit, if they say theirs."""
+        if self.unit is not None and unit is not None:
+            known_scale(place, self.unit, unit)
 
     def _as_columns(self, values: np.ndarray) -> np.ndarray:
         """One column for each element, those of a matrix column after column, (n, k)."""

@@ -140,6 +140,7 @@ class Quantity(Formula):
         shape: Any = (),
         *,
         unit: str | None = None,
+        display: str | None = None,
         description: str = "",
         start: Any = None,
         fixed: bool = False,
@@ -151,6 +152,7 @@ class Quantity(Formula):
     ):
         self.declared_shape = shape
         self.unit = unit
+        self.display = display
         self.description = description
         self.start = start
         self.fixed = fixed
@@ -191,6 +193,7 @@ class Real(Quantity):
 
     shape: (), an int or a tuple; a function of the instance where it depends on its settings.
     start: guess of the initial value (None: no opinion); fixed: the start is an initial condition.
+    unit: coherent SI, in which all its numbers are; display: the unit in which figures and printing show it, as "deg".
     min, max: limits used by optimisation; nominal: typical magnitude; prefer: see StateSelect.
     undetermined: the likely cause where the equations do not determine it, for messages.
     """
@@ -223,6 +226,7 @@ class Discrete(Quantity):
         *,
         shape: Any = None,
         unit: str | None = None,
+        display: str | None = None,
         description: str = "",
         min: Any = None,
         max: Any = None,
@@ -231,7 +235,7 @@ class Discrete(Quantity):
         if shape is None:
             shape = () if callable(start) or isinstance(start, Formula) else np.shape(start)
         limits = dict(min=min, max=max, nominal=nominal)
-        super().__init__(shape, unit=unit, description=description, start=start, **limits)
+        super().__init__(shape, unit=unit, display=display, description=description, start=start, **limits)
 
 
 class Flow(Quantity):
@@ -257,7 +261,7 @@ class Propagated(Quantity):
 class Parameter(Quantity):
     """A constant of one simulation: a number or array, or an expression of other parameters.
 
-    value: number, array, formula of declarations (`2 * m`), or function of the instance
+    value: number, array, text with a unit ("700 mm"), formula of declarations (`2 * m`), or function of the instance
     (`lambda self: self.L / 2`). Its shape is that of the value, unless `shape` says otherwise.
     evaluate: the value shapes the equations (a joint axis): it is folded in when the model is
     translated, as Modelica's annotation Evaluate=true. assumed: what `check` says where nobody gives another value.
@@ -270,6 +274,7 @@ class Parameter(Quantity):
         value: Any = None,
         *,
         unit: str | None = None,
+        display: str | None = None,
         description: str = "",
         min: Any = None,
         max: Any = None,
@@ -280,7 +285,8 @@ class Parameter(Quantity):
     ):
         if shape is None:
             shape = () if value is None or callable(value) or isinstance(value, Formula) else np.shape(value)
-        super().__init__(shape, unit=unit, description=description, min=min, max=max, nominal=nominal)
+        words: dict[str, Any] = dict(unit=unit, display=display, description=description)
+        super().__init__(shape, **words, min=min, max=max, nominal=nominal)
         self.value = value
         self.fold = evaluate
         self.assumed = assumed

@@ -2,10 +2,9 @@
 
 Modelica Language Specification 3.6, chapter 19. The radian is of dimension one, as in the SI. Only
 coherent units are known to models: a millimetre inside a model would be a factor of a thousand nobody
-applies. Files, which people write, may bring another unit with a number: `FACTORS` bring it to SI.
+applies. At the border, in what people write and read, there are others, `OTHERS` and prefixes; `scales` brings them to SI.
 """
 
-import math
 import re
 from fractions import Fraction
 from functools import cache
@@ -54,16 +53,50 @@ SYMBOLS: dict[str, Dimension] = {
     "T": _dimension(kg=1, s=-2, A=-1),
     "S": _dimension(m=-2, kg=-1, s=3, A=2),
 }
-FACTORS = {  # unit of a quantity -> texts that a file may write behind its number -> factor
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180},
-    "s": {"s": 1.0, "ms": 1e-3},
-    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
-    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
-    "N": {"N": 1.0, "kN": 1e3},
-    "N.m": {"N.m": 1.0, "Nm": 1.0, "kN.m": 1e3},
+# Other units -> the coherent unit that each is a multiple of, the factor, and the power of pi behind it. Those of inches and
+# pounds are exact by definition (NIST SP 811, appendix B), as all here: a horsepower, of which there are several, is none.
+OTHERS: dict[str, tuple[str, Fraction, int]] = {
+    "g": ("kg", Fraction(1, 1000), 0),
+    "t": ("kg", Fraction(1000), 0),
+    "min": ("s", Fraction(60), 0),
+    "h": ("s", Fraction(3600), 0),
+    "d": ("s", Fraction(86400), 0),
+    "deg": ("rad", Fraction(1, 180), 1),
+    "arcmin": ("rad", Fraction(1, 10800), 1),
+    "arcsec": ("rad", Fraction(1, 648000), 1),
+    "rev": ("rad", Fraction(2), 1),
+    "rpm": ("rad/s", Fraction(1, 30), 1),
+    "Nm": ("N.m", Fraction(1), 0),
+    "Nmm": ("N.m", Fraction(1, 1000), 0),
+    "bar": ("Pa", Fraction(100_000), 0),
+    "l": ("m3", Fraction(1, 1000), 0),
+    "L": ("m3", Fraction(1, 1000), 0),
+    "Wh": ("J", Fraction(3600), 0),
+    "degC": ("K", Fraction(1), 0),
+    "degF": ("K", Fraction(5, 9), 0),
+    "in": ("m", Fraction(254, 10_000), 0),
+    "ft": ("m", Fraction(3048, 10_000), 0),
+    "lb": ("kg", Fraction(45_359_237, 100_000_000), 0),
+    "lbf": ("N", Fraction(44_482_216_152_605, 10_000_000_000_000), 0),
+    "psi": ("Pa", Fraction(44_482_216_152_605, 64_516 * 100_000), 0),
+    "%": ("1", Fraction(1, 100), 0),
 }
-FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1)(?P<power>[+-]?\d+)?$")
+ZEROS = {"degC": 273.15, "degF": 459.67}  # what is added to a temperature before the factor makes it K
+LOGARITHMIC = ("dB", "dBm", "Np", "pH")
+PREFIXES = {
+    "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "da": 1, "h": 2, "k": 3, "M": 6, "G": 9, "T": 12,
+}  # fmt: skip
+PREFIXED = (
+    *(name for name in SYMBOLS if name not in ("1", "kg", "sr")),
+    "g",
+    "bar",
+    "l",
+    "L",
+    "deg",
+    "Nm",
+    "Wh",
+)
+FACTOR = re.compile(r"(?P<symbol>[A-Za-z]+|1|%)(?P<power>[+-]?\d+)?$")
 
 
 @cache
@@ -88,7 +121,7 @@ def _factor(text: str, unit: str) -> Dimension:
     if symbol not in SYMBOLS:
         raise ModelError(
             f"unit '{unit}': '{symbol}' is not a coherent SI unit; quantities are in SI inside a model "
-            "(m, kg, s, rad, N, N.m, ...), convert where the number enters"
+            "(m, kg, s, rad, N, N.m, ...), convert where the number enters, or say how to show it: unit='rad', display='deg'"
         )
     return tuple(power * exponent for exponent in SYMBOLS[symbol])
 
@@ -105,3 +138,27 @@ def unit_text(dimension: Dimension) -> str:
     if below:
         text += "/" + (product(below) if len(below) == 1 else f"({product(below)})")
     return text
+
+
+def radians(unit: str) -> int:
+    """The exponent of the radian in a unit: 1 for "rad/s", -1 for "N.m/rad"."""
+    total = 0
+    for sign, part in zip((1, -1), unit.replace(" ", "").split("/"), strict=False):
+        for factor in part.strip("()").split("."):
+            match = FACTOR.match(factor)
+            if match is not None and match["symbol"] == "rad":
+                total += sign * int(match["power"] or 1)
+    return total
+
+
+def per_second(unit: str, order: int = 1) -> str:
+    """The unit of a derivative of that order, with one '/' as Modelica writes it: "rad/s2" of "rad/s", "1/s" of "1"."""
+    if not unit or not order:
+        return unit
+    above, _, below = unit.partition("/")
+    factors = [*below.strip("()").split(".")] if below else []
+    times = [f for f in factors if f.rstrip("0123456789") == "s"]
+    power = order + sum(int(f[1:] or 1) for f in times)
+    rest = [f for f in factors if f not in times]
+    joined = ".".join([*rest, "s" if power == 1 else f"s{power}"])
+    return f"{above}/({joined})" if rest else f"{above}/{joined}"

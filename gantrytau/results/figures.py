@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
 
@@ -18,44 +19,48 @@ BAND = 0.45  # height of the bands of a mode, inches
 _FEW = 12  # lines that one figure still shows distinctly
 
 
-def draw(result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | None) -> "Figure":
-    """The figure of the named variables of a result over time, saved to `file` if one is named."""
+def draw(
+    result: Series, names: tuple[str, ...], file: str | os.PathLike[str] | None, display: Display = None
+) -> "Figure":
+    """The figure of the named variables of a result over time, in units as `shown_units` reads them, saved to a `file`."""
     import matplotlib.pyplot as plt
 
     if file is not None:
         check_suffix(file)
     lines = _lines(result, names)
     modes = [name for name in lines if name in result.modes]
+    shown = shown_units(result, ("time", *lines), display, DECLARED, "plot")
     axes_of_unit: dict[str, list[str]] = {}
     for name in lines:
         if name not in modes:
-            axes_of_unit.setdefault(result.unit(name), []).append(name)
+            axes_of_unit.setdefault(shown[name].unit, []).append(name)
+    times = shown["time"].of(result.time)
     heights = [BAND] * len(modes) + [2.2] * len(axes_of_unit)
     figure, axes = plt.subplots(
         len(heights), sharex=True, squeeze=False, figsize=(7.0, 1.2 + sum(heights)), layout="constrained",
         gridspec_kw=dict(height_ratios=heights),
     )  # fmt: skip
     for axis, name in zip(axes[:, 0], modes, strict=False):
-        _bands(axis, result, name)
+        _bands(axis, result, name, times)
     for axis, (unit, members) in zip(axes[len(modes) :, 0], axes_of_unit.items(), strict=True):
         for name in members:
             style = "steps-post" if name in result.held else "default"
-            axis.plot(result.time, result[name], label=name, drawstyle=style)
-        axis.set_ylabel(_label(result, members, unit))
+            axis.plot(times, shown[name].of(result[name]), label=name, drawstyle=style)
+        axis.set_ylabel(_label(members, unit))
         axis.grid(alpha=0.3)
         if len(members) > 1:
             axis.legend(fontsize="small")
-    axes[-1, 0].set_xlabel("time [s]")
+    axes[-1, 0].set_xlabel(shown["time"].heading("time"))
     if result.title:
         figure.suptitle(result.title)
     return finished(figure, file)
 
 
-def _bands(axis: "Axes", result: Series, name: str) -> None:
+def _bands(axis: "Axes", result: Series, name: str, t: np.ndarray) -> None:
     """A mode over time as bands, each colour with the name of its mode."""
     import matplotlib.pyplot as plt
 
-    t, numbers, words = result.time, result[name].astype(int), result.modes[name]
+    numbers, words = result[name].astype(int), result.modes[name]
     starts = np.flatnonzero(np.append(True, np.diff(numbers) != 0))
     ends = np.append(t[starts[1:]], t[-1])
     colours = plt.get_cmap("tab10")
@@ -121,7 +126,7 @@ def _lines(result: Series, names: tuple[str, ...]) -> list[str]:
     return list(dict.fromkeys(lines))
 
 
-def _label(result: Series, members: list[str], unit: str) -> str:
+def _label(members: list[str], unit: str) -> str:
     """The name if there is one line only, and the unit unless it is one."""
     name = members[0] if len(members) == 1 else ""
     return " ".join(filter(None, [name, f"[{unit}]" if unit else ""]))

@@ -3,13 +3,14 @@
 import csv
 import importlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau.errors import GantryTauError, ModelError, did_you_mean
+from gantrytau.results.display_units import SI, Display, Shown, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-def save(result: Series, path: str | os.PathLike[str]) -> Path:
+def save(result: Series, path: str | os.PathLike[str], display: Display = None) -> Path:
     """Write a result in the format that the suffix of `path` names; see `Result.save`."""
     path = Path(path)
     writer = _WRITERS.get(path.suffix.lower())
@@ -25,6 +26,17 @@ def save(result: Series, path: str | os.PathLike[str]) -> Path:
         raise ModelError(
             f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
             + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0]
+        )
+    if writer is _write_csv:
+        shown = shown_units(result, ("time", *result.names), display, SI, "save")
+        with replacing(path) as partial:
+            _write_csv(result, partial, shown)
+        return path
+    if display not in (None, SI):
+        raise ModelError(
+            f"{path}: save: found display={display!r}, expected none: '{path.suffix}' holds SI, and the units beside the "
+            "numbers; leave it out, or save a .csv",
+            argument="display",
         )
     with replacing(path) as partial:
         writer(result, partial)
@@ -53,13 +65,13 @@ def _attributes(result: Series, name: str) -> dict[str, str]:
     return {key: text for key, text in attributes.items() if text}
 
 
-def _write_csv(result: Series, path: Path) -> None:
+def _write_csv(result: Series, path: Path, shown: Mapping[str, Shown] | None = None) -> None:
     names = ("time", *result.names)
-    units = [result.unit(name) for name in names]
+    shown = shown or shown_units(result, names, None, SI, "save")
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True))
-        writer.writerows(np.column_stack([result[name] for name in names]).tolist())
+        writer.writerow(shown[name].heading(name) for name in names)
+        writer.writerows(np.column_stack([shown[name].of(result[name]) for name in names]).tolist())
 
 
 def _write_netcdf(result: Series, path: Path) -> None:

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gantrytau.results.display_units import Display
 from gantrytau.results.figures import draw
 from gantrytau.results.files import dataset, save
 from gantrytau.results.series import Series
@@ -16,23 +17,29 @@ if TYPE_CHECKING:
 class Result(Series):
     """The variables of a model at the output times of a simulation or an optimum, see `Series`, with figures and files."""
 
-    def plot(self, *names: str, file: str | os.PathLike[str] | None = None) -> "Figure":
+    def plot(
+        self, *names: str, file: str | os.PathLike[str] | None = None, display: Display = None
+    ) -> "Figure":
         """Draw variables over time, one axis for each unit, and return the figure.
 
         names: scalars or vectors; none means all, if they are few.
         file: also save the figure there, in the format that its suffix names.
+        display: units to draw them in, in place of those of their declarations: "deg" for all that it measures,
+        {"crank.phi": "deg", "m": "mm", "time": "ms"} by name or by the unit that it replaces, or "SI". Raises ModelError for
+        a unit that measures something else.
         """
-        return draw(self, names, file)
+        return draw(self, names, file, display)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | os.PathLike[str], *, display: Display = None) -> Path:
         """Write all variables to a file and return its path; the suffix chooses the format.
 
-        .csv: a column for each scalar, the header `name [unit]`, numbers that read back exactly;
+        .csv: a column for each scalar, the header `name [unit]`, numbers that read back exactly; in SI, or with display=
+        in other units, as `plot` takes them, or "declared", which readers bring back to SI;
         .nc: netCDF with units, vectors whole; .parquet: a column for each scalar, its unit as metadata;
         .mat: a trajectory of Dymola (and OpenModelica), read by their tools.
         An existing file is replaced only when the new one is complete.
         """
-        return save(self, path)
+        return save(self, path, display)
 
     def to_xarray(self) -> "xarray.Dataset":
         """The variables as a dataset with the coordinate `time`, vectors whole, units as attributes."""

@@ -29,6 +29,7 @@ class Series:
     ended: why it ends where it does, "stop" where that was asked for.
     modes: names of the values 0, 1, ... of a scalar, by its name.
     shapes: what the components of the model look like, by names.
+    displays: scalar or vector name -> the unit in which figures and tables show it, where that is not its own.
 
     Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
     matrix `R`, (times, 3, 3). `time` is a name, too.
@@ -47,6 +48,7 @@ class Series:
         ended: str = "stop",
         modes: Mapping[str, Sequence[str]] | None = None,
         shapes: Iterable[Shape] = (),
+        displays: Mapping[str, str] | None = None,
     ):
         self._time = np.array(time, dtype=float)
         if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
@@ -58,6 +60,7 @@ class Series:
         self._values = values
         self._units = dict(units or {})
         self._descriptions = dict(descriptions or {})
+        self._displays = {name: text for name, text in (displays or {}).items() if text}
         self._title = title
         self._aliases = dict(aliases or {})
         self._held = frozenset(held)
@@ -146,6 +149,10 @@ class Series:
         """The description of one variable, found like its unit."""
         return "time" if name == "time" else self._attribute(self._descriptions, name)
 
+    def display(self, name: str) -> str:
+        """The unit in which one variable is shown, as its declaration says, "" if it says none; found like its unit."""
+        return self._attribute(self._displays, name) if self._displays and name != "time" else ""
+
     def __contains__(self, name: object) -> bool:
         return name == "time" or name in self._scalars or name in self._arrays
 
@@ -208,7 +215,7 @@ class Series:
         words = {name: self.description(name) for name in values}
         own: dict[str, Any] = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
         own["modes"] = {name: words for name, words in self._modes.items() if name in values}
-        own["shapes"] = self._shapes
+        own |= dict(shapes=self._shapes, displays={name: self.display(name) for name in values})
         return type(self)(self._time, values, units=units, descriptions=words, **own)
 
     def __repr__(self) -> str:

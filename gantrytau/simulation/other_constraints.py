@@ -72,5 +72,5 @@ def joined(parts: Sequence[Result], grid: np.ndarray) -> Result:
     first = parts[0].select(names)
     words = {name: first.description(name) for name in names}
     own: dict[str, Any] = dict(title=first.title, held=first.held, ended=parts[-1].ended, modes=first.modes)
-    own["shapes"] = first.shapes
+    own |= dict(shapes=first.shapes, displays={name: first.display(name) for name in names})
     return Result(times, values, units=first.units, descriptions=words, **own)

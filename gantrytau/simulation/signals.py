@@ -13,6 +13,7 @@ from gantrytau.flattening.shapes import check_shape, elements_of, joined, numpy_
 from gantrytau.inputs.input_signal import Span, with_course, with_seeds
 from gantrytau.inputs.samples import Samples
 from gantrytau.language.instructions import refuse_calls
+from gantrytau.language.scales import given as in_si
 from gantrytau.language.symbols import time
 
 
@@ -51,10 +52,12 @@ def read_signals(
     found: dict[str, Signal] = {}
     for name, value in with_seeds(given, seed).items():
         elements, shape = flat.expand(name), flat.shape(name)
+        value = in_si(f"input {name}", value, flat.unit(name))
         course = with_course(name, value, shape, lambda: span)
         if callable(course):
             columns = _function(name, course, shape)
         elif isinstance(course, Samples):
+            course.check_unit(f"input {name}", flat.unit(name))
             columns = _samples(name, course, shape, span)
         else:
             columns = _constant(name, course, shape)

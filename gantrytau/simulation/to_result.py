@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
-from gantrytau.language.units import dimension, unit_text
+from gantrytau.language.units import per_second
 from gantrytau.results.result import Result
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -40,6 +40,7 @@ def result_of(
     units, words = labels(dae)
     modes = {n: own for n, own in dae.flat.modes.items() if n in table}
     own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes, shapes=dae.flat.shapes)
+    own["displays"] = displays(dae)
     return Result(times, table, units=units, descriptions=words, **own)
 
 
@@ -110,13 +111,23 @@ def _labels(dae: Translated) -> tuple[dict[str, str], dict[str, str]]:
     for name in _names(dae, None):
         base, order = split_derivative(name)
         if order and base in units:
-            units[name] = _rate_unit(units[base], order)
+            units[name] = per_second(units[base], order)
             words[name] = f"derivative of {base}"
     return units, words
 
 
-def _rate_unit(unit: str, order: int) -> str:
-    if "/" in unit or unit == "1":
-        exponents = [e - order * s for e, s in zip(dimension(unit), dimension("s"), strict=True)]
-        return unit_text(tuple(exponents))
-    return f"{unit}/s{order if order > 1 else ''}"
+def displays(dae: Translated) -> dict[str, str]:
+    """The units in which variables and their derivatives are shown, by name, where a declaration says one."""
+    if "displays" not in dae.made:
+        dae.made["displays"] = _displays(dae)
+    return dict(dae.made["displays"])
+
+
+def _displays(dae: Translated) -> dict[str, str]:
+    declared = [v for v in (*dae.flat.variables, *dae.flat.parameters) if v.display]
+    found = {name: v.display for v in declared for name in (v.name, *v.elements)}
+    for name in _names(dae, None) if found else ():
+        base, order = split_derivative(name)
+        if order and base in found:
+            found[name] = per_second(found[base], order)
+    return found

@@ -5,6 +5,7 @@ from typing import Any
 
 from gantrytau import ModelError, Result
 from gantrytau.flattening.shapes import elements_of
+from gantrytau.language.scales import given as in_si
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum
 from gantrytau_optimica.control.first_guesses.guesses import guess_of
@@ -33,6 +34,7 @@ def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
             found.update(guess_of(value, read.dae, name))
         else:
             elements, shape = read.dae.expand(name), read.dae.flat.shape(name)
+            value = in_si(f"guess {name}", value, read.dae.flat.unit(name))
             if shape and elements[0] in read.dae.parameter_symbols:  # free numbers are guessed one by one
                 found.update(zip(elements, elements_of(f"guess {name}", value, shape), strict=True))
             else:

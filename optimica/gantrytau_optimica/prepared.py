@@ -8,6 +8,7 @@ import numpy as np
 
 from gantrytau import ModelError, SolveError
 from gantrytau.flattening.shapes import elements_of
+from gantrytau.language.scales import given
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
@@ -321,7 +322,9 @@ class Prepared:
                     f"{name}: was not named in prepare(parameters=[...]), expected one of {held}"
                 )
             expected = f"{len(elements)} finite numbers"
-            numbers = elements_of(name, value, self.built.read.dae.flat.shape(name), expected, expected)
+            flat = self.built.read.dae.flat
+            value = given(name, value, flat.unit(name))
+            numbers = elements_of(name, value, flat.shape(name), expected, expected)
             found.update(zip(elements, numbers, strict=True))
         return found
 

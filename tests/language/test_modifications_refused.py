@@ -60,7 +60,11 @@ from tests.language.test_modifications import Cell, Pack, Rack, values
         (lambda: Pack(shapes=[1.0, math.nan, 2.0]), r"^shapes: value is nan, expected a finite number"),
         (lambda: Pack(shapes=[1.0, 2.0]), r"^shapes: value has shape \(2,\), expected \(3,\)"),
         (lambda: Pack(shapes=1.0), r"^shapes: value has shape \(\), expected \(3,\)"),
-        (lambda: Pack(total="3 V"), r"^total: value is '3 V', expected a number, an array or an expression"),
+        (lambda: Pack(total="3 volts"), r"^total: value: unit 'volts': there is no unit 'volts'"),
+        (
+            lambda: Pack(total="three"),
+            r"^total: value: found 'three', expected a number and its unit, as '2.5 ",
+        ),
         (
             lambda: Pack(main=dict(charge=Start(math.nan))),
             r"^main\.charge: start is nan, expected a finite number",

@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import split_derivative
+from gantrytau.language.units import per_second
 from gantrytau_fmu.code.arrays import numbers_of
 from gantrytau_fmu.code.dependencies import Dependencies
 from gantrytau_fmu.code.formulas import Formulas
@@ -72,11 +73,11 @@ class _Listed:
         base, order = split_derivative(name)
         declaration, place = self.declared.get(base, (None, 0))
         reference = len(self.variables)
-        unit, words = "", ""
+        unit, words, display = "", "", ""
         if declaration is not None:
-            unit, words = declaration.unit or "", declaration.description
+            unit, words, display = declaration.unit or "", declaration.description, declaration.display
             if order:
-                unit = _per_second(unit, order)
+                unit, display = per_second(unit, order), per_second(display, order)
                 words = (
                     f"{'second ' if order == 2 else ''}time derivative of {base}"
                     if order < 3
@@ -85,6 +86,7 @@ class _Listed:
             elif limited:
                 more = {**self.limits(declaration, place), **more}
         more.setdefault("unit", unit)
+        more.setdefault("display", display if more["unit"] == unit else "")
         more.setdefault("description", words)
         found, width = fmi_name(name), int(order > 1)
         if name in self.formulas.delays:
@@ -114,22 +116,6 @@ class _Listed:
                 if np.isfinite(number) and (word != "nominal" or number > 0):
                     found[word] = number
         return found
-
-
-def _per_second(unit: str, order: int) -> str:
-    """The unit of a derivative, with one '/' as Modelica writes it."""
-    if not unit:
-        return ""
-    seconds = "s" if order == 1 else f"s{order}"
-    above, _, below = unit.partition("/")
-    if not below:
-        return f"{above}/{seconds}"
-    factors = [*below.strip("()").split(".")]
-    times = [f for f in factors if f.rstrip("0123456789") == "s"]
-    power = order + sum(int(f[1:] or 1) for f in times)
-    rest = [f for f in factors if f not in times]
-    joined = ".".join([*rest, "s" if power == 1 else f"s{power}"])
-    return f"{above}/({joined})" if rest else f"{above}/{joined}"
 
 
 def contents_of(model: ModelGraph, outputs: Sequence[str], others: Sequence[str] = ()) -> Contents:

@@ -74,6 +74,7 @@ def variable(told: FmuVariable, declared: DeclaredType | None, state: int | None
     value: dict[str, Attribute] = {
         "declaredType": declared and declared.name,
         "unit": declared and declared.unit,
+        "displayUnit": (declared and told.display) or None,
         **numbers(told),
         "derivative": None if state is None else state + 1,
         "reinit": reinit or None,

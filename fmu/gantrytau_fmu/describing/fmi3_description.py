@@ -55,6 +55,7 @@ def variable(told: FmuVariable, declared: DeclaredType | None, state: int | None
         **named(told),
         "declaredType": declared and declared.name,
         "unit": declared and declared.unit,
+        "displayUnit": (declared and told.display) or None,
         **numbers(told),
         "derivative": state,
         "reinit": reinit or None,

@@ -4,11 +4,11 @@ FMI 3.0.2, sections 2.4.3 and 2.4.4; FMI 2.0.4, sections 2.2.2 and 2.2.3. The ra
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
 
 from gantrytau.errors import ModelError
-from gantrytau.language.units import BASE, FACTOR, dimension
+from gantrytau.language.scales import scale
+from gantrytau.language.units import BASE, dimension, radians
 from gantrytau_fmu.describing.xml_text import element, parent
 from gantrytau_fmu.description import FmuVariable
 
@@ -55,43 +55,35 @@ QUANTITIES = {
     "mol": "AmountOfSubstance",
     "cd": "LuminousIntensity",
 }
-# display = factor * value + offset; the first is the one shown by default where the unit is in DEFAULT_DISPLAY
-DISPLAYS: dict[str, tuple[tuple[str, float, float], ...]] = {
-    "rad": (("deg", 180 / pi, 0.0),),
-    "rad/s": (("deg/s", 180 / pi, 0.0), ("rev/min", 30 / pi, 0.0)),
-    "rad/s2": (("deg/s2", 180 / pi, 0.0),),
-    "m": (("mm", 1e3, 0.0),),
-    "m/s": (("mm/s", 1e3, 0.0),),
-    "m/s2": (("mm/s2", 1e3, 0.0),),
-    "s": (("ms", 1e3, 0.0),),
-    "kg": (("g", 1e3, 0.0),),
-    "N": (("kN", 1e-3, 0.0),),
-    "Pa": (("bar", 1e-5, 0.0),),
-    "W": (("kW", 1e-3, 0.0),),
-    "K": (("degC", 1.0, -273.15),),
+DISPLAYS = {  # units that tools offer, besides those that declarations name; the first by default, of DEFAULT_DISPLAY
+    "rad": ("deg",),
+    "rad/s": ("deg/s", "rev/min"),
+    "rad/s2": ("deg/s2",),
+    "m": ("mm",),
+    "m/s": ("mm/s",),
+    "m/s2": ("mm/s2",),
+    "s": ("ms",),
+    "kg": ("g",),
+    "N": ("kN",),
+    "Pa": ("bar",),
+    "W": ("kW",),
+    "K": ("degC",),
 }
 DEFAULT_DISPLAY = ("rad", "rad/s", "rad/s2", "m", "m/s", "K")
 
 
 @dataclass(frozen=True)
 class DeclaredType:
-    """What variables of one unit share; quantity: None where the unit does not tell it."""
+    """What variables of one unit share; quantity: None where the unit does not tell it.
+
+    display: the unit in which they are shown; displays: all that are defined.
+    """
 
     name: str
     unit: str
     quantity: str | None
     display: str | None
-
-
-def radians(unit: str) -> int:
-    """The exponent of the radian in a unit: 1 for "rad/s", -1 for "N.m/rad"."""
-    total = 0
-    for sign, part in zip((1, -1), unit.replace(" ", "").split("/"), strict=False):
-        for factor in part.strip("()").split("."):
-            match = FACTOR.match(factor)
-            if match is not None and match["symbol"] == "rad":
-                total += sign * int(match["power"] or 1)
-    return total
+    displays: tuple[str, ...] = ()
 
 
 def declared_types(variables: Sequence[FmuVariable]) -> dict[str, DeclaredType]:
@@ -114,8 +106,10 @@ def declared_types(variables: Sequence[FmuVariable]) -> dict[str, DeclaredType]:
         while name in taken:
             name += "_"
         taken.add(name)
-        display = DISPLAYS[unit][0][0] if unit in DEFAULT_DISPLAY else None
-        types[unit] = DeclaredType(name, unit, QUANTITIES.get(unit), display)
+        display = DISPLAYS[unit][0] if unit in DEFAULT_DISPLAY else None
+        shown = (v.display for v in variables if v.real and v.unit == unit and v.display)
+        displays = tuple(dict.fromkeys((*DISPLAYS.get(unit, ()), *shown)))
+        types[unit] = DeclaredType(name, unit, QUANTITIES.get(unit), display, displays)
     return types
 
 
@@ -127,14 +121,17 @@ def _made_up(unit: str) -> str:
 
 def unit_definitions(types: Iterable[DeclaredType]) -> str:
     """The element `UnitDefinitions`, which both versions write alike; "" without units."""
-    return parent("UnitDefinitions", [_unit(declared.unit) for declared in types])
+    return parent("UnitDefinitions", [_unit(declared) for declared in types])
 
 
-def _unit(unit: str) -> str:
+def _unit(declared: DeclaredType) -> str:
+    unit = declared.unit
     powers = {base: int(power) for base, power in zip(BASE, dimension(unit), strict=True) if power}
     if turns := radians(unit):
         powers["rad"] = turns
     inside = element("BaseUnit", powers)
-    for name, factor, offset in DISPLAYS.get(unit, ()):
-        inside += element("DisplayUnit", {"name": name, "factor": factor, "offset": offset or None})
+    for name in declared.displays:  # display = factor * value + offset
+        shown = scale(name)
+        factor = replace(shown, zero=0.0).written(1.0)
+        inside += element("DisplayUnit", {"name": name, "factor": factor, "offset": -shown.zero or None})
     return element("Unit", {"name": unit}, "\n" + inside)

@@ -272,6 +272,7 @@ def _variable(variable: Any) -> FmuVariable:
         initial=variable.initial,
         start=_value(variable),
         unit=said("unit") or "",
+        display=variable.displayUnit or "",
         description=variable.description or (declared.description if declared else None) or "",
         min=least,
         max=greatest,

@@ -10,12 +10,13 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.flattening.shapes import elements_of
 from gantrytau.language.events import mode_number
+from gantrytau.language.scales import given as in_si
 
 SAME = 1e-9  # relative, below which two starts of one symbol agree
 
 
 def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
-    """The same translation from other starts, name -> number, array, or name of a mode; what is not named moves before them.
+    """The same translation from other starts, name -> number, array, "40 deg", or name of a mode; the rest moves before them.
 
     A start that is fixed in the model stays fixed, at its new value. Equations and states are those that the old start
     chose. Raises ModelError for names that are no variables and for wrong shapes, InitializationError where no
@@ -28,6 +29,7 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
         elements = _variables(dae, name)
         if name in dae.flat.modes:
             value = mode_number(f"starts: {name}", dae.flat.modes[name], value)
+        value = in_si(f"starts: {name}", value, dae.flat.unit(name))
         numbers = elements_of(f"starts: {name}", value, dae.flat.shape(name))
         for element, number in zip(elements, numbers, strict=True):
             symbol, start = _symbol(dae, element, number)

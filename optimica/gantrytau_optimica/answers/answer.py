@@ -11,6 +11,7 @@ import numpy as np
 from gantrytau import ModelError, Result
 from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.symbols import split_derivative
+from gantrytau.results.display_units import Display
 
 Signal = Callable[[Any], np.ndarray]
 
@@ -56,6 +57,11 @@ class Answer(ABC):
     def shapes(self) -> Sequence[Shape]:
         """What the components of the model look like; none of an answer that was read from a file."""
         return ()
+
+    @property
+    def displays(self) -> Mapping[str, str]:
+        """The units in which variables are shown, where they are declared, by name; none of an answer read from a file."""
+        return {}
 
     @property
     def _only(self) -> Any:
@@ -110,9 +116,8 @@ class Answer(ABC):
             names = self._variables(path)
             rows = dict(zip(names, self._rows(names, path)(phase.time), strict=True))
             title = f"{self.name}.{path}" if path else self.name
-            found[path] = Result(
-                phase.time, rows, units=units, descriptions=words, title=title, shapes=self.shapes
-            )
+            own: dict[str, Any] = dict(shapes=self.shapes, displays=self.displays)
+            found[path] = Result(phase.time, rows, units=units, descriptions=words, title=title, **own)
         return found
 
     @cached_property
@@ -123,7 +128,7 @@ class Answer(ABC):
         times = np.unique(np.concatenate([result.time for result in self.by_phase.values()]))
         units, words = self._labels()
         rows = {n: self._over(n, times) for result in self.by_phase.values() for n in result.names}
-        return Result(times, rows, units=units, descriptions=words, title=self.name)
+        return Result(times, rows, units=units, descriptions=words, title=self.name, displays=self.displays)
 
     def _over(self, name: str, times: np.ndarray) -> np.ndarray:
         """A scalar at times (n,), NaN outside of its phase."""
@@ -187,14 +192,15 @@ class Answer(ABC):
 
         return value
 
-    def plot(self, *names: str, file: Any = None):
+    def plot(self, *names: str, file: Any = None, display: Display = None):
         """Variables over time, as Result.plot, those of a phase over its own; derivatives and free numbers, too."""
         result, (units, words) = self._whole, self._labels()
         more = [n for name in names for n in self._elements(name) if n not in result and n != "time"]
         if more:
             values = {n: result[n] for n in result.names} | {n: self._drawn(n, result.time) for n in more}
-            result = Result(result.time, values, units=units, descriptions=words, title=result.title)
-        return result.plot(*names, file=file)
+            own: dict[str, Any] = dict(title=result.title, displays=self.displays)
+            result = Result(result.time, values, units=units, descriptions=words, **own)
+        return result.plot(*names, file=file, display=display)
 
     def _drawn(self, name: str, times: np.ndarray) -> Any:
         try:
@@ -204,9 +210,9 @@ class Answer(ABC):
                 f"{name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
             ) from error
 
-    def save(self, path: Any):
+    def save(self, path: Any, *, display: Display = None):
         """Save all variables over time, as Result.save; outside of its phase a variable is NaN."""
-        return self._whole.save(path)
+        return self._whole.save(path, display=display)
 
 
 def _shape(elements: Sequence[str]) -> tuple[int, ...]:

@@ -5,6 +5,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from gantrytau import ModelError
+from gantrytau.results.display_units import SI, Display
 from gantrytau_optimica.answers.archive.optimum_files import SUFFIX, save_optimum
 from gantrytau_optimica.answers.playback.arcs import Arc, arcs
 from gantrytau_optimica.answers.playback.playback import Playback, play_back
@@ -28,9 +30,16 @@ class Optimum(ProgramAnswer):
             object.__setattr__(noted, name, vars(self)[name])
         return noted
 
-    def save(self, path: Any):
+    def save(self, path: Any, *, display: Display = None):
         """Save all variables over time, as Result.save; with the ending .optimum the whole solution, for load_optimum."""
-        return save_optimum(self, path) if Path(path).suffix == SUFFIX else super().save(path)
+        if Path(path).suffix != SUFFIX:
+            return super().save(path, display=display)
+        if display not in (None, SI):
+            raise ModelError(
+                f"{path}: save: found display={display!r}, expected none: a solution is kept in SI; leave it out",
+                argument="display",
+            )
+        return save_optimum(self, path)
 
     @cached_property
     def playback(self) -> Playback:

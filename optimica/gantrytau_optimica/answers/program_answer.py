@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau import Dae
 from gantrytau.language.self_description.appearance import Shape
-from gantrytau.simulation.to_result import labels
+from gantrytau.simulation.to_result import displays, labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.solving.ipopt import Solution
@@ -109,6 +109,11 @@ class ProgramAnswer(Answer):
 
     def _labels(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
         return labels(self.dae)
+
+    @property
+    def displays(self) -> Mapping[str, str]:
+        """The units in which variables are shown, where they are declared, by name."""
+        return displays(self.dae)
 
     def _rows(self, names: Sequence[str], path: str) -> Callable[[np.ndarray], np.ndarray]:
         phase, expressions = self.phases[path], self.built.expressed(names)

@@ -72,6 +72,9 @@ def plan(
     problem = type(type(instance).__name__, (Optimization,), phases)
     read = read_problem(problem, change)
     _check_inputs(read, experiments)
+    for one in experiments:
+        for name, samples in one.measured.items():
+            samples.check_unit(f"measured {name}", read.dae.flat.unit(f"{one.name}.model.{name}"))
     still = static(read.dae)
     if still:
         read = _as_rows(read, experiments)

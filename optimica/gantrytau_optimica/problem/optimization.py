@@ -21,7 +21,7 @@ from gantrytau.flattening.shapes import numpy_shape
 class Free(Parameter):
     """A number that the optimiser chooses: a time, a parameter, or with `Start(Free(...))` an initial value.
 
-    guess: where the search starts; min, max: limits; unit, description: as for any parameter. The optimum has
+    guess: where the search starts; min, max: limits; unit, display, description: as for any parameter. The optimum has
     times and parameters as numbers, `optimum["final_time"]`, an initial value as `optimum["x"][0]`.
     """
 
@@ -32,11 +32,12 @@ class Free(Parameter):
         guess: Any = 1.0,
         *,
         unit: str | None = None,
+        display: str | None = None,
         min: Any = None,
         max: Any = None,
         description: str = "",
     ):
-        super().__init__(guess, unit=unit, min=min, max=max, description=description)
+        super().__init__(guess, unit=unit, display=display, min=min, max=max, description=description)
 
 
 class Optimization(Model):

@@ -207,6 +207,7 @@ def _courses(name: str, stages: list[tuple[str, Any]], dae: Dae) -> dict[str, ca
             )
             if isinstance(course, Samples):
                 course.check_shape(place, shape)
+                course.check_unit(place, dae.flat.unit(full))
                 found.update((e, (course, k)) for k, e in enumerate(elements))
             else:
                 signals = read_signals({full: course}, dae.flat, (0.0, 1.0))

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gantrytau_fmu.describing.unit_definitions import DISPLAYS
 from gantrytau_fmu.description import FmuVariable
 from tests.fmu.interfaces import VERSIONS, description, read
 
@@ -57,9 +56,32 @@ def test_types_carry_quantity_unit_and_display_unit(fmi):
     assert convert["mm/s"](1.5) == 1500.0
 
 
-def test_display_units_of_turning():
-    factors = {name: factor for name, factor, _ in DISPLAYS["rad/s"]}
-    assert factors["rev/min"] * 2 * np.pi / 60 == pytest.approx(
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_declared_display_units_are_defined_and_named_by_their_variables(fmi):
+    shown = {
+        "phi": ("rad", "rev", 1 / (2 * np.pi), 0.0),
+        "psi": ("rad", "", 0.0, 0.0),
+        "plain": ("rad", "rad", 1.0, 0.0),
+        "w": ("rad/s", "rpm", 30 / np.pi, 0.0),
+        "T": ("K", "degF", 1.8, -459.67),
+        "v": ("m/s", "km/h", 3.6, 0.0),
+        "x": ("kg.m2/s3", "kW", 1e-3, 0.0),
+    }
+    told = (
+        FmuVariable(name, 0, "parameter", "fixed", start=1.0, unit=unit, display=display)
+        for name, (unit, display, _, _) in shown.items()
+    )
+    found = read(description(*told), fmi)
+    defined = {(u.name, d.name): d for u in found.unitDefinitions for d in u.displayUnits}
+    variables = {v.name: v for v in found.modelVariables}
+    for name, (unit, display, factor, offset) in shown.items():
+        assert variables[name].displayUnit == (display or None)
+        if display:
+            one = defined[unit, display]
+            assert float(one.factor or 1.0) == pytest.approx(factor, rel=1e-15), name
+            assert float(one.offset or 0.0) == offset
+    assert variables["psi"].declaredType.displayUnit == "deg"
+    assert float(defined["rad/s", "rev/min"].factor) * 2 * np.pi / 60 == pytest.approx(
         1, rel=1e-15
     )  # one turn a second is 60 a minute
 

@@ -102,6 +102,27 @@ def test_units_and_types_are_declared(fmu):
     assert (units["J"].kg, units["J"].m, units["J"].s) == (1, 2, -2)
 
 
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_declared_display_units_come_with_the_model(fmi, tmp_path):
+    class Turn(Model):
+        """A shaft that is shown in turns."""
+
+        k = Parameter("2 rpm", unit="rad/s", display="rpm", description="speed")
+        phi = Real(unit="rad", display="rev", description="angle", start="90 deg", fixed=True)
+        r = Real(2, unit="m", display="mm", description="place")
+
+        def equations(self):
+            yield der(self.phi) == self.k
+            yield self.r[0] == 0
+            yield self.r[1] == 0
+
+    found = read_fmu(export_fmu(Turn(), tmp_path / "turn.fmu", fmi=fmi)).by_name
+    assert {n: found[n].display for n in ("k", "phi", "der(phi)", "r[0]", "r[1]", "time")} == {
+        "k": "rpm", "phi": "rev", "der(phi)": "rev/s", "r[0]": "mm", "r[1]": "mm", "time": "",
+    }  # fmt: skip
+    assert found["phi"].start == np.pi / 2  # in SI
+
+
 def test_head_experiment_and_words_of_the_caller(fmu):
     told = fmu.described
     assert (told.description, told.author, told.copyright) == (

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result, heeding_interrupts
-from gantrytau.simulation.to_result import labels
+from gantrytau.simulation.to_result import displays, labels
 from gantrytau_optimica.answers.playback.ranges import FLAT, condition_sizes, magnitude, measured
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
@@ -91,7 +91,7 @@ class Playback:
         units, words = labels(dae)
         table = dict(zip(names, rows[:, keep], strict=True))
         title = f"{self.optimum.name}, played back"
-        own: dict[str, Any] = dict(title=title, shapes=dae.flat.shapes)
+        own: dict[str, Any] = dict(title=title, shapes=dae.flat.shapes, displays=displays(dae))
         return Result(played.times[keep], table, units=units, descriptions=words, **own)
 
     def __getitem__(self, name: str) -> np.ndarray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gantrytau import ModelError, did_you_mean
-from gantrytau.language.units import FACTORS
+from gantrytau.language.scales import USUAL, scale
 
 WORDS = {  # last part of a column's name, in small letters -> what it is
     **dict.fromkeys(("t", "time", "timestamp"), "t"),
@@ -72,7 +72,7 @@ def columns_of(path: object, header: Sequence[str]) -> LogColumns:
     joints = _joints(place, heads, {head.place for head in tool or ()})
     found = {kind: tuple(_column(place, head, kind) for head in part) for kind, part in joints.items()}
     for position, force in zip(joints["q"], joints["f"], strict=True):
-        if position.unit in FACTORS["m"] and force.unit in FACTORS["N.m"]:
+        if _is_of(position, "m") and _is_of(force, "N.m"):
             raise ModelError(
                 f"{place}: found {force.text} beside {position.text}, expected a force along a length; divide torques of "
                 "motors by the radius of the transmission, and write N"
@@ -91,13 +91,23 @@ def _head(place: int, text: str) -> _Header:
 
 
 def _column(place: str, head: _Header, kind: str) -> LogColumn:
-    known = {text: factor for unit in UNITS[kind] for text, factor in FACTORS[unit].items()}
-    if head.unit and head.unit not in known:
+    if not head.unit:
+        return LogColumn(head.place, 1.0)
+    if not any(_is_of(head, unit) for unit in UNITS[kind]):
+        known = [text for unit in UNITS[kind] for text in (unit, *USUAL[unit])]
         raise ModelError(
             f"{place}: found the unit {head.unit} of {head.name}, expected one of {', '.join(known)}"
             + did_you_mean(head.unit, known).partition("; there is")[0]
         )
-    return LogColumn(head.place, known.get(head.unit, 1.0))
+    return LogColumn(head.place, scale(head.unit).slope)
+
+
+def _is_of(head: _Header, unit: str) -> bool:
+    """Whether a column says that it is in a unit of what another one measures."""
+    try:
+        return bool(head.unit) and scale(head.unit).measures(unit)
+    except ModelError:
+        return False
 
 
 def _tool(place: str, heads: Sequence[_Header]) -> list[_Header] | None:

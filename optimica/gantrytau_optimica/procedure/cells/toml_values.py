@@ -1,13 +1,13 @@
 """Values of a TOML file with the unit that they must have: numbers are SI, texts bring theirs, as "5 mm" or "40 deg"."""
 
 import math
-import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from gantrytau import ModelError, did_you_mean
-from gantrytau.language.units import FACTORS
+from gantrytau.language.scales import USUAL, given
 
 WORDS = {
     "m": "a length in m",
@@ -18,14 +18,13 @@ WORDS = {
 }
 LARGEST = {"m": 50.0, "rad": 2 * math.pi, "m/s": 50.0}  # more was not written in SI
 EXAMPLES = {"m": "mm", "rad": "deg", "s": "ms", "m/s": "mm/s"}
-_TEXT = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S+)\s*")
 
 
 @dataclass(frozen=True)
 class Value:
     """What a key holds: a number, vector or table of numbers in a unit, a whole number or a text.
 
-    unit: of FACTORS or 1, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere;
+    unit: of WORDS, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere;
     shapes: those allowed, None for any number of rows; least: the smallest number allowed, or above: what it must exceed;
     words: of which a text must be one.
     """
@@ -80,17 +79,13 @@ class Value:
         return float(found)
 
     def _with_unit(self, place: str, found: str) -> float:
-        units = {
-            name: factor for unit in self.unit.split(",") for name, factor in FACTORS.get(unit, {}).items()
-        }
-        match = _TEXT.fullmatch(found)
-        if match is None or match[2] not in units:
-            known = f"; units are {', '.join(units)}" if units else ", without a unit"
-            raise ModelError(f'{place}: found "{found}", expected {self._unit()}{known}')
-        try:
-            return float(match[1]) * units[match[2]]
-        except ValueError:
-            raise ModelError(f'{place}: found "{found}", expected a number and its unit') from None
+        units = [unit for unit in self.unit.split(",") if unit in WORDS and unit != "1"]
+        for unit in units:
+            with suppress(ModelError):
+                return float(given(place, found, unit))
+        usual = [name for unit in units for name in (unit, *USUAL[unit])]
+        known = f"; units are {', '.join(usual)}" if units else ", without a unit"
+        raise ModelError(f'{place}: found "{found}", expected {self._unit()}{known}')
 
     def _unit(self) -> str:
         return (

@@ -93,7 +93,7 @@ def test_empty_cells_are_nan_and_lines_before_the_names_are_passed_over(tmp_path
         ("q1,f1\n1,2\n", "found no columns of time"),
         ("t,q1\n0,1\n", "found no columns of forces; expected t,q1"),
         ("t,q1,Q1,f1\n0,1,2,3\n", "found q1 and Q1, expected one column for each"),
-        ("t,q1 [furlong],f1\n0,1,2\n", "found the unit furlong of q1, expected one of m, cm"),
+        ("t,q1 [furlong],f1\n0,1,2\n", "found the unit furlong of q1, expected one of m, mm, cm"),
         ("t,q1 [mm],f1 [N.m]\n0,1,2\n", "divide torques of motors"),
         ("t,q1,f1\n0,1,2\n0.1,a,2\n", "line 3, column q1: found 'a'"),
         ("t,q1,f1\n0,1,2\n0.1,2\n", "line 3 has 2 cells"),
