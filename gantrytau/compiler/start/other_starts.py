@@ -16,7 +16,7 @@ SAME = 1e-9  # relative, below which two starts of one symbol agree
 
 
 def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
-    """The same translation from other starts, name -> number, array, "40 deg", or name of a mode; the rest moves before them.
+    """The same translation from other starts, name -> number, array, "40 deg", or name of a mode; others move before.
 
     A start that is fixed in the model stays fixed, at its new value. Equations and states are those that the old start
     chose. Raises ModelError for names that are no variables and for wrong shapes, InitializationError where no
