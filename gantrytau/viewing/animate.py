@@ -57,7 +57,7 @@ def animate(
     around: Sequence[Any] = (),
     model: Shown | None = None,
 ) -> "Page":
-    """A result of `simulate`, an optimum, or a plan of `plan_calibration` in motion; lists stand side by side, under `names`.
+    """A result of `simulate`, an optimum, or a plan of `plan_calibration` in motion; lists stand side by side under `names`.
 
     file: where the page is saved, too; speed: seconds of the motion in one second; around: obstacles and a workspace, as of
     `view`; model: whose motion it is, of a result that was read from a file. Actuator forces are arrows, the way of the tool
