@@ -71,6 +71,6 @@ def test_files_of_an_optimum(quarter, tmp_path):
 
 def test_guesses_of_another_kind_are_refused():
     with pytest.raises(
-        ModelError, match="guess shaft.phi: found '45 mm', a length, expected an angle in rad"
+        ModelError, match=r"guess shaft\.phi: found '45 mm', a length, expected an angle in rad"
     ):
         optimize(Quarter, elements=10, guess={"shaft.phi": "45 mm"})
