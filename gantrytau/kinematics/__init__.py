@@ -6,6 +6,7 @@ from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
 from gantrytau.kinematics.modes.assembly_study import AssemblyStudy, assembly_study
 from gantrytau.kinematics.rods.configurations import Configuration
+from gantrytau.kinematics.workspace.grid_spacing import grid_spacing
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
 from gantrytau.kinematics.workspace.pose_limits import Limits, examine
 from gantrytau.kinematics.workspace.workspace import Workspace, workspace
@@ -32,5 +33,6 @@ __all__ = [
     "assembly_study",
     "cart_joints",
     "examine",
+    "grid_spacing",
     "workspace",
 ]

@@ -45,7 +45,7 @@ SPELLING = Spelling(
         "device": "device",
     }
     | {"strokes": "limits.strokes", "facing": "device.facing"}
-    | {name: f"plan.{name}" for name in ("robots", "seed", "spacing", "margin", "home")}
+    | {name: f"plan.{name}" for name in ("robots", "seed", "spacing", "places", "margin", "home")}
     | {"folder": "--output"},
     exactly={
         "obstacles[": "limits.obstacles[",

@@ -95,6 +95,11 @@ class Cells:
         return self.box[:, 1] - self.box[:, 0]
 
     @property
+    def spacing(self) -> float:
+        """The longest side of a cell, in m; 0 for a single place."""
+        return float((self.extent / self.shape).max())
+
+    @property
     def dimensions(self) -> int:
         """3 for a solid, 2 for a slice."""
         return int((self.extent > 0).sum())

@@ -12,12 +12,14 @@ from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.kinematics.workspace.cells import Cells, axis_number, border
 from gantrytau.kinematics.workspace.figures import draw_layer, draw_solid
+from gantrytau.kinematics.workspace.grid_spacing import checked_places, settled_spacing
 from gantrytau.kinematics.workspace.pose_limits import Examiner, Limits
 from gantrytau.language.model import Model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+USUAL = 0.05  # m, of a cell
 _MOST = 20_000_000  # places, whose results fill a few GB
 
 
@@ -58,18 +60,20 @@ def workspace(
     robot: Model | Kinematics,
     limits: Limits | None = None,
     *,
-    spacing: float = 0.05,
+    spacing: float | None = None,
+    places: int | None = None,
     box: ArrayLike | None = None,
     R: ArrayLike | None = None,
     refine: int = 1,
 ) -> Workspace:
     """The workspace of a robot with one orientation of its plate.
 
-    robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; spacing: side of a cell at most, m; box:
-    (3, 2) of (least, largest) x, y, z in m, equal ones for a slice, or None for what strokes and links allow; R: (3, 3),
-    None for the orientation that the links give, for a robot with turntables that of its start; refine: cells on the
-    border are judged by that many places along each axis. Raises ModelError for a box, a spacing or a robot that does
-    not fit, and where neither strokes nor a box bound the workspace.
+    robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; spacing: side of a cell at most, m, 0.05 if
+    nothing is said; places: in place of it, about how many are to be inside, some per cent more or less; box: (3, 2) of
+    (least, largest) x, y, z in m, equal ones for a slice, or None for what strokes and links allow; R: (3, 3), None for
+    the orientation that the links give, for a robot with turntables that of its start; refine: cells on the border are
+    judged by that many places along each axis. Raises ModelError for a box, a spacing or a robot that does not fit, and
+    where neither strokes nor a box bound the workspace.
     """
     limits = limits or Limits()
     examiner = Examiner(robot, limits)
@@ -79,16 +83,20 @@ def workspace(
             f"{examiner.name}: found the box {shown(bounds if box is None else box)}, expected three finite "
             "pairs (least, largest) of x, y and z in m; give box=, or strokes of all carts in Limits"
         )
-    axes = _cells(examiner.name, bounds, spacing)
+    checked_places(places, spacing, examiner.name)
+    if places is not None:
+        spacing = settled_spacing(
+            places, bounds, lambda step: int(examiner(_grid(examiner.name, bounds, step)[0], R).inside.sum())
+        )
+    places_of_grid, axes = _grid(examiner.name, bounds, USUAL if spacing is None else spacing)
     if not (isinstance(refine, (int, np.integer)) and refine >= 1):
         raise ModelError(f"{examiner.name}: found refine={refine!r}, expected a whole number from 1")
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    examined = examiner(grid.reshape(-1, 3), R)
-    inside = examined.inside.reshape(grid.shape[:3])
+    examined = examiner(places_of_grid, R)
+    inside = examined.inside.reshape([len(axis) for axis in axes])
     fraction = inside.astype(float)
     if refine > 1:
         cut = border(inside)
-        fraction[cut] = _shares(examiner, grid[cut], bounds, inside.shape, R, refine)
+        fraction[cut] = _shares(examiner, places_of_grid[cut.ravel()], bounds, inside.shape, R, refine)
     x, y, z = axes
     return Workspace(
         name=examiner.name,
@@ -119,6 +127,12 @@ def _shares(
     spread = np.stack(np.meshgrid(*offsets, indexing="ij"), axis=-1).reshape(-1, 3)
     examined = examiner((middles[:, None] + spread).reshape(-1, 3), R)
     return examined.inside.reshape(len(middles), len(spread)).mean(axis=1)
+
+
+def _grid(name: str, box: np.ndarray, spacing: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Middles of all cells, (N, 3), the last coordinate varying fastest, and their coordinates along each axis."""
+    axes = _cells(name, box, spacing)
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3), axes
 
 
 def _cells(name: str, box: np.ndarray, spacing: float) -> list[np.ndarray]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.ensembles.each import each
-from gantrytau.kinematics import Limits
+from gantrytau.kinematics import Limits, workspace
+from gantrytau.kinematics.workspace.grid_spacing import checked_places
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
@@ -50,6 +51,7 @@ def plan_calibration(
     robots: int = 20,
     seed: int = 0,
     spacing: float | None = None,
+    places: int | None = None,
     margin: float = 0.002,
     home: Any = None,
     folder: str | Path | None = None,
@@ -69,9 +71,10 @@ def plan_calibration(
     the tool, m, that calibration must reach in the mean over the workspace; tape: standard deviation of joints and
     lengths, m; robots: how many with such errors are calibrated in simulation; they must be safe, and as many with twice
     these errors; seed: of all that is drawn; spacing: of the grid of the workspace, m, None refines it until it has
-    settled; margin: m (and rad) by which poses keep more than the limits ask, so that there are ways between them; home: q
-    (n,) where the program begins and ends, None for the start of the model. folder: keeps finished stages there, so that
-    the same call goes on after an interruption; stages whose questions changed are done anew. progress: called with
+    settled; places: in place of it, about how many places of the grid are to be inside; margin: m (and rad) by which poses
+    keep more than the limits ask, so that there are ways between them; home: q (n,) where the program begins and ends,
+    None for the start of the model. folder: keeps finished stages there, so that the same call goes on after an
+    interruption; stages whose questions changed are done anew. progress: called with
     (stage, done, of). Raises ModelError for what does not fit, where nothing is visible or safe, or home is in a collision.
     """
     _check_numbers(wanted=wanted, tape=tape, margin=margin, robots=robots)
@@ -93,7 +96,7 @@ def plan_calibration(
         robots=robots,
         seed=seed,
         margin=margin,
-        spacing=spacing,
+        spacing=_spacing(fleet, limits, spacing, places),
         home=start,
     )
     return _Procedure(fleet, limits, device, asked, Stages(path, progress)).plan()
@@ -249,6 +252,14 @@ def _check_numbers(*, wanted: Any, tape: Any, margin: Any, robots: Any) -> None:
             f"plan_calibration.robots: found {robots!r}, expected a whole number from 1; 20 are usual",
             argument="robots",
         )
+
+
+def _spacing(fleet: Fleet, limits: Limits, spacing: float | None, places: int | None) -> float | None:
+    """The spacing that is given, in m, or that of a grid with so many places in the workspace of the nominal robot."""
+    checked_places(places, spacing, "plan_calibration")
+    if places is None:
+        return spacing
+    return workspace(fleet.nominal.kinematics, limits, places=places).spacing
 
 
 def _check_kinds(limits: Any, device: Any) -> None:

@@ -49,6 +49,15 @@ def test_examples_are_cells(tmp_path, kind):
     assert f'"{cell.name}"' in cell_example(kind)
 
 
+def test_a_grid_may_be_given_by_its_places(tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text(small().replace("spacing = 0.25", "places = 300"))
+    assert read_cell(file).policy["places"] == 300
+    file.write_text(small().replace("spacing = 0.25", "places = 2.5"))
+    with pytest.raises(ModelError, match="places"):
+        read_cell(file)
+
+
 def test_the_robot_may_be_given(tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text(cell_example().replace('# "arms[0].length" = 2.061', '"arms[0].length" = "2061 mm"'))

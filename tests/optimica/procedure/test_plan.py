@@ -40,6 +40,11 @@ def test_the_verdict_is_the_error_of_the_tool(plan):
     np.testing.assert_array_equal(plan.q[0], plan.q[-1])
 
 
+def test_a_grid_of_so_many_places():
+    found = plan_calibration(*cells.l1(), poses=9, robots=1, tape=0.003, places=400)
+    assert len(found.workspace.r) == pytest.approx(400, rel=0.1)
+
+
 @pytest.mark.parametrize("cell", [cells.l1, cells.symmetric], ids=["l1", "symmetric"])
 def test_simulated_errors_are_those_predicted(cell):
     found = plan_calibration(*cell(), **varied(FEW, robots=14))

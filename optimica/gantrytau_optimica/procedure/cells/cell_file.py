@@ -28,6 +28,7 @@ PLAN = {
     "robots": Value("whole", least=1),
     "seed": Value("whole", least=0),
     "spacing": LENGTH,
+    "places": Value("whole", least=1),
     "margin": LENGTH,
     "home": Value("m,rad", ((None,),)),
 }

@@ -1,0 +1,105 @@
+"""How wide the cells of a grid are, of which so many fill a volume."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gantrytau.errors import ModelError
+from gantrytau.kinematics.poses import floats, real, shown
+from gantrytau.kinematics.workspace.cells import Cells
+
+CLOSE = 0.02  # of the number of places inside
+ROUNDS = 8  # of a guess, which the number of places inside corrects; whole cells leave a few per cent
+
+
+def grid_spacing(places: int, of: float | ArrayLike | Cells, *, dimensions: int | None = None) -> float:
+    """The side in m of equal cells of which a number fills a volume, an area or a length.
+
+        grid_spacing(1000, 2.0)                                   # 1000 cells in 2 m3
+        grid_spacing(1000, [[0, 1], [-1, 1], [0.5, 0.5]])         # in a box, here a slice
+        grid_spacing(20_000, workspace(robot, limits, spacing=0.2))       # in what is inside of it
+
+    of: a size, in m3, or in m2 with dimensions=2 and m with dimensions=1; a box (3, 2) of (least, largest) x, y, z, where
+    equal ones make a slice; or a workspace. Raises ModelError for a number below one and for what has no size.
+    """
+    count = _whole(places, "grid_spacing")
+    size, sides = _size(of)
+    if dimensions is not None and (
+        dimensions not in (1, 2, 3) or (sides is not None and sides != dimensions)
+    ):
+        raise ModelError(
+            f"grid_spacing: found dimensions={dimensions!r}, expected "
+            f"{'1, 2 or 3' if sides is None else f'{sides}, as it has, or nothing'}",
+            argument="dimensions",
+        )
+    return float((size / count) ** (1.0 / (sides or dimensions or 3)))
+
+
+def settled_spacing(places: int, box: np.ndarray, inside: Callable[[float], int]) -> float:
+    """A spacing in m of the grid in a box (3, 2) of which about so many places are inside.
+
+    inside: how many there are with a spacing. That of places that fill the box where no place is inside.
+    """
+    if not (box[:, 1] > box[:, 0]).any():
+        return 1.0  # a single place, whatever the spacing
+    step = best = grid_spacing(places, box)
+    dimensions, gap = int((box[:, 1] > box[:, 0]).sum()), np.inf
+    for _ in range(ROUNDS):
+        found = inside(step)
+        if found == 0:
+            step /= 1.5
+            continue
+        miss = float(np.log(found / places))
+        if abs(miss) < gap:
+            best, gap = step, abs(miss)
+        if gap < CLOSE:
+            break
+        step *= float(np.exp(miss / dimensions))
+    return best
+
+
+def _whole(places: Any, where: str) -> int:
+    if isinstance(places, bool) or not isinstance(places, (int, np.integer)) or places < 1:
+        raise ModelError(
+            f"{where}: found places={places!r}, expected a whole number from 1", argument="places"
+        )
+    return int(places)
+
+
+def checked_places(places: Any, spacing: Any, where: str) -> None:
+    """ModelError for a number of places that is none, or that stands beside a spacing."""
+    if places is None:
+        return
+    _whole(places, where)
+    if spacing is not None:
+        raise ModelError(
+            f"{where}: found both spacing={spacing!r} and places={places!r}, expected one of them; leave one out",
+            argument="places",
+        )
+
+
+def _size(of: Any) -> tuple[float, int | None]:
+    """A size, and of how many dimensions it is where that is known."""
+    if isinstance(of, Cells):
+        extent = of.extent[of.extent > 0]
+        size, sides = float(of.fraction.mean() * extent.prod()), len(extent)
+        words = f"a workspace of {of.name} with nothing inside"
+    else:
+        found = floats(of)
+        words = shown(of)
+        if found.shape == ():
+            size, sides = real(of), None
+        elif found.shape == (3, 2) and (found[:, 0] <= found[:, 1]).all():
+            extent = found[:, 1] - found[:, 0]
+            size, sides = float(extent[extent > 0].prod()), int((extent > 0).sum())
+        else:
+            size, sides = np.nan, None
+    if not 0 < size < np.inf or sides == 0:
+        raise ModelError(
+            f"grid_spacing: found {words}, expected a size above 0, a box of (least, largest) x, y and z in m, or a "
+            "workspace with something inside",
+            argument="of",
+        )
+    return size, sides
