@@ -7,6 +7,8 @@ from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.answers.linearization import Linearization, linearize
 from gantrytau.dae import Dae, translate
+from gantrytau.describing.describe import describe
+from gantrytau.describing.described import Description
 from gantrytau.ensembles.study import study
 from gantrytau.ensembles.study_record import Study
 from gantrytau.errors import (
@@ -89,6 +91,7 @@ __all__ = [
     "Connector",
     "Dae",
     "Declared",
+    "Description",
     "Diagnosis",
     "Discrete",
     "DoubtfulResult",
@@ -135,6 +138,7 @@ __all__ = [
     "cross",
     "delay",
     "der",
+    "describe",
     "did_you_mean",
     "dot",
     "exp",

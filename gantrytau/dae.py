@@ -8,6 +8,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from gantrytau.answers.causality import function
+from gantrytau.answers.described_dae import dae_described
 from gantrytau.answers.diagnosis import Diagnosis, diagnose
 from gantrytau.answers.evaluation import evaluate
 from gantrytau.answers.instant_function import instant_function, is_before
@@ -16,6 +17,7 @@ from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.system import Causality, System, assemble
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
+from gantrytau.describing.described import Description
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatModel
@@ -31,6 +33,12 @@ class Dae(Translated):
     def of(cls, translated: Translated) -> "Dae":
         """The face of a translated model."""
         return cls(**{f.name: getattr(translated, f.name) for f in fields(Translated)})
+
+    def __describe__(self, name: str = "") -> Description:
+        return dae_described(self, name)
+
+    def _repr_html_(self) -> str:
+        return self.__describe__().html()
 
     @cached_property
     def diagnosis(self) -> Diagnosis:

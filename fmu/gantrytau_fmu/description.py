@@ -11,13 +11,15 @@ from functools import cached_property
 from math import prod
 from typing import Literal
 
+from gantrytau.describing.record import Record
+
 Interfaces = Literal["model-exchange", "co-simulation"]
 Value = float | int | bool | str | tuple[float | int | bool | str, ...]
 C_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 @dataclass(frozen=True)
-class FmuVariable:
+class FmuVariable(Record):
     """A variable of an FMU, with what its declared type adds; causality, variability, initial: in the standard's words.
 
     name: in the structured naming convention; reference: its value reference; start: None if it has none, a tuple for
@@ -67,7 +69,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class ModelStructure:
+class ModelStructure(Record):
     """What is to be computed, and of what; indicators: names of event indicators, None in FMI 2, which counts them."""
 
     outputs: tuple[Unknown, ...] = ()
@@ -77,7 +79,7 @@ class ModelStructure:
 
 
 @dataclass(frozen=True)
-class FmuInterface:
+class FmuInterface(Record):
     """A way to run an FMU: kind, the identifier in the names of its binaries, and its capabilities by name.
 
     Directional derivatives of FMI 3 stand under its name and under that of FMI 2, so that one name is there for both.
@@ -100,7 +102,7 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class FmuTerminal:
+class FmuTerminal(Record):
     """Variables that belong together, by the name that each has in the terminal; inner ones are `name.inner`."""
 
     name: str
@@ -110,7 +112,7 @@ class FmuTerminal:
 
 
 @dataclass(frozen=True)
-class AboutFmu:
+class AboutFmu(Record):
     """What people say of an FMU: what it is, who made it, whose it is, on which terms, and which version this is."""
 
     description: str = ""

@@ -10,6 +10,7 @@ from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
+from gantrytau.describing.record import Record
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel, Loop, When
@@ -30,7 +31,7 @@ class Moved:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Record):
     """What translation found out: sizes, loops, states and their conditioning, blocks, the start.
 
     mobility: number of ways in which the positions can change; redundant: equations that repeat others;

@@ -13,6 +13,7 @@ import numpy as np
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.start.consistency import newton
 from gantrytau.compiler.translated import Translated
+from gantrytau.describing.record import Record
 from gantrytau.language.symbols import split_derivative
 
 GUESSES = 40  # first guesses per block that has to be iterated
@@ -22,7 +23,7 @@ MOST = 24  # unknowns of a block that is searched
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Record):
     """A group of unknowns with several solutions: what was taken, and what else there is, by name.
 
     The search from random guesses may miss some.

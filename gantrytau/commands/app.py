@@ -14,7 +14,7 @@ from gantrytau.commands.equations_command import equations
 from gantrytau.commands.estimate.estimate_command import estimate
 from gantrytau.commands.identify.identify_command import identify
 from gantrytau.commands.learn.learn_command import learn
-from gantrytau.commands.library_command import library
+from gantrytau.commands.library_command import describe, library
 from gantrytau.commands.linearize_command import linearize
 from gantrytau.commands.optimize_command import optimize
 from gantrytau.commands.pareto_command import pareto
@@ -83,6 +83,7 @@ app.command(epilog="Example: gantrytau view 'GantryTau(L1)' --pose 'tool.r=[0.5,
     view
 )
 app.command(epilog="Example: gantrytau library --json")(library)
+app.command(epilog="Example: gantrytau describe Revolute")(describe)
 app.add_typer(fmu.app, name="fmu")
 app.add_typer(controller.app, name="controller")
 app.add_typer(vision.app, name="vision")

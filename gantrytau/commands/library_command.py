@@ -1,16 +1,19 @@
-"""`gantrytau library`: models, components and prototypes by name, each with a line of explanation."""
+"""`gantrytau library` and `describe`: models, components and prototypes by name, and all that is said of one of them."""
 
 import importlib
 import pkgutil
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from gantrytau import Declared
+from gantrytau import describe as described
 from gantrytau.commands.arguments import model_choice
+from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.loading import similar
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import as_json
+from gantrytau.commands.printing.reporting import CommandError, as_json, reporting
 
 
 def library(json: Json = False) -> None:
@@ -31,11 +34,54 @@ def library(json: Json = False) -> None:
     _show("Prototypes (gantrytau_models.prototypes), for --prototype", held["prototypes"])
 
 
+def describe(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="WHAT",
+            help="a component or a model of the library, as Revolute; one of your own, as robot.py:Robot; with values, as "
+            "'GantryTau(L1)'.",
+        ),
+    ],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME", help="of a part or a quantity in it, as tool.r; without it, all of it."
+        ),
+    ] = "",
+    json: Json = False,
+) -> None:
+    """Tell what a component or a model is: its parameters, connectors, variables and components, with units."""
+    with reporting(json, source_of(what)):
+        said = described(_found(what), name)
+        typer.echo(as_json(said.as_mapping()) if json else str(said))
+
+
+def _found(what: str) -> Any:
+    """The class of a name of the library, or a model as other commands take it."""
+    known = {name: cls for classes in component_classes().values() for name, cls in classes.items()}
+    known |= model_choice.library()
+    last = what.rpartition(".")[2] if what.startswith("gantrytau") else what
+    if last in known:
+        return known[last]
+    if last.isidentifier():
+        raise CommandError(
+            f"{what}: the library has nothing of this name{similar(what, known)}\n`gantrytau library` lists what it holds; "
+            "a model of your own is named by its file, as robot.py:Robot"
+        )
+    return model_choice.build(what).model
+
+
 def components() -> dict[str, dict[str, str]]:
     """Module of gantrytau.mechanics, and the packages of one list -> class -> first line of its docstring."""
+    return {module: _explained(classes) for module, classes in component_classes().items()}
+
+
+def component_classes() -> dict[str, dict[str, type]]:
+    """Module of gantrytau.mechanics, and the packages of one list -> its components by name."""
     from gantrytau import blocks, electrical, mechanics
 
-    found: dict[str, dict[str, str]] = {}
+    found: dict[str, dict[str, type]] = {}
     below = [info.name for info in pkgutil.iter_modules(mechanics.__path__, f"{mechanics.__name__}.")]
     for path in (*below, blocks.__name__, electrical.__name__):
         if path.rpartition(".")[2].startswith("_"):
@@ -47,7 +93,7 @@ def components() -> dict[str, dict[str, str]]:
             if isinstance(value, type) and issubclass(value, Declared) and _belongs(name, value, module)
         }
         if classes:
-            found[path] = _explained(classes)
+            found[path] = classes
     return found
 
 

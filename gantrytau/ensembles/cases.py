@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 
 SEED = "seed"  # the name of the axis of seeds
@@ -16,7 +17,7 @@ SAME = 1e-9  # relative: numbers that are closer are one value
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(Record):
     """One run of a study.
 
     number: from 0, seeds last and fastest; place: along each axis; chosen: name -> value; seed: None without seeds.
@@ -37,7 +38,7 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
-class FailedCase:
+class FailedCase(Record):
     """A case that has no result: its error in words, and the class of the error."""
 
     case: Case
@@ -49,7 +50,7 @@ class FailedCase:
 
 
 @dataclass(frozen=True, eq=False)
-class Axes:
+class Axes(Record):
     """What varies: name -> its values; combined as a grid, or value by value ("zip"); seeds, None without.
 
     labels: name -> its name as an axis, where that is another one: the start of x is "x.start".

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gantrytau.describing.record import Record
 from gantrytau.ensembles.cases import SEED, Axes, Case, FailedCase, equal, spoken
 from gantrytau.ensembles.fan import draw_fan
 from gantrytau.ensembles.labelled_array import labelled
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Study:
+class Study(Record):
     """All cases of a study and what came of them.
 
     title: of the model or function; axes: what varies; cases: in their order, the seed fastest; outcomes: by the number of

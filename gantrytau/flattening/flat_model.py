@@ -6,6 +6,7 @@ from functools import cached_property
 
 import casadi as ca
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.self_description.appearance import Shape
@@ -16,7 +17,7 @@ from gantrytau.language.units import per_second
 
 
 @dataclass(frozen=True, eq=False)
-class FlatVariable:
+class FlatVariable(Record):
     """A declared quantity, vectors whole.
 
     name: dotted path; shape: (), (n,) or (n, m); elements: names of its scalars, column after column;
@@ -159,7 +160,7 @@ class Delay:
 
 
 @dataclass(frozen=True, eq=False)
-class FlatModel:
+class FlatModel(Record):
     """A model written out: variables, parameters and scalar equations between their symbols.
 
     derivatives: symbols of derivatives by name, `der(x)`; propagated: quantities, such as orientations, that

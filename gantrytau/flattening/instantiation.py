@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate
+from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate, is_setting
 from gantrytau.language.events import CurrentMode, Mode, mode_number
 from gantrytau.language.model import (
     Connector,
@@ -18,7 +18,6 @@ from gantrytau.language.model import (
     Model,
     Outer,
     check_member,
-    is_setting,
     refuse_container,
 )
 from gantrytau.language.symbols import Symbols, element_names, time

@@ -15,6 +15,7 @@ import numpy as np
 
 from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
@@ -27,7 +28,7 @@ from gantrytau.language.model import Model
 FITS = 1e-6  # m by which links may miss their lengths at the start of a model
 
 
-class Kinematics:
+class Kinematics(Record):
     """Kinematics of a robot: a model instance, or what `translate` made of one.
 
     tool: name of the component whose `.r` (and `.R`) is the pose; joints: names of the actuator coordinates, by default

@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from gantrytau.describing.short_values import short
 from gantrytau.errors import ModelError
 
 Component = TypeVar("Component")
@@ -37,6 +38,10 @@ class Formula:
     def evaluate(self, scope: Any) -> Any:
         """The value of the formula where `scope` is the instance whose class body holds it."""
         return self._function(*(evaluate(argument, scope) for argument in self._arguments))
+
+    def parts(self) -> tuple[str, tuple[Any, ...]]:
+        """The name of its function, and to what it is applied."""
+        return getattr(self._function, "__name__", "a function"), self._arguments
 
     def __repr__(self) -> str:
         names = [getattr(one, "name", "") or repr(one) for one in self._arguments]
@@ -164,7 +169,23 @@ class Quantity(Formula):
         self.name = ""
         self.owner = ""
 
-    __repr__ = object.__repr__
+    def parts(self) -> tuple[str, tuple[Any, ...]]:
+        """Its name, applied to nothing."""
+        return self.name, ()
+
+    def __repr__(self) -> str:
+        """As it is declared, without what is left open: `Real(3, unit='m', description='position')`."""
+        shape = self.declared_shape
+        first = [short(shape)] if shape != () and not callable(shape) else []
+        return self._declared(first, ("unit", "start", "fixed", "min", "max", "nominal", "description"))
+
+    def _declared(self, first: list[str], names: tuple[str, ...]) -> str:
+        told = {name: getattr(self, name, None) for name in names}
+        wanted = {
+            k: v for k, v in told.items() if not (v is None or v is False or (isinstance(v, str) and not v))
+        }
+        spelled = [f"{name}={short(value)}" for name, value in wanted.items()]
+        return f"{type(self).__name__}({', '.join([*first, *spelled])})"
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name, self.owner = name, owner.__name__
@@ -237,6 +258,9 @@ class Discrete(Quantity):
         limits = dict(min=min, max=max, nominal=nominal)
         super().__init__(shape, unit=unit, display=display, description=description, start=start, **limits)
 
+    def __repr__(self) -> str:
+        return self._declared([short(self.start)], ("unit", "min", "max", "nominal", "description"))
+
 
 class Flow(Quantity):
     """A connector variable whose sum over a connection is zero: force, torque, current."""
@@ -291,6 +315,10 @@ class Parameter(Quantity):
         self.fold = evaluate
         self.assumed = assumed
 
+    def __repr__(self) -> str:
+        first = [] if self.value is None else [short(self.value)]
+        return self._declared(first, ("unit", "min", "max", "nominal", "description"))
+
 
 class Array(Generic[Component]):
     """Several components of a class: `Array(Cart, 3, m=2.0)`, `Array(Cart, [dict(m=1.0), dict(m=2.0)])`."""
@@ -302,6 +330,10 @@ class Array(Generic[Component]):
         self.elements = [
             component(**{**modifications, **one}) if isinstance(one, dict) else one for one in count
         ]
+
+    def __repr__(self) -> str:
+        name = getattr(self.component, "__name__", "a function")
+        return f"Array({name}, {len(self.elements)})"
 
     def __getitem__(self, index: int) -> Component:
         return self.elements[index]
@@ -321,6 +353,9 @@ class Start:
     def __init__(self, value: Any):
         self.value = value
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({short(self.value)})"
+
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
         return dict(start=self.value, fixed=self.fixed)
@@ -339,6 +374,14 @@ class Bounds:
         self.min = min
         self.max = max
 
+    def __repr__(self) -> str:
+        return f"Bounds({short(self.min)}, {short(self.max)})"
+
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
         return dict(min=self.min, max=self.max)
+
+
+def is_setting(value: Any, name: str) -> bool:
+    """Whether a class attribute is a plain constant that shapes the model, such as `order = 2`."""
+    return not name.startswith("_") and isinstance(value, (bool, int, float, str))

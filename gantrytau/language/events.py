@@ -165,6 +165,10 @@ class Mode(Discrete):
         self.names = names
         self.start = 0 if start is None else mode_number("Mode", names, start)
 
+    def __repr__(self) -> str:
+        start = f", start={self.names[self.start]!r}" if self.start else ""
+        return f"Mode({', '.join(map(repr, self.names))}{start}, description={self.description!r})"
+
 
 def mode_number(place: str, names: Sequence[str], start: Any) -> int:
     """The number of a mode by its name or as it is; ModelError for what is neither."""

@@ -8,8 +8,11 @@ import functools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self, TypeGuard
 
+from gantrytau.describing.described import Description
+from gantrytau.describing.short_values import LENGTH, WHOLE, joined, short
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.declarations import Array, Bounds, Quantity, Start
+from gantrytau.language.declarations import Array, Bounds, Fixed, Quantity, Start, is_setting
+from gantrytau.language.self_description.described_model import model_described
 
 
 class _Part:
@@ -68,6 +71,21 @@ class Declared(_Part):
     def chosen_starts(self) -> frozenset[str]:
         """Names of variables whose start values whoever uses the class said, not its author; `carts.s` are all of them."""
         return self._chosen_starts
+
+    def __repr__(self) -> str:
+        """As it is made: `Cart(m=2.0, s=Start(0.5))`."""
+        given = (f"{name}={_written(value)}" for name, value in vars(self).get("_modifications", {}).items())
+        return f"{type(self).__name__}({joined(given, WHOLE)})"
+
+    def _repr_html_(self) -> str:
+        return self.__describe__().html()
+
+    def __describe__(self, name: str = "") -> Description:
+        return model_described(self, name)
+
+    @classmethod
+    def __describe_class__(cls, name: str = "") -> Description:
+        return model_described(cls, name)
 
     @classmethod
     def open(cls, **modifications: Any) -> Self:
@@ -199,6 +217,17 @@ def _attributes(value: Any) -> Any:
     return value
 
 
+def _written(value: Any) -> str:
+    """A modification as it is written, in few letters."""
+    if isinstance(value, Mapping) and value.keys() <= {"start", "fixed"} and "start" in value:
+        return repr((Fixed if value.get("fixed") else Start)(value["start"]))
+    if isinstance(value, Mapping) and value.keys() <= {"min", "max"}:
+        return repr(Bounds(**value))
+    if isinstance(value, Mapping):
+        return f"dict({joined((f'{name}={_written(one)}' for name, one in value.items()), LENGTH)})"
+    return short(value)
+
+
 def _elementwise(value: Any) -> TypeGuard[list[Any]]:
     return isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value)
 
@@ -214,8 +243,3 @@ def check_member(cls: type[Any], name: str, path: str) -> None:
         return found.words() if isinstance(found, Quantity) else type(found).__name__
 
     raise ModelError(f"{path} has no '{name}'{did_you_mean(name, members, describe)}")
-
-
-def is_setting(value: Any, name: str) -> bool:
-    """Whether a class attribute is a plain constant that shapes the model, such as `order = 2`."""
-    return not name.startswith("_") and isinstance(value, (bool, int, float, str))

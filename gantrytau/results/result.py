@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gantrytau.describing.described import Description
+from gantrytau.results.described_result import series_described
 from gantrytau.results.display_units import Display
 from gantrytau.results.figures import draw
 from gantrytau.results.files import dataset, save
@@ -16,6 +18,12 @@ if TYPE_CHECKING:
 
 class Result(Series):
     """The variables of a model at the output times of a simulation or an optimum, see `Series`, with figures and files."""
+
+    def __describe__(self, name: str = "") -> Description:
+        return series_described(self, name)
+
+    def _repr_html_(self) -> str:
+        return self.__describe__().html()
 
     def plot(
         self, *names: str, file: str | os.PathLike[str] | None = None, display: Display = None

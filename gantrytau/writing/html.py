@@ -6,11 +6,11 @@ from html import escape
 import casadi as ca
 
 from gantrytau.compiler.translated import Translated
+from gantrytau.describing.pages import folded, page, table
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 from gantrytau.writing.mathml import MathSyntax, equality, html_name
-from gantrytau.writing.pages import folded, page, table
 from gantrytau.writing.sections import Section, sections
 from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.text import PlainSyntax, event_lines, plain_number

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, SolveError
+from gantrytau.describing.record import Record
 from gantrytau.flattening.shapes import elements_of
 from gantrytau.language.scales import given
 from gantrytau_optimica.answers.optimum import Optimum
@@ -59,7 +60,7 @@ REMEDIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class Prepared(Record):
     """A problem ready to be solved, again and again. build_time: s."""
 
     built: Built

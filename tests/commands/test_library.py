@@ -62,3 +62,22 @@ def test_brackets_in_the_help_are_not_taken_for_markup(run):
 def test_names_are_separated_by_commas_outside_of_brackets():
     assert listed(["a, b", "R[0,1],der(tool.r[2])", " "]) == ("a", "b", "R[0,1]", "der(tool.r[2])")
     assert listed(None) == ()
+
+
+def test_components_and_models_are_described(run, answer):
+    said = run("describe", "Revolute").stdout
+    assert "A joint that turns about an axis" in said
+    assert "angle from frame_a to frame_b about n" in said
+    assert answer("describe", "gantrytau.mechanics.multibody.Revolute")["title"] == "Revolute"
+    (mass, *_) = answer("describe", "GantryTau(L1)")["Parameters"]
+    assert (mass["name"], float(mass["value"])) == ("plate_mass", prototypes.L1.plate_mass)
+    assert answer("describe", "GantryTau(D1)", "tool.r")["Attributes"][1] == {"name": "unit", "value": "m"}
+
+
+def test_models_of_a_file_are_described(answer, robots):
+    assert answer("describe", f"{robots}:Runaway")["title"] == "Runaway"
+
+
+def test_what_is_not_there_is_not_described(fails):
+    assert "the library has nothing of this name; did you mean 'Revolute'?" in fails(2, "describe", "Revolut")
+    assert "GantryTau has no 'tol'; did you mean 'tool'" in fails(1, "describe", "GantryTau(L1)", "tol.r")

@@ -2,7 +2,7 @@
 
 from html.parser import HTMLParser
 
-from gantrytau.writing.pages import folded, page, table, verdict
+from gantrytau.describing.pages import folded, page, table, verdict
 
 
 class Tags(HTMLParser):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.units import dimension
 
@@ -53,7 +54,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Declaration:
+class Declaration(Record):
     """Channels in their order: what a vector of values (n,) means. Empty where nothing is exchanged.
 
     Raises ModelError for a name that stands twice, and for more than 4096 numbers.

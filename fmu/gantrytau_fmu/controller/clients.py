@@ -7,11 +7,12 @@ is not newer than k - 1, so that what a client makes of sample k acts in sample 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from gantrytau.describing.record import Record
 from gantrytau_fmu.controller.channels import Declaration, Values
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(Record):
     """Values that belong together.
 
     k: number of the sample, from 0; of an answer that of the sample it answers. time: k periods, in ns.

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, SolveError, in_words
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 
 
 @dataclass(frozen=True)
-class ExternalKinematics:
+class ExternalKinematics(Record):
     """Where the axes have to be for a pose: `function(pose) -> axes`, or `(axes, status)`.
 
     poses: channels that references of the controller have in place of those of the axes; function: takes their numbers

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.controller.channels import Declaration, Values
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
@@ -20,7 +21,7 @@ from gantrytau_fmu.controller.stepped_part import SteppedPart
 
 
 @dataclass(frozen=True)
-class AxisLimits:
+class AxisLimits(Record):
     """Limits of the references of an input: numbers, or one for each of its axes.
 
     minimum, maximum: in the unit of the input, None for those that the plant declares; speed: of change, in this unit per

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.results.result import Result
 from gantrytau_fmu.controller.channels import Values
 
@@ -30,7 +31,7 @@ class ClientCounts:
 
 
 @dataclass(frozen=True, eq=False)
-class Timing:
+class Timing(Record):
     """Of a run. lateness: s by which each sample began late, (samples,), empty with a virtual clock, which is never late;
     missed: samples that began a period late or more; limited, refused, unreachable: samples in which references met a
     limit, were not finite, or were out of reach of the kinematics; wall: s that the run took.

@@ -9,7 +9,7 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from itertools import groupby
 
-from gantrytau.writing.pages import folded, page, table
+from gantrytau.describing.pages import folded, page, table
 from gantrytau_fmu.describing.description_checks import initial_of, limit
 from gantrytau_fmu.describing.license import BSD_3_CLAUSE
 from gantrytau_fmu.describing.xml_text import plain

@@ -4,11 +4,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from gantrytau.describing.record import Record
+
 Severity = Literal["error", "warning", "note"]
 
 
 @dataclass(frozen=True)
-class FmuFinding:
+class FmuFinding(Record):
     """Something that a check found: an "error", a "warning" (it may work elsewhere) or a "note"; path: of what file."""
 
     severity: Severity

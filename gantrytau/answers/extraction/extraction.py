@@ -26,6 +26,7 @@ from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Cut, Strata
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat, translate_model
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
@@ -42,7 +43,7 @@ Sections = tuple[tuple[str, tuple[str, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism:
+class Mechanism(Record):
     """M1 T'' + M2 q'' + G + bias = J^-T f, with constraints g(T, q) = 0 and q' = J^-1 T'; prints itself.
 
     tool, joints, forces: scalar names, n each, in the order of T, q and f. The functions are CasADi's, vectors (n,), SI:

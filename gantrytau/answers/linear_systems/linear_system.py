@@ -17,6 +17,7 @@ from gantrytau.answers.linear_systems.poles_and_zeros import (
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
 from gantrytau.answers.linear_systems.system_files import record, save_system
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ LOST = 1e-6  # of the largest element, by which a system may differ when it is s
 ROUNDING = 1e-12  # relative: eigenvalues that are off the real axis by less are real
 
 
-class LinearSystem:
+class LinearSystem(Record):
     """x' = A x + B u, y = C x + D u; with a period x[k + 1] = A x[k] + B u[k], y[k] = C x[k] + D u[k].
 
     A (n, n), B (n, m), C (k, n), D (k, m); period: s, None for a continuous system. states, inputs, outputs: names of the
@@ -42,6 +43,11 @@ class LinearSystem:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     units: Mapping[str, str]
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
+        kind = "" if self.period is None else f", a sample each {self.period:g} s"
+        return f"<{type(self).__name__} {self.title}: {sizes}{kind}>"
 
     @property
     def title(self) -> str:

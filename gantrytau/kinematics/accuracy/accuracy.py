@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
@@ -36,7 +37,7 @@ _PASSES = 20  # three suffice where the links are not in one plane
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class Accuracy(Record):
     """Errors of the tool in N poses. Rows are NaN where the tool is out of reach; where links are so nearly in one plane
     that errors pull them apart, corners are NaN and error and bound infinite.
 

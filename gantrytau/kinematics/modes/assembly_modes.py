@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.modes.hexapod_checks import checked_hexapod, specialities
 from gantrytau.kinematics.modes.link_crossings import PAIRS, link_geometry, sides, signs
 from gantrytau.kinematics.modes.study_coordinates import pose
@@ -20,7 +21,7 @@ REAL_SINGULAR = 1e-5  # the same of singular modes, which are known less well
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblyModes:
+class AssemblyModes(Record):
     """The modes of a hexapod: real ones first, those of one group together; complex ones in conjugate pairs.
 
     r: (k, 3), position of the platform, in m; R: (k, 3, 3), its rotation; complex both, real ones without

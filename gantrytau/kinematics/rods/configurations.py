@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.modes.assembly_modes import assembly_modes
 from gantrytau.kinematics.poses import Poses, answered
@@ -19,7 +20,7 @@ SIDES = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
 
 
 @dataclass(frozen=True, eq=False)
-class Configuration:
+class Configuration(Record):
     """One solution: q (N, n), r (N, 3), R (N, 3, 3) and feasible (N,), or one pose without the first axis.
 
     feasible: it exists, within the bounds that the model declares, and no two links cross.

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import about, cross, of_quaternion
 from gantrytau.language.self_description.rods import Rods
 
 
 @dataclass(frozen=True, eq=False)
-class TurntableFrame:
+class TurntableFrame(Record):
     """A turntable on an arm: its place and orientation in what carries it, its axis in its own frame."""
 
     arm: int
@@ -27,7 +28,7 @@ class TurntableFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class RodGeometry:
+class RodGeometry(Record):
     """Where guideways, turntables and joints are.
 
     names: of the actuator coordinates, carts first, then turntables, a column of q each; offset, direction: (arms, 3), carts

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.modes.link_crossings import crossings
 from gantrytau.kinematics.rods.closed_form import (
@@ -25,7 +26,7 @@ NO_TURN = 1e-9  # of an element of R - I that a plate without rotation may be as
 
 
 @dataclass(frozen=True, eq=False)
-class Home:
+class Home(Record):
     """A pose on the branch that the robot is meant to work on: q (n,), r (3,), R (3, 3)."""
 
     q: np.ndarray
@@ -34,7 +35,7 @@ class Home:
 
 
 @dataclass(frozen=True, eq=False)
-class RodRobot:
+class RodRobot(Record):
     """What all of them have.
 
     home: a pose of the branch; tolerance: m by which a link may miss its length where an orientation is given to a robot

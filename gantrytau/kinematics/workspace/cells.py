@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import real
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Limits
@@ -14,7 +15,7 @@ from gantrytau.language.self_description.appearance import Cloud, Shape
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(Record):
     """Places of the tool on a grid, x, y, z: the middles of its cells in m; box: (3, 2) in m, which the cells fill.
 
     examined: all places, the last coordinate varying fastest, and what they leave of the limits; fraction: how much of

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.language.self_description.appearance import Ball, Cuboid, Shape, Stick
@@ -31,7 +32,7 @@ class Obstacle(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class Box(Record):
     """A box between two corners, low and high, (3,) in m; R (3, 3) turns it about its centre."""
 
     low: Any
@@ -105,7 +106,7 @@ def _deepest(at: np.ndarray, way: np.ndarray, half: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder:
+class Cylinder(Record):
     """A cylinder with flat ends: its axis from start to end, (3,) in m, and its radius in m."""
 
     start: Any
@@ -142,7 +143,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, eq=False)
-class Capsule:
+class Capsule(Record):
     """All points within a radius of the segment from start to end, (3,) in m; a sphere where these are the same."""
 
     start: Any

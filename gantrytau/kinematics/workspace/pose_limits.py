@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, real, shown
@@ -23,7 +24,7 @@ _BLOCK = 1024  # poses, whose links and their distances stay in the cache
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Limits:
+class Limits(Record):
     """What a robot may do. Lengths in m, angles in rad; what is not said is not limited.
 
     strokes: (n, 2), least and largest actuator coordinates; (2,) for all carts alike; (3, 2) for the carts of a robot
@@ -74,7 +75,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Examined:
+class Examined(Record):
     """N poses and what each leaves of the limits, less the margins for safety; negative where a limit is broken.
 
     r (N, 3) in m, R (N, 3, 3), q (N, n). reason: (N,), the first limit that is broken as a number of REASONS, 0 for

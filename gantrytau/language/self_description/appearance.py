@@ -17,13 +17,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 
 Value = str | float | Sequence[float | str] | np.ndarray
 
 
 @dataclass(frozen=True)
-class Shape:
+class Shape(Record):
     """Something to be seen. Its fields that are texts are names of quantities, lengths in m.
 
     owner: path of the component that it belongs to, from the one that says it; it turns red while that is at a limit.

@@ -17,6 +17,7 @@ from dataclasses import dataclass, fields
 from types import FunctionType
 from typing import Any
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 
 
@@ -53,7 +54,7 @@ class RodTurntable:
 
 
 @dataclass(frozen=True)
-class RodArm:
+class RodArm(Record):
     """An arm: its path; the driven coordinate of its cart; its guideway, cart = offset + s direction; its rods, and the
     turntables that carry them, from the cart outwards.
     """
@@ -71,7 +72,7 @@ class RodArm:
 
 
 @dataclass(frozen=True)
-class Rods:
+class Rods(Record):
     """The arms of a robot. given: parameters that follow by convention, which no calibration looks for."""
 
     arms: Sequence[RodArm]

@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.describing.described import Description
+from gantrytau.describing.record import Record
 from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.display_units import Display
+from gantrytau_optimica.answers.described_answer import answer_described
 
 Signal = Callable[[Any], np.ndarray]
 
 
-class Answer(ABC):
+class Answer(Record, ABC):
     """`answer["robot.tool.r"]` is a variable over `time`, free numbers are floats, vectors of them arrays.
 
     A kind of answer says what stands below, and gives names, values and labels of its variables.
@@ -52,6 +55,11 @@ class Answer(ABC):
     @abstractmethod
     def _rows(self, names: Sequence[str], path: str) -> Callable[[np.ndarray], np.ndarray]:
         """Scalars of a phase as a function of times (n,): (names, n). Raises ModelError for what is not known."""
+
+    @property
+    def labels(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
+        """Units and descriptions by name; a name that is left out has none."""
+        return self._labels()
 
     @property
     def shapes(self) -> Sequence[Shape]:
@@ -147,6 +155,9 @@ class Answer(ABC):
         size = sum(phase.time.size for phase in self.phases.values())
         kind = type(self).__name__
         return f"<{kind} {self.name}: {self.status}, objective {self.objective:.8g}, {size} times>"
+
+    def __describe__(self, name: str = "") -> Description:
+        return answer_described(self, name)
 
     def __contains__(self, name: object) -> bool:
         return name in self.free or any(name in result for result in self.by_phase.values())

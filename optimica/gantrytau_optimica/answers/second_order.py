@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.failures.row_meanings import Meanings
 from gantrytau_optimica.solving.curvature import FLAT, least_curvature
@@ -18,7 +19,7 @@ Verdict = Literal["minimum", "flat", "saddle", "not known"]
 
 
 @dataclass(frozen=True)
-class SecondOrder:
+class SecondOrder(Record):
     """Whether a stationary answer is a minimum, along all motions that conditions and binding limits leave free.
 
     verdict: "minimum", "flat" where some motions leave the objective as it is, "saddle" where it falls to both sides, or

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Samples
+from gantrytau.describing.record import Record
 from gantrytau_optimica.problem.optimization import Free, Optimization
 
 EXPECTED = 0.01  # of the spread of the data: their noise, until the fit tells it
@@ -15,7 +16,7 @@ SPREAD = 1e-9  # of the largest value: what does not spread more is constant
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class Experiment(Record):
     """One experiment; names are those of the model.
 
     measured: name -> Samples or (times, values); a static model takes values (n,) without times as well, one row each.

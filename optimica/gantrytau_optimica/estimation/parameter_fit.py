@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, told_twice
@@ -24,7 +25,7 @@ ENDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class ParameterFit:
+class ParameterFit(Record):
     """`fit.parameters["k"]` is a float in the model's unit.
 
     parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;

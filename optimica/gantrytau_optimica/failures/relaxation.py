@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.failures.elastic import Elastic, Soft, soft_conditions
@@ -37,7 +38,7 @@ class Concession:
 
 
 @dataclass(frozen=True, eq=False)
-class Relaxed:
+class Relaxed(Record):
     """What would have to give: ways, each of conditions that yield together, fewest conditions first.
 
     found: whether there is an answer; ways is empty where all conditions can be met together. solution: the unknowns of

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.paths.points import words
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ HERMITE = np.linalg.inv(
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewisePolynomial:
+class PiecewisePolynomial(Record):
     """Polynomials over the arc length: place = sum of coefficients[i, j] * (s - knots[i])**j on piece i.
 
     knots: (n + 1,) in m, from 0; coefficients: (n, degree + 1, d).

@@ -25,6 +25,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
+from gantrytau.describing.record import Record
 from gantrytau.language.declarations import Formula
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.paths.fitting import (
@@ -62,7 +63,7 @@ ACCURACY = 1e-7  # m: how far the pieces may be from the curve they stand for
 
 
 @dataclass(frozen=True)
-class Corner:
+class Corner(Record):
     """A corner that was rounded. row: of the points given; point: (d,) in m; angle: by which the way turns, in rad;
     s: where the path passes it, in m; distance: of the path from the corner, in m.
     """
@@ -75,7 +76,7 @@ class Corner:
 
 
 @dataclass(frozen=True)
-class Deviation:
+class Deviation(Record):
     """How far a recording is from its path. largest, rms: distance in m; row: of the point that is the furthest
     off; noise: standard deviation of a coordinate as differences of successive points show it, in m; left_out: rows
     of single points that are far from their neighbours, not followed and not counted.
@@ -89,7 +90,7 @@ class Deviation:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(Record):
     """A place over the arc length in m: call it with a number -> (d,), an array (k,) -> (k, d), or a symbol -> (d, 1).
 
     Made by `line`, `through`, `polyline`, `of` and `recorded`. pieces: polynomials of degree five, with continuous

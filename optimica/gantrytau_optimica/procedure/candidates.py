@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import turned
 from gantrytau.kinematics.workspace.pose_limits import REASONS
 from gantrytau_optimica.calibration.devices.devices import Device
@@ -20,7 +21,7 @@ DECIMALS_M, DECIMALS_DEG = 7, 5  # what a program commands: 0.1 um and 1e-5 degr
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(Record):
     """Poses that were tried, by their actuator coordinates q (N, n), with nominal r (N, 3), R (N, 3, 3).
 
     reason: (N,) the first limit that some robot breaks, a number of REASONS; seen: (N,) whether the device sees the

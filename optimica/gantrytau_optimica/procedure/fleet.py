@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics, Limits
 from gantrytau.kinematics.rods.rod_robots import SixRods, ThreeRods, TurningRods
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Examiner
@@ -74,7 +75,7 @@ class Member:
 
 
 @dataclass(frozen=True, eq=False)
-class Fleet:
+class Fleet(Record):
     """The nominal robot and those that differ from it by errors of a tape measure.
 
     robot: as measured by tape; members: nominal first, then those with the tape error; wider: those with more of it.

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import Finding
@@ -39,7 +40,7 @@ Frame = Literal["fitted", "base"]
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredPlan:
+class MeasuredPlan(Record):
     """Measurements of a plan, made ready for `calibrate`.
 
     measurements: in the frame of the plan, without rows that were left empty; rows: the measured poses of the plan that they

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
@@ -21,7 +22,7 @@ CRITERION = (
 
 
 @dataclass(frozen=True, eq=False)
-class PoseChoice:
+class PoseChoice(Record):
     """Chosen rows of the candidates (n,), and what they promise.
 
     position: expected standard deviations of the tool over the workspace, (k,) in m; angle: the same in rad; noise,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.calibration.trust.calibration_verdict import um
@@ -22,7 +23,7 @@ DOUBT = 0.05  # of 95 % confidence
 
 
 @dataclass(frozen=True, eq=False)
-class PlanBasis:
+class PlanBasis(Record):
     """What a plan was made from and its file does not hold: robots, limits, device, candidates."""
 
     fleet: Fleet
@@ -32,7 +33,7 @@ class PlanBasis:
 
 
 @dataclass(frozen=True, eq=False)
-class PosePlan:
+class PosePlan(Record):
     """Poses to measure and what to expect of them; lengths in m, angles in rad.
 
     q (k, n), r (k, 3), R (k, 3, 3): the program, from home to home, and where the nominal robot then is; measured (k,):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.data.measurements import Measurements
@@ -40,7 +41,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Trials:
+class Trials(Record):
     """All simulated robots, arrays (k,) in m as in `Trial`, NaN where a calibration failed.
 
     averaged: the error after a calibration with 25 readings of each pose averaged: what no patience of the device removes;

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits, Workspace, workspace
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.fleet import Fleet
@@ -16,7 +17,7 @@ MOST = {"three links": 300_000, "six links": 200_000, "turntables": 120_000}  # 
 
 
 @dataclass(frozen=True, eq=False)
-class SettledWorkspace:
+class SettledWorkspace(Record):
     """The workspace of the nominal robot: volume and its uncertainty in m3, on a grid of `spacing` (m).
 
     visible: volume of that part in which the device sees the target, m3; settled: whether a finer grid would hardly change

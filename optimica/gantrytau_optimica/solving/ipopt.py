@@ -8,6 +8,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.solving.attended import Watch, attended
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.transcription.program import Program, first_guess
@@ -69,7 +70,7 @@ FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by acci
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Record):
     """Unknowns w and multipliers as Ipopt left them; status in words; times in s.
 
     upright: whether its last steps were made without regularisation, so that curvature was positive in all directions

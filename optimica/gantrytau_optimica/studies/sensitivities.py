@@ -10,6 +10,7 @@ import numpy as np
 
 from gantrytau import ModelError, heeding_interrupts
 from gantrytau.compiler.request import names
+from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.boundary_arcs import with_free_ends
 from gantrytau_optimica.studies.held_parameters import holding
@@ -20,7 +21,7 @@ PREDICTED = "predicted to first order, not solved"
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Record):
     """Derivatives of an optimum with respect to `parameters` (scalar names), with the limits that bind now.
 
     slopes: of the program's unknowns; one column per parameter.

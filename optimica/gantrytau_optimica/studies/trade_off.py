@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.figures import draw, write
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class TradeOff:
+class TradeOff(Record):
     """Optima along a weight. `points` are those found, in the order of `weights` (n,); ["quantity"] is (n,).
 
     failures: what was said for a weight without optimum; findings: points that are local minima only, and steps of the

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import read_toml
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import UP
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.calibration.devices.devices import numbers
@@ -26,7 +27,7 @@ KEYS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(Record):
     """A camera of which only the images are known: not where it stands, but what it makes of directions.
 
     K: ((f_x, 0, c_x), (0, f_y, c_y), (0, 0, 1)) in pixels, the middle of the first pixel at (0, 0); distortion: k1, k2,

@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
@@ -39,7 +40,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Rehearsal:
+class Rehearsal(Record):
     """What a simulated robot before cameras came to.
 
     images: where they are; detections, poses: what was found in them; measured: poses beside the true ones; calibration,

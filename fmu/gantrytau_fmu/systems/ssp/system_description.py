@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
 from gantrytau_fmu.reading.fmu_file import SHOWN
@@ -32,7 +33,7 @@ class SystemPart:
 
 
 @dataclass(frozen=True)
-class SystemDescription:
+class SystemDescription(Record):
     """A system as `read_system` finds it; prints itself.
 
     wires: (output, input), factor and offset on the way left out; unconnected: inputs that nothing drives and no

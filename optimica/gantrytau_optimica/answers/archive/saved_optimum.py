@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Dae, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.answer import Answer
@@ -25,7 +26,7 @@ class MissingGuess(UserWarning):
 
 
 @dataclass(frozen=True, eq=False)
-class SavedPhase:
+class SavedPhase(Record):
     """One phase: `signals` are its states, algebraics and inputs, polynomials of the elements.
 
     time: (times,) in s, the start, all collocation points and the end; borders: of elements, shares of the horizon;

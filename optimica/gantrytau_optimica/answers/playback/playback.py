@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result, heeding_interrupts
+from gantrytau.describing.record import Record
 from gantrytau.simulation.to_result import displays, labels
 from gantrytau_optimica.answers.playback.ranges import FLAT, condition_sizes, magnitude, measured
 from gantrytau_optimica.answers.playback.replay import Replayed, replay
@@ -46,7 +47,7 @@ class Defect:
 
 
 @dataclass(frozen=True, eq=False)
-class Playback:
+class Playback(Record):
     """What happens if the inputs of an optimum drive the model.
 
     phases: states and algebraics integrated anew, by name; violations: all limits along the motion, the worst first;

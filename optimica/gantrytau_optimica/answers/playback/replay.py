@@ -13,6 +13,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
@@ -24,7 +25,7 @@ PLACES = 0.5 - 0.5 * np.cos(
 
 
 @dataclass(frozen=True, eq=False)
-class Replayed:
+class Replayed(Record):
     """States and algebraics of one phase, pieces one after another.
 
     pieces (n, 2): begin and end in s; x (n, 17, nx), z (n, 17, nz) at Chebyshev places of each piece; local (n, nx):

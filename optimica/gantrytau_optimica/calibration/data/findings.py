@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gantrytau import GantryTauError
+from gantrytau.describing.record import Record
 
 SHOWN = 8  # rows, or ranges of them, that a message lists
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Record):
     """Something noticed: kind, such as "duplicates" or "millimetres"; rows from 0; a sentence."""
 
     kind: str

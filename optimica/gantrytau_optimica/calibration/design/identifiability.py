@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gantrytau import Model, ModelError, StructureError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_factors import (
     NOISE,
@@ -39,7 +40,7 @@ class PoseArrays(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ArmIdentifiability:
+class ArmIdentifiability(Record):
     """What poses say about the parameters of one arm.
 
     name: its path; names: of its unknowns; count: how many; rank: directions that the poses determine at all;
@@ -107,7 +108,7 @@ class ArmIdentifiability:
 
 
 @dataclass(frozen=True, eq=False)
-class Identifiability:
+class Identifiability(Record):
     """What measured poses say about a robot: `arms[i]`; prints itself."""
 
     arms: tuple[ArmIdentifiability, ...]

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.design.identifiability import (
     NOTHING,
     PoseArrays,
@@ -39,7 +40,7 @@ ENOUGH = 1.05  # of the fewest poses
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(Record):
     """The error of the tool that is to be expected after a calibration, at poses.
 
     position: standard deviation of its distance from where the robot believes it to be, (N,) in m; angle: the same of its

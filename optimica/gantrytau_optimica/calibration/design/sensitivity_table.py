@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
@@ -24,7 +25,7 @@ STEP = 5e-5  # m, or without unit: that of Table 5.10
 
 
 @dataclass(frozen=True, eq=False)
-class SensitivityTable:
+class SensitivityTable(Record):
     """Sums over poses and both signs of a step of each parameter; prints itself as a table.
 
     names: of the parameters; position: (p,) in m; angle: (p,) in rad, zero where the plate cannot turn; cost: (p,) in m4;

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.devices import Array, checked_rotation, numbers
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
 
@@ -16,7 +17,7 @@ TOLD = 1e-6  # of the squares of what is felt: less across the main direction do
 
 
 @dataclass(frozen=True, eq=False)
-class Accelerometer:
+class Accelerometer(Record):
     """Three axes on a plate that does not turn: they feel R^T (a - g), filtered, with noise, up to a range.
 
     acceleration: its name in the result, a vector in m/s2 without gravity, in the world; R: axes in the world, (3, 3);

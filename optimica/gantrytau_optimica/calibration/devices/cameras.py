@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import skewed, turned
 from gantrytau_optimica.calibration.devices.devices import (
     Array,
@@ -34,7 +35,7 @@ STRAIGHT_AHEAD = 1e-3  # m, points nearer to the plane of the lens or behind it 
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(Record):
     """A pinhole camera with lens distortion.
 
     r: centre of projection in the world, (3,) in m; R: its axes in the world, x to the right, y down, z ahead. focal:

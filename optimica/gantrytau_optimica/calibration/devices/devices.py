@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rotations import skewed, turned
 from gantrytau.kinematics.workspace.obstacles import Obstacle
@@ -22,7 +23,7 @@ ORTHONORMAL = 1e-6  # what rounding to six decimals leaves of a rotation matrix
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredPoses:
+class MeasuredPoses(Record):
     """What a device read at N poses; rows that it did not see are NaN.
 
     r: positions (N, 3) in m, or None if the device finds none; R: orientations (N, 3, 3), or None; readings: (N, k) as
@@ -40,7 +41,7 @@ class MeasuredPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class Device:
+class Device(Record):
     """Base of all devices: where it stands, what it looks at, what stands in between.
 
     r: place in the world, (3,) in m; R: its axes in the world, (3, 3). target: what is measured, in the frame of the

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
@@ -44,7 +45,7 @@ class Readings(Result):
 
 
 @dataclass(frozen=True, eq=False)
-class SampledDevice:
+class SampledDevice(Record):
     """A device such as LaserTracker, TMac or LengthGauge that reads a motion again and again.
 
     device: what reads; position: name of the watched point in the result, a vector in m; orientation: name of its axes in

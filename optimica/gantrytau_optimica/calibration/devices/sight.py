@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.workspace.obstacles import Obstacle, between_segments, segment_distance
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Bars:
+class Bars(Record):
     """Round bars that move with the robot, such as its links: they hide what is behind them.
 
     start, end: (N, k, 3) in m, world, one row for each pose; (k, 3) for bars that stand still. radius: m.

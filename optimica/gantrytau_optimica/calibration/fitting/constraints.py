@@ -14,13 +14,14 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 
 AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
 
 
 @dataclass(frozen=True)
-class ParameterConstraint:
+class ParameterConstraint(Record):
     """low <= sum of squares, or value less other value, of numbers <= high. places: of the numbers; others: of those that
     are taken from them, or none; squared: whether of squares.
     """

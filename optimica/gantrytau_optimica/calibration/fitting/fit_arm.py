@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance
 from gantrytau_optimica.calibration.fitting.rod_fit import (
     Fit,
@@ -22,7 +23,7 @@ from gantrytau_optimica.calibration.rods.groups import TAPE
 
 
 @dataclass(frozen=True, eq=False)
-class ArmFit:
+class ArmFit(Record):
     """The arm as it was fitted.
 
     arm: with its new values; iterations: steps taken; success: whether they converged; residuals: closure errors

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
+
 ITERATIONS = 60
 NEGLIGIBLE = 1e-9  # m, of a step: it is still taken, and what is left after it is less by far
 UNSEEN = (
@@ -19,7 +21,7 @@ TALL = 4  # times as many rows as columns
 
 
 @dataclass(frozen=True)
-class Minimum:
+class Minimum(Record):
     """Where Gauss-Newton ended.
 
     x: all numbers; errors: (m,) there; slopes: (m, n) for the free numbers by their scale; rank: how many directions were

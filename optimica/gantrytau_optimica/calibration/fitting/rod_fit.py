@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum
 from gantrytau_optimica.calibration.fitting.least_squares import Problem, Taped, minimise, problem
@@ -20,7 +21,7 @@ HUBER, TUKEY = 1.345, 4.685  # of the standard deviation, 95 % efficient for nor
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Record):
     """A group at its minimum. smallest: singular value below which directions were left alone; weights (N,) or None."""
 
     group: Group

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau import GantryTauError, Model
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, miss, trimmed_motion
@@ -18,7 +19,7 @@ FEWEST = 4  # poses that nominal kinematics must reach
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Record):
     """From the frame of measurements to the base of the robot: base = rotation @ measured + translation, m.
 
     placed: whether measurements were moved so before they were fitted: then identified numbers are in the base, else in the

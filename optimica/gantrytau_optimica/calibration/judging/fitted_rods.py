@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
@@ -34,7 +35,7 @@ from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 
 
 @dataclass(frozen=True, eq=False)
-class FittedRods:
+class FittedRods(Record):
     """Rods of a robot at their minima.
 
     nominal_rods: the robot as it was given; model, method, loss, orientation: as they were asked for; fits: links that share

@@ -12,12 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 
 @dataclass(frozen=True, eq=False)
-class LinkSystem:
+class LinkSystem(Record):
     """m links that share numbers, at N poses.
 
     errors: closure errors, (N, m) in m; numbers: their derivatives by the combinations of numbers that data hold and by

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.fitting.named_parameters import calibrated_arms, rod_links
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, fit_group, not_held
@@ -29,7 +30,7 @@ LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
 
 
 @dataclass(frozen=True)
-class Suspicion:
+class Suspicion(Record):
     """rows: those that close too badly; misses: how links identified without them close; typical: robust standard
     deviation of the closure errors of the others, of the worst link, m.
     """

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import Model
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_selection import predict
 from gantrytau_optimica.calibration.rods.arm_closure import Orientation, read_arms
@@ -31,7 +32,7 @@ class Loose:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolError:
+class ToolError(Record):
     """The error of the tool to be expected, (N,) in m at each place, and what poses do not hold, the worst first."""
 
     position: np.ndarray

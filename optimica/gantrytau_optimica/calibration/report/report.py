@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
@@ -36,7 +37,7 @@ LISTED = 2000  # poses, of more the worst
 
 
 @dataclass(frozen=True, eq=False)
-class About:
+class About(Record):
     """What a report says beside the calibration itself, as far as that is known.
 
     robot: its name with its prototype; facts: in words by heading, such as goal and device; good, verdict: whether it is

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.writing.pages import folded, page, table, verdict
+from gantrytau.describing.pages import folded, page, table, verdict
 
 STYLE = """
 .matrix { overflow-x: auto; } .matrix td { font-size: .7rem; padding-right: .4rem; }

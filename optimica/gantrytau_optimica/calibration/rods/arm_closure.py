@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import about, cross, skewed
 from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
@@ -25,7 +26,7 @@ ORIENTATIONS = ("local", "unit", "free")
 
 
 @dataclass(frozen=True, eq=False)
-class ArmClosure:
+class ArmClosure(Record):
     """The geometry of one arm, and which of it is unknown.
 
     said: its parameters by name; cart: the column of its cart in q; columns: those of its turntables;

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import left_jacobian
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 
@@ -64,7 +65,7 @@ class ArmOverPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmLink:
+class ArmLink(Record):
     """Link number j of an arm over poses, as `Chain` says; its errors are in m."""
 
     poses: ArmOverPoses

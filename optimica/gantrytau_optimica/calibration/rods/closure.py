@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import left_jacobian, of_vector, told_vector
 from gantrytau_optimica.calibration.rods.guideway_points import between
 
@@ -25,7 +26,7 @@ LENGTH, OFFSET, ALONG, PLATE = slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 1
 
 
 @dataclass(frozen=True)
-class Chain:
+class Chain(Record):
     """One link over the measured poses: q (N,), r (N, 3), R (N, 3, 3) or None; a guideway's points at q (N, 3) or None.
 
     name: of the link; cart: the column of its cart; rail: points (k, 4) of a measured guideway, turned: the rotation (3, 3)

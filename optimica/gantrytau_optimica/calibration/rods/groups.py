@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.rods.arm_links import ArmLink, ArmOverPoses
 from gantrytau_optimica.calibration.rods.closure import Chain
 
@@ -12,7 +13,7 @@ TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measu
 
 
 @dataclass(frozen=True)
-class Group:
+class Group(Record):
     """Links and where in the vector x of the group their numbers stand.
 
     x: start values (n,); names: of the numbers, (n,); free: which of them are identified; scale: what of each number moves

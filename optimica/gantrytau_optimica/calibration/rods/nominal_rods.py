@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, flatten
 from gantrytau.compiler.parameters import parameter_table
+from gantrytau.describing.record import Record
 from gantrytau.flattening.instantiation import instantiate
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod, rods_of
 
@@ -16,7 +17,7 @@ _PARTS = re.compile(r"(\w+)|\[(\d+)\]")
 
 
 @dataclass(frozen=True)
-class NominalRods:
+class NominalRods(Record):
     """A robot, what it says of its rods, and the values of their parameters by name, numbers and vectors."""
 
     robot: Model

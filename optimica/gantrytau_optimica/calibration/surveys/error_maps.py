@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import vectors
 from gantrytau_optimica.calibration.data.findings import CalibrationError
@@ -26,7 +27,7 @@ BLOCK = 4096  # poses at once
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorMap:
+class ErrorMap(Record):
     """Error vectors over the workspace: r (N, 3) and errors (N, 3) in m."""
 
     r: Array

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, rows_in_words
 
@@ -28,7 +29,7 @@ SCALE = 0.05  # a guideway that measures another length by more than this is wor
 
 
 @dataclass(frozen=True, eq=False)
-class Basis:
+class Basis(Record):
     """Columns of the fit: splines over knots, then backlash if there is one, then waves of the pitch."""
 
     knots: Array

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.surveys.guideway_fit import (
@@ -39,7 +40,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Cyclic:
+class Cyclic(Record):
     """What repeats with the pitch (m): amplitude * cos(2 pi harmonic q / pitch - phase).
 
     amplitude, its standard error amplitude_error (m) and phase (rad): (harmonics, d), columns as of `Linearity.error`.
@@ -52,7 +53,7 @@ class Cyclic:
 
 
 @dataclass(frozen=True, eq=False)
-class Linearity:
+class Linearity(Record):
     """A guideway as measured. d is 3, or 1 if only lengths along it were measured. Lengths in m.
 
     q (N,); rising (N,): 1 where the cart came with rising q, -1 with falling, 0 unknown; start (d,), direction (d,):

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from gantrytau import Model
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses, vectors
@@ -45,7 +46,7 @@ SURE = 0.01  # probability of chance, below which guideways are held to have a p
 
 
 @dataclass(frozen=True, eq=False)
-class Causes:
+class Causes(Record):
     """What turns the plate: rotation vectors in the world in rad, (N, 3), without their means; their sum is the whole.
 
     links: what constant errors of links and joints explain; guideways: what they cannot, and errors that change along the
@@ -101,7 +102,7 @@ class Causes:
 
 
 @dataclass(frozen=True, eq=False)
-class OrientationErrors:
+class OrientationErrors(Record):
     """Orientations over the workspace against a reference.
 
     r (N, 3) in m; R (N, 3, 3); reference (3, 3): their mean, or as given; turns (N, 3): rotation vectors from the

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from gantrytau import GantryTauError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
@@ -27,7 +28,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, eq=False)
-class CalibrationVerdict(Verdict):
+class CalibrationVerdict(Record, Verdict):
     """Of a measured calibration.
 
     validation_error: mean error of poses that were not fitted, m, NaN where there are none; expected_error: of the tool, in

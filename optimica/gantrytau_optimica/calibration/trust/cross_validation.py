@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError
@@ -13,7 +14,7 @@ from gantrytau_optimica.calibration.data.measurements import Measurements
 
 
 @dataclass(frozen=True, eq=False)
-class CrossValidation:
+class CrossValidation(Record):
     """A calibration, and how far poses lie from where fits without them expect them.
 
     calibration: with all that was fitted; errors: distances by row of the measurements, (N,) in m, NaN where a row was

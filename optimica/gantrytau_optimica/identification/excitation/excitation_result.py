@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError, Samples
+from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.excitation.fourier_series import FourierSeries
 from gantrytau_optimica.identification.excitation.motion_regressor import MotionRegressor
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -16,7 +17,7 @@ STEP = 0.1  # s between two targets of a program
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Excitation:
+class Excitation(Record):
     """A motion of a robot of n actuators, in N rows over time.
 
     log: time, positions, speeds and forces of the actuators as the model foretells them, and the tool; series: of the

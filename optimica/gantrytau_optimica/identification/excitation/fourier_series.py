@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
+
 
 @dataclass(frozen=True, eq=False)
-class FourierSeries:
+class FourierSeries(Record):
     """Series of m coordinates; coefficients (m, 2 H + 1): r_0, a_1 .. a_H, b_1 .. b_H in m; period in s."""
 
     coefficients: np.ndarray

@@ -15,6 +15,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.dae import Dae
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.identification.friction.carried_mass import PLATE, driven_coordinates
 
@@ -23,7 +24,7 @@ FRICTION = re.compile(r"\.((?:f|tau)_[cvs])(\[\d+\])?$")
 
 
 @dataclass(frozen=True, eq=False)
-class MotionRegressor:
+class MotionRegressor(Record):
     """function: motion (3 m,) to q (n,), q', q'', f (n,) of the nominal model and Y (n, k).
 
     names: parameters, k; nominal: their values in the model; actuators, coordinates: scalar names, n.

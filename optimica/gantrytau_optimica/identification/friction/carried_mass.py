@@ -15,6 +15,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, translate
 from gantrytau.dae import Dae
+from gantrytau.describing.record import Record
 
 PLATE = ("plate_mass", "platform.m", "tool.m")  # what robots call it
 NO_LOAD = re.compile(
@@ -23,7 +24,7 @@ NO_LOAD = re.compile(
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedMass:
+class CarriedMass(Record):
     """Forces at constant speeds as known + mass * slope.
 
     name: of the robot's class; coordinates, actuators: scalar names, n each; nominal: mass of the plate in kg.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -17,7 +18,7 @@ ROWS = 100  # of a run, at which the weight is looked up
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantRuns:
+class ConstantRuns(Record):
     """Means of R runs, (R, n) each.
 
     runs: their numbers, (R,); q, v, f: positions, speeds and forces; slope, known: forces of 1 kg at the tool and of all

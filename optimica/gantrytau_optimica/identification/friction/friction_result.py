@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Friction:
+class Friction(Record):
     """Friction of n actuators and the mass that they carry.
 
     mass: in kg, of the plate with half of its links; deviation 0 where it was given. coulomb, viscous: (n, 2) in N and kg/s

@@ -10,6 +10,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, Result, translate
 from gantrytau.dae import Dae
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
@@ -18,7 +19,7 @@ from gantrytau_optimica.identification.logs.log_files import lines_of, read_log,
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotionLog:
+class MotionLog(Record):
     """Measured motion of a robot of n actuators, in N rows over time.
 
     t: time (N,) in s; q: actuator positions (N, n) in m, or rad of turning actuators; f: actuator forces (N, n) in N, or

@@ -8,13 +8,14 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.state_space import StateSpace
+from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.physical.vibration_modes import Modes, modes_of, without_damping
 
 DEFINITE = 1e-12  # of the largest eigenvalue, above which the smallest is above zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MechanicalForm:
+class MechanicalForm(Record):
     """M z'' + D z' + K z = f, z = (M s^2 + D s + K)^-1 f: M in kg, D in kg/s, K in N/m, (n, n) each.
 
     Numbers do for n = 1. Raises ModelError for matrices that do not fit together, are not finite, or an M without inverse.

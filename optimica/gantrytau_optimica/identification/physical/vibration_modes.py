@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.describing.record import Record
+
 REAL = 1e-9  # of the size of a pole, to which one is taken as real
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Record):
     """Modes, the slowest first: one for each pair of poles, one for each real pole.
 
     poles: s in 1/s, (k,) complex with imaginary parts of at least zero; shapes: motion of the n coordinates, (n, k)

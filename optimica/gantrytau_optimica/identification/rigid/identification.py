@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
-from gantrytau.writing.pages import page, table
+from gantrytau.describing.pages import page, table
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 from gantrytau_optimica.identification.rigid.robot_dynamics import expanded
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Record):
     """Identified parameters of a robot of rigid bodies.
 
     parameters: masses in kg, `coulomb[i]` in N, `viscous[i]` in kg/s, by public name; residuals: what is left of the

@@ -8,13 +8,14 @@ import numpy as np
 
 from gantrytau import Model, ModelError, translate
 from gantrytau.dae import Dae
+from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.identify import identify
 
 
 @dataclass(frozen=True, eq=False)
-class ModelComparison:
+class ModelComparison(Record):
     """Fits by the name of their model; prints itself as a table, with numbers of others in brackets.
 
     beside: by model and name such numbers, sums of squares as "total" in N2.

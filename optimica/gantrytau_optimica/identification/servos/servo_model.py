@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.state_space import StateSpace
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.identification.servos.figures import draw_steps
 from gantrytau_optimica.identification.servos.servo_fit import corner, response
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ServoModel:
+class ServoModel(Record):
     """Servos of n actuators, q_m = q^-d b / (1 - a q^-1) q_r from sample to sample, (6.11).
 
     delay: d in samples, (n,) of whole numbers; pole: a, (n,); gain: b, (n,); fit: % of the motion that is explained, (n,);

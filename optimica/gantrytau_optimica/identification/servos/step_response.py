@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import rows_in_words
 
 EVEN = 0.01  # of the period, by which times of samples may be off
@@ -14,7 +15,7 @@ LEAST = 8  # samples from the first change of a reference on, which two paramete
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepResponse:
+class StepResponse(Record):
     """References and positions of n actuators, sampled in N rows: a step, or any other motion from rest.
 
     t: time (N,) in s, evenly spaced; reference, position: (N, n) in m, or rad of turning actuators; (N,) of one actuator.

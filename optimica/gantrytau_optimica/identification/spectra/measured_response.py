@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import check_period
+from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
 SHORTEST = 16  # samples of a block
@@ -20,7 +21,7 @@ QUIET = 1e-14  # of the largest power of the inputs, below which there is none
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasuredResponse:
+class MeasuredResponse(Record):
     """Response (k, m, F) complex of k outputs to m inputs at frequencies hertz (F,), without 0.
 
     coherence: share of the power of each output that the inputs explain, (k, F) from 0 to 1; deviation: standard deviation

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.cases.rig_file import CaseOfFile, RigFile
 from gantrytau_optimica.learning.design.design_q import design_q
 from gantrytau_optimica.learning.estimators.estimator import Estimator
@@ -26,7 +27,7 @@ SETTLED = 5  # runs, after which errors are averaged in Table 7.2
 
 
 @dataclass(frozen=True)
-class LearntCases:
+class LearntCases(Record):
     """Histories by the names of cases. As a text: sigma, and errors of the tool in % of the first run."""
 
     histories: dict[str, History] = field(default_factory=dict)

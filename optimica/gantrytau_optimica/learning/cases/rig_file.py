@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, did_you_mean, read_toml
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.rig import Rig
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
@@ -128,7 +129,7 @@ class CaseOfFile:
 
 
 @dataclass(frozen=True)
-class RigFile:
+class RigFile(Record):
     """What a file says: a plant, made when it is asked for, a motion, what is learnt of it, and ways to learn."""
 
     file: Path

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.pose_maps import PoseMap
 
@@ -24,7 +25,7 @@ MOVING = 0.015  # m/s2, rms of slow accelerations by which an accelerometer can 
 LIKE = 2.0  # times more or less than kinematics, by which slow accelerations may be read
 
 
-class Estimator:
+class Estimator(Record):
     """What is learnt from. joints: positions of the actuators, else of the tool.
 
     reads: what is needed of a run, of "q", measured positions of the actuators, "z", forward kinematics of these, "a",

@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class BiquadSection:
 
 
 @dataclass(frozen=True)
-class ZeroPhase:
+class ZeroPhase(Record):
     """A zero-phase filter for each axis, or one for all: sections of the causal half by axis."""
 
     axes: tuple[tuple[BiquadSection, ...], ...]

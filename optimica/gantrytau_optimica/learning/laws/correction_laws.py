@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, lifted, norm
 
 
@@ -42,7 +43,7 @@ class Shifted:
 
 
 @dataclass(frozen=True, eq=False)
-class Gradient:
+class Gradient(Record):
     """Down the slope of the squared error by the response of a model: gains below 2 are safe, small answers slow."""
 
     response: Response | None = None  # measured by `learn` if None
@@ -54,7 +55,7 @@ class Gradient:
 
 
 @dataclass(frozen=True, eq=False)
-class NormOptimal:
+class NormOptimal(Record):
     """The correction of least error and effort by the response of a model; weight: of effort, relative."""
 
     response: Response | None = None  # measured by `learn` if None

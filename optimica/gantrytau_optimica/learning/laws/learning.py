@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 from gantrytau_optimica.learning.laws.correction_laws import CorrectionLaw, Gradient, NormOptimal, Shifted
@@ -31,7 +32,7 @@ GROWN = 10.0  # times, from which learning is said to diverge: a path that is le
 
 
 @dataclass(frozen=True, eq=False)
-class Stability:
+class Stability(Record):
     """What a learning law does to corrections from run to run.
 
     sigma: largest singular value of M with all axes coupled; diagonal: that of each axis alone, (m,); parts: M, or one
@@ -80,7 +81,7 @@ class Stability:
 
 
 @dataclass(frozen=True)
-class Learning:
+class Learning(Record):
     """A learning law for runs of N samples with m axes.
 
     gain, shift: L takes the error `shift` samples later, times gain, (7.10); law: another L, such as Gradient or

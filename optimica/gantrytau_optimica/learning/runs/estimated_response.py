@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError, Result, prbs
+from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
 from gantrytau_optimica.learning.estimators.estimator import Estimator
@@ -28,7 +29,7 @@ FAIR = 50.0  # % of what is measured, that a response must foretell
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(Record):
     """What an estimator makes of all that it reads. widths: columns by letter; picked: those of the estimate that count."""
 
     estimator: Estimator
@@ -44,7 +45,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EstimatedResponse:
+class EstimatedResponse(Record):
     """From corrections (N, m) to what is learnt from, F_u + F_y T_uy of Dressler (2012), (7.15).
 
     system: from corrections to all that the estimator reads, `delay` samples early; fit: of the estimate in the half of the

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.learning.laws.learning import Stability
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
@@ -22,7 +23,7 @@ ROWS = ("inputs", "q_ref", "q", "tool", "estimates")  # what is kept of each run
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class History:
+class History(Record):
     """Runs of a learning robot: K + 1 of them, N samples, n joints, m corrections.
 
     reference: of the tool; names: what is corrected, joints or axes of the tool; columns: these of the tool, none for

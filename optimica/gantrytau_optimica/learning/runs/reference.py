@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 
 STILL = 1e-9  # m, by which the first two samples may differ
 EVEN = 1e-6  # of the period, by which times may be off
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Reference:
+class Reference(Record):
     """Positions of the tool r (N, 3) in m at times t (N,) in s, evenly spaced, from rest.
 
     Raises ModelError for shapes that do not fit, what is not finite, uneven times, and a motion that does not begin at rest:

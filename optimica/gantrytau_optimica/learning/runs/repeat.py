@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.runs.corrections import Corrections
 from gantrytau_optimica.learning.runs.learn import RUNS, LearningError
@@ -17,7 +18,7 @@ from gantrytau_optimica.learning.servo_loop import unit_of
 
 
 @dataclass(frozen=True, eq=False)
-class Repetitions:
+class Repetitions(Record):
     """Runs of one motion. q: measured positions of the joints (K, N, n); error: reference less these in run 0, (N, n).
 
     full: the samples (N,) by which they are judged.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau import GantryTauError, Model, ModelError, did_you_mean, kinematics, read_toml, with_setting
+from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.cameras import single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import Device, LaserTracker, TMac
@@ -96,7 +97,7 @@ LIBRARY = "gantrytau_models"  # of models that a file names without their module
 
 
 @dataclass(frozen=True)
-class Cell:
+class Cell(Record):
     """What a cell file says; lengths in m, angles in rad.
 
     file: its path; name: of the robot, as the file names it, a model in a file by its full path; robot, limits, device:

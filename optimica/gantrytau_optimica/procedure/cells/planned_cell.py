@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, load_plan
 from gantrytau_optimica.procedure.cells.cell_file import Cell, Robot, read_cell
@@ -20,7 +21,7 @@ SAME = 1e-6  # m and rad, by which poses of the same plan may differ
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedCell:
+class PlannedCell(Record):
     """A cell, the plan that was made for it, and their folder."""
 
     cell: Cell

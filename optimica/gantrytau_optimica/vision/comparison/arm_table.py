@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.vision.comparison.compare import Comparison
 from gantrytau_optimica.vision.comparison.printed_tables import ARMS
@@ -16,7 +17,7 @@ PARTS = ("length", "offset", "direction")
 
 
 @dataclass(frozen=True, eq=False)
-class ArmTable:
+class ArmTable(Record):
     """Numbers of arms, (arms, 7): length in m, offset (3) in m, direction (3), one array for each name."""
 
     arms: Mapping[str, Array]

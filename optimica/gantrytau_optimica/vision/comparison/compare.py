@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.devices.devices import numbers
 from gantrytau_optimica.vision.opencv import VisionError
@@ -17,7 +18,7 @@ THIRD = 3  # of the places are the middle, as many the border
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Record):
     """How places miss those of a reference after the best motion.
 
     error: r moved less reference, (N, 3) in m in the axes of the reference, NaN where either is missing; reference: (N, 3)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.vision.boards import Pattern
@@ -29,7 +30,7 @@ LOST = {  # step -> what it says of an image that ended there, and what to do
 
 
 @dataclass(frozen=True, eq=False)
-class Detections:
+class Detections(Record):
     """Corners of a pattern in images of C cameras at N poses.
 
     corners: (C, N, P, 2) in pixels, in the order of `pattern.points`, NaN where missing; sigma: standard deviation of

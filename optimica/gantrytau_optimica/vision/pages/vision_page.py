@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.pages import page, table, verdict
 from gantrytau.whole_files import replacing
-from gantrytau.writing.pages import page, table, verdict
 from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.image_series import ImageSeries, image_series
 from gantrytau_optimica.vision.opencv import opencv

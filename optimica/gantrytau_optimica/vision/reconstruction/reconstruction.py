@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
@@ -17,7 +18,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Reconstruction:
+class Reconstruction(Record):
     """Poses of a pattern from images, in the axes of the first camera: x right, y down, z ahead.
 
     r: middle of the pattern, (N, 3) in m, NaN where it was not seen; R: its orientation, (N, 3, 3); covariance: of r after

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.vision.image_files import file_name, write_image, write_poses
 from gantrytau_optimica.vision.opencv import VisionError, opencv
@@ -20,7 +21,7 @@ GOOD = Light()
 
 
 @dataclass(frozen=True, eq=False)
-class Images:
+class Images(Record):
     """Images and the poses of the plate that they show.
 
     frames: one for each camera: arrays (N, height, width), or the folder of its files; r: (N, 3) in m; R: (N, 3, 3).

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
@@ -54,7 +55,7 @@ class Light:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Record):
     """A robot with a pattern on its tool, in front of a cluttered wall.
 
     pattern: what it carries; robot: a model that says of its links, or None for a pattern alone; place: middle of the

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector, turned
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.vision.boards import Pattern
@@ -27,7 +28,7 @@ UNKNOWN = 10.0  # m/s and rad/s, of a velocity before there is one
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class Tracked(Record):
     """Where a pattern is at one instant, filtered: r (3,) in m, R (3, 3), v (3,) in m/s, w (3,) in rad/s, in the world.
 
     seen: whether this image showed it, else it is where it was expected; deviation: of r, in m; searched: whether it was
@@ -44,7 +45,7 @@ class Tracked:
 
 
 @dataclass(eq=False)
-class PatternTracker:
+class PatternTracker(Record):
     """Follows a quincunx with cameras that are known.
 
         tracker = PatternTracker(Pattern.quincunx(0.06), found.cameras)

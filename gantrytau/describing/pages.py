@@ -15,6 +15,13 @@ summary { cursor: pointer; }
 .verdict { border-left: .5rem solid #3a3; padding: .2rem 1rem; background: #3a32; }
 .bad { border-color: #c33; background: #c332; }
 """
+PART = """
+.gantrytau :is(h4, p) { margin: .6rem 0 .2rem; }
+.gantrytau table { border-collapse: collapse; margin: .2rem 0; }
+.gantrytau :is(th, td) { text-align: left; vertical-align: top; padding: .1rem .9rem .1rem 0; }
+.gantrytau :is(td:first-child, pre) { font-family: ui-monospace, monospace; }
+.gantrytau pre { white-space: pre-wrap; }
+"""
 
 
 def page(title: str, parts: Iterable[str], style: str = "") -> str:
@@ -25,6 +32,12 @@ def page(title: str, parts: Iterable[str], style: str = "") -> str:
     )
     body = "\n".join(filter(None, parts))
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
+
+
+def fragment(parts: Iterable[str]) -> str:
+    """A part of somebody else's page, such as the output of a cell of a notebook, with the same tables."""
+    body = "\n".join(filter(None, parts))
+    return f'<div class="gantrytau"><style>{PART}</style>\n{body}\n</div>'
 
 
 def table(

@@ -1,0 +1,89 @@
+"""What is said of a translated model: its states, inputs and blocks, and all names with their numbers at the start."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gantrytau.compiler.translated import Translated
+from gantrytau.describing.described import Description, Listing
+from gantrytau.describing.short_values import array_words, number
+from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
+from gantrytau.language.symbols import split_derivative
+
+LONG = 6  # elements of a vector that is spoken
+
+
+def dae_described(dae: Translated, name: str = "") -> Description:
+    """What is said of a translated model, or of one variable or parameter; ModelError for a name that is not there."""
+    if name:
+        return _of_quantity(dae, name)
+    flat = dae.flat
+    facts = [
+        ("states", ", ".join(dae.states) or "none"),
+        ("inputs", ", ".join(dae.inputs) or "none"),
+        ("found by iteration", ", ".join(dae.algebraics) or "nothing, all blocks have closed forms"),
+    ]
+    columns, start = ("name", "value", "unit", "description"), _start(dae)
+    parameters = [_row(dae.parameter_values, p) for p in flat.parameters]
+    outputs = [_row(start, v) for v in flat.variables if v.kind == "output"]
+    variables = [_row(start, v) for v in flat.variables if v.kind != "output"]
+    heads = ("name", "start", "unit", "description")
+    tables = (
+        Listing.of("Parameters", columns, parameters),
+        Listing.of("Outputs", heads, outputs),
+        Listing.of("Variables", heads, variables),
+    )
+    kind = f"translated model, {len(dae.variables)} variables in {len(dae.blocks)} blocks"
+    return Description(dae.name, kind, "", tuple(facts), tables)
+
+
+def _row(values: Mapping[str, float], quantity: FlatVariable) -> tuple[str, ...]:
+    shape = f"[{', '.join(map(str, quantity.shape))}]" if quantity.shape else ""
+    unit = "" if quantity.unit in (None, "1") else str(quantity.unit)
+    return f"{quantity.name}{shape}", _words(_numbers(values, quantity)), unit, quantity.description
+
+
+def _numbers(values: Mapping[str, float], quantity: FlatVariable) -> np.ndarray:
+    """Values of a parameter, or of a variable at the start, in its shape; NaN where it has none."""
+    found = np.array([values.get(n, np.nan) for n in quantity.elements], dtype=float)
+    return found.reshape(quantity.shape, order="F")
+
+
+def _start(dae: Translated) -> dict[str, float]:
+    """Consistent values of the unknowns at the start, those of what equals them included; parameters are numbers."""
+    found = dict(dae.start)
+    for name in dae.variables:
+        alias = dae.root(name)
+        if alias is not None and alias.offset.is_constant() and (not alias.symbol or alias.symbol in found):
+            found[name] = float(alias.offset) + alias.factor * (found[alias.symbol] if alias.symbol else 0.0)
+    return found
+
+
+def _words(values: np.ndarray) -> str:
+    if np.all(np.isnan(values)) or values.size > LONG:
+        return ""
+    return array_words(values)
+
+
+def _of_quantity(dae: Translated, name: str) -> Description:
+    flat = dae.flat
+    flat.expand(name)  # an unknown name raises
+    base, order = split_derivative(name)
+    quantity = flat.vectors.get(base) or next(v for v in flat.vectors.values() if base in v.elements)
+    kind = "parameter" if isinstance(quantity, FlatParameter) else "variable"
+    facts = [("unit", quantity.unit or "1")]
+    if quantity.shape and base == quantity.name:
+        facts.append(("shape", str(quantity.shape)))
+    if order:
+        facts = [("derivative of", base)]
+    elements = [n for n in quantity.elements if base in (n, quantity.name)]
+    numbers = _start(dae) | dict(dae.parameter_values)
+    told = [number(numbers[n]) for n in elements if n in numbers]
+    if told and not order and len(told) <= LONG:
+        facts.append(("value" if kind == "parameter" else "start", ", ".join(told)))
+    for role, names in (("state", dae.states), ("input", dae.inputs), ("output", dae.outputs)):
+        if set(names) & ({name} if order else set(elements)):
+            facts.append(("role", role))
+    if quantity.owner:
+        facts.append(("of", quantity.owner))
+    return Description(name, f"{kind} of {dae.name}", quantity.description, tuple(facts))

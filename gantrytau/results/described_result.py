@@ -1,0 +1,79 @@
+"""What is said of signals over time: how long, why they end, and each by name, unit, first and last value, range."""
+
+import numpy as np
+
+from gantrytau.describing.described import Description, Listing
+from gantrytau.describing.short_values import array_words, number
+from gantrytau.language.symbols import split_derivative
+from gantrytau.results.series import Series
+
+
+def series_described(series: Series, name: str = "") -> Description:
+    """What is said of a result, or of one variable of it; ModelError for a name that is not there.
+
+    Vectors are one row: their values where they are short, else none.
+    """
+    time = series.time
+    span = f"{time.size} times from {number(time[0])} to {number(time[-1])} s"
+    if name:
+        values = series[name]
+        facts = (("unit", series.unit(name) or "1"), ("shape", str(values.shape)), *_extremes(series, name))
+        aliases = [n for n, to in series.aliases.items() if to.removeprefix("-") == name]
+        told = (*facts, ("equal or opposite", ", ".join(aliases))) if aliases else facts
+        return Description(name, f"variable of {series.title or 'a result'}", series.description(name), told)
+    elements = {str(element) for names in series.arrays.values() for element in names.flat}
+    shown = sorted(
+        (*series.arrays, *(n for n in series.names if n not in elements)),
+        key=_first_places(series).__getitem__,
+    )
+    rows = [_row(series, n) for n in shown if not split_derivative(n)[1]]
+    facts = (("time", span), ("ended", series.ended))
+    columns = ("name", "at the start", "at the end", "unit", "description")
+    kind = type(series).__name__
+    return Description(series.title or kind, kind, "", facts, (Listing.of("Variables", columns, rows),))
+
+
+def _first_places(series: Series) -> dict[str, int]:
+    """Where each name first stands in the order of the scalars."""
+    places = {name: k for k, name in enumerate(series.names)}
+    return places | {name: places[str(names.flat[0])] for name, names in series.arrays.items()}
+
+
+def _row(series: Series, name: str) -> tuple[str, ...]:
+    shape = series.arrays[name].shape if name in series.arrays else ()
+    told = f"{name}[{', '.join(map(str, shape))}]" if shape else name
+    return told, *_ends(series, name), _plain(series.unit(name)), series.description(name)
+
+
+def _ends(series: Series, name: str) -> tuple[str, str]:
+    values = series[name]
+    if name in series.modes:
+        words = series.mode(name)
+        return str(words[0]), str(words[-1])
+    return _spoken(values[0]), _spoken(values[-1])
+
+
+def _spoken(value: np.ndarray) -> str:
+    return array_words(np.round(np.asarray(value, dtype=float), 9)) if np.size(value) <= 3 else ""
+
+
+def _plain(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _extremes(series: Series, name: str) -> tuple[tuple[str, str], ...]:
+    """Least and greatest value with their times, of a scalar; how many are missing."""
+    values = series[name]
+    if values.ndim > 1:
+        return ()
+    missing = np.count_nonzero(~np.isfinite(values))
+    lost = (("not finite", f"at {missing} of {values.size} times"),) if missing else ()
+    if missing == values.size:
+        return lost
+    low, high = np.nanargmin(values), np.nanargmax(values)
+    unit = _plain(series.unit(name))
+
+    def at(k: np.intp) -> str:
+        return f"{values[k]:.6g} {unit}".rstrip() + f" at {number(series.time[k])} s"
+
+    return ("least", at(low)), ("greatest", at(high)), *lost
