@@ -11,6 +11,7 @@ from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.symbols import split_derivative
 
 LONG = 6  # elements of a vector that is spoken
+ROUNDED = 12  # digits behind the point: what is smaller is rounding
 
 
 def dae_described(dae: Translated, name: str = "") -> Description:
@@ -25,8 +26,9 @@ def dae_described(dae: Translated, name: str = "") -> Description:
     ]
     columns, start = ("name", "value", "unit", "description"), _start(dae)
     parameters = [_row(dae.parameter_values, p) for p in flat.parameters]
-    outputs = [_row(start, v) for v in flat.variables if v.kind == "output"]
-    variables = [_row(start, v) for v in flat.variables if v.kind != "output"]
+    ordered = sorted(flat.variables, key=lambda v: v.name.count("."))  # what is deep in components comes last
+    outputs = [_row(start, v) for v in ordered if v.kind == "output"]
+    variables = [_row(start, v) for v in ordered if v.kind != "output"]
     heads = ("name", "start", "unit", "description")
     tables = (
         Listing.of("Parameters", columns, parameters),
@@ -62,7 +64,7 @@ def _start(dae: Translated) -> dict[str, float]:
 def _words(values: np.ndarray) -> str:
     if np.all(np.isnan(values)) or values.size > LONG:
         return ""
-    return array_words(values)
+    return array_words(np.round(values, ROUNDED))
 
 
 def _of_quantity(dae: Translated, name: str) -> Description:

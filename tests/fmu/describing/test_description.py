@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from fmpy.model_description import read_build_description
 from fmpy.validation import validate_fmu
-from gantrytau_fmu.describing.description_checks import initial_of
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau.errors import ModelError
+from gantrytau_fmu.describing.description_checks import initial_of
 from gantrytau_fmu.describing.model_description import LOG_CATEGORIES, build_description, model_description
 from gantrytau_fmu.describing.xml_text import plain
 from gantrytau_fmu.description import Experiment, FmuDescription, FmuTerminal, FmuVariable, Unknown
