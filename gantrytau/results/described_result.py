@@ -22,10 +22,9 @@ def series_described(series: Series, name: str = "") -> Description:
         told = (*facts, ("equal or opposite", ", ".join(aliases))) if aliases else facts
         return Description(name, f"variable of {series.title or 'a result'}", series.description(name), told)
     elements = {str(element) for names in series.arrays.values() for element in names.flat}
-    shown = sorted(
-        (*series.arrays, *(n for n in series.names if n not in elements)),
-        key=_first_places(series).__getitem__,
-    )
+    places = _first_places(series)
+    names = (*series.arrays, *(n for n in series.names if n not in elements))
+    shown = sorted(names, key=lambda n: (n.count("."), places[n]))  # what is deep in components comes last
     rows = [_row(series, n) for n in shown if not split_derivative(n)[1]]
     facts = (("time", span), ("ended", series.ended))
     columns = ("name", "at the start", "at the end", "unit", "description")
