@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
@@ -31,7 +32,7 @@ SAME = 1e-6  # m, of the joints on the plate in a mode that the robot's own kine
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblyStudy:
+class AssemblyStudy(Record):
     """The modes of each row, a robot at actuator coordinates; prints itself as a table.
 
     names: of the robots; robot: (N,), which of them a row is of; q: (N, n), m and rad; modes: the record of
