@@ -35,6 +35,7 @@ LONGEST = (  # ten seconds of one processor and more; test_compiling.py takes mi
     "fmu/reading/test_checking.py",
     "optimica/procedure/test_resuming.py",
     "models/test_pages.py",
+    "site/test_code_blocks.py",
     "models/mechanisms/test_four_bar.py",
     "fmu/runtime/test_sanitizers.py",
     "fmu/runtime/test_switching.py",

@@ -1,6 +1,5 @@
 """Every notebook runs from top to bottom, and so does the code of the README."""
 
-import re
 import runpy
 from pathlib import Path
 
@@ -8,6 +7,8 @@ import jupytext
 import matplotlib
 import matplotlib.pyplot as plt
 import pytest
+
+from tests.site.code_blocks import Page, blocks, run_page
 
 matplotlib.use("Agg")
 
@@ -33,9 +34,9 @@ def test_notebook_opens_as_cells_that_assert(path):
 
 def test_code_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    page = Page((ROOT / "README.md").read_text(encoding="utf-8"))
+    (code,) = [block.text for block in blocks(page.text) if block.language == "python"]
     assert len([line for line in code.splitlines() if line.strip()]) <= 30
-    names: dict[str, object] = {}
-    exec(compile(code, "README.md", "exec"), names)
+    run_page(page, "README.md")
     assert (tmp_path / "fall.png").stat().st_size > 1000
-    assert "solved" in capsys.readouterr().out
+    assert "solved" in page.printed

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError
+from gantrytau.kinematics import Kinematics
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate, cross_validate, judge
 from tests.optimica.calibration import f1_data, synthetic_d1
@@ -65,6 +66,18 @@ def test_a_fitted_frame_stands_among_the_parameters(robot):
     assert "frame.t = [" in repr(found.parameters)
     with pytest.raises(ModelError, match=r"frame\.t follows from nominal values alone"):
         found.covariance(["frame.t"])
+
+
+def test_places_on_two_levels_have_a_frame_too():
+    """Guideways cannot be told from them alone, as y and y**2 are the same there but for two constants."""
+    r = np.array([[x, y, z] for x in (0.4, 0.7, 1.0) for y in (2.6, 3.0) for z in (-0.9, -0.6, -0.3)])
+    robot = GantryTau(prototypes.L1)
+    q = Kinematics(robot).ik(r)
+    found = calibrate(robot, turned(q, r + NOISE * np.random.default_rng(0).standard_normal(r.shape), None))
+    assert found.parameters["frame.R"] == pytest.approx(TURN.T, abs=1e-3)  # noise over half a metre
+    assert found.parameters["frame.t"] == pytest.approx(-TURN.T @ SHIFT, abs=1e-3)
+    with pytest.raises(CalibrationError, match="in another frame than the base of"):
+        calibrate(robot, turned(q, r, None), frame="base")
 
 
 def test_a_linear_start_knows_the_frame_too():

@@ -88,6 +88,11 @@ def in_frame(
             kind="another robot",
             rows=rows,
         )
+    if (
+        fitting.off > NEAR
+    ):  # places on two levels of x, y or z do not tell guideways apart; forward kinematics may
+        by_tool = frame_of(robot.robot, misses_of(links), data)
+        fitting = fitting if by_tool is None or by_tool.off > NEAR else by_tool
     if fitting.off > NEAR and (swapped := swapped_carts(links, fitting.off, data.q, data.r, data.R)):
         words, off = swapped
         raise CalibrationError(
