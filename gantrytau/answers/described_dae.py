@@ -8,10 +8,11 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.describing.described import Description, Listing
 from gantrytau.describing.short_values import array_words, number
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
+from gantrytau.language.scales import scale
 from gantrytau.language.symbols import split_derivative
 
 LONG = 6  # elements of a vector that is spoken
-ROUNDED = 12  # digits behind the point: what is smaller is rounding
+ROUNDED = 15  # digits behind the point: what is smaller is rounding
 
 
 def dae_described(dae: Translated, name: str = "") -> Description:
@@ -41,8 +42,14 @@ def dae_described(dae: Translated, name: str = "") -> Description:
 
 def _row(values: Mapping[str, float], quantity: FlatVariable) -> tuple[str, ...]:
     shape = f"[{', '.join(map(str, quantity.shape))}]" if quantity.shape else ""
-    unit = "" if quantity.unit in (None, "1") else str(quantity.unit)
-    return f"{quantity.name}{shape}", _words(_numbers(values, quantity)), unit, quantity.description
+    unit = quantity.display or quantity.unit
+    told = _words(_shown(quantity, _numbers(values, quantity)))
+    return f"{quantity.name}{shape}", told, "" if unit in (None, "1") else str(unit), quantity.description
+
+
+def _shown(quantity: FlatVariable, values: np.ndarray) -> np.ndarray:
+    """Values in the unit in which they are shown."""
+    return scale(quantity.display).written(values) if quantity.display else values
 
 
 def _numbers(values: Mapping[str, float], quantity: FlatVariable) -> np.ndarray:
@@ -73,14 +80,14 @@ def _of_quantity(dae: Translated, name: str) -> Description:
     base, order = split_derivative(name)
     quantity = flat.vectors.get(base) or next(v for v in flat.vectors.values() if base in v.elements)
     kind = "parameter" if isinstance(quantity, FlatParameter) else "variable"
-    facts = [("unit", quantity.unit or "1")]
+    facts = [("unit", quantity.display or quantity.unit or "1")]
     if quantity.shape and base == quantity.name:
         facts.append(("shape", str(quantity.shape)))
     if order:
         facts = [("derivative of", base)]
     elements = [n for n in quantity.elements if base in (n, quantity.name)]
     numbers = _start(dae) | dict(dae.parameter_values)
-    told = [number(numbers[n]) for n in elements if n in numbers]
+    told = [number(float(_shown(quantity, np.array(numbers[n])))) for n in elements if n in numbers]
     if told and not order and len(told) <= LONG:
         facts.append(("value" if kind == "parameter" else "start", ", ".join(told)))
     for role, names in (("state", dae.states), ("input", dae.inputs), ("output", dae.outputs)):

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, real, shown, vectors
@@ -24,7 +25,7 @@ from gantrytau.language.model import Model
 
 
 @dataclass(frozen=True, eq=False)
-class CartJoints:
+class CartJoints(Record):
     """Frames and joints of N poses; those of one pose have no first axis. Lengths in m, angles in rad.
 
     links: paths of the m links; q (N, n), r (N, 3), R (N, 3, 3): the poses. chain: for each arm the frames of its cart and

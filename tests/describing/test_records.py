@@ -246,6 +246,27 @@ def test_results_with_gaps_modes_and_one_time_are_told():
     assert "nothing" not in str(describe(Result([0.0], {})))
 
 
+class Turning(Model):
+    """A shaft that turns on."""
+
+    w = Parameter(np.pi, unit="rad/s", display="rpm", description="speed")
+    phi = Real(unit="rad", display="deg", start=np.pi / 2, fixed=True, description="angle")
+
+    def equations(self):
+        yield der(self.phi) == self.w
+
+
+def test_translated_models_and_results_are_told_in_units_of_their_declarations():
+    dae = translate(Turning())
+    for said, column in ((describe(dae), "start"), (describe(simulate(dae, stop=1.0)), "at the start")):
+        (row,) = (row for row in said.as_mapping()["Variables"] if row["name"] == "phi")
+        assert (float(row[column]), row["unit"]) == (pytest.approx(90.0), "deg")
+    (speed,) = describe(dae).as_mapping()["Parameters"]
+    assert (float(speed["value"]), speed["unit"]) == (pytest.approx(30.0), "rpm")
+    assert dict(describe(dae, "phi").facts)["start"] == "90.0"
+    assert dict(describe(simulate(dae, stop=1.0), "phi").facts)["greatest"] == "270 deg at 1.0 s"
+
+
 class Growth(Model):
     """x' = x."""
 

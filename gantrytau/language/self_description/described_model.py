@@ -24,7 +24,8 @@ from gantrytau.language.declarations import (
     is_setting,
 )
 from gantrytau.language.events import Mode
-from gantrytau.language.self_description.placed_parts import PlacedPart, number_of
+from gantrytau.language.scales import scale
+from gantrytau.language.self_description.placed_parts import NUMBERS, PlacedPart, in_si, number_of
 
 HEADINGS = {  # kind of a quantity -> heading, in the order in which they are told
     "parameter": "Parameters",
@@ -203,9 +204,9 @@ def _of_quantity(part: PlacedPart, name: str) -> Description:
     """All that is said of one quantity."""
     member: Any = part.members[name]
     rows = [("shape", str(_shape(member)))] if _shape(member) else []
-    rows += [("unit", member.unit)] if member.unit else []
+    rows += [("unit", member.display or member.unit)] if member.unit else []
     if isinstance(member, Parameter):
-        rows.append(("value", _value(part.value(name))))
+        rows.append(("value", _shown(member, part.value(name))))
     for key in ATTRIBUTES:
         value = part.attribute(name, key) if hasattr(member, key) else None
         if value is None or value is False or (isinstance(value, str) and not value):
@@ -214,7 +215,8 @@ def _of_quantity(part: PlacedPart, name: str) -> Description:
             if value == StateSelect.DEFAULT:
                 continue
             value = StateSelect(value).name
-        rows.append((key, value if isinstance(value, str) else _value(value)))
+        shown = _shown(member, value) if key in NUMBERS else _value(value)
+        rows.append((key, value if isinstance(value, str) else shown))
     if modes := getattr(member, "names", None):
         rows.append(("modes", ", ".join(modes)))
     kind = f"{type(member).__name__} of {member.owner or part.kind.__name__}"
@@ -242,30 +244,45 @@ def _shape(member: Quantity) -> str:
 
 
 def _unit(member: Quantity) -> str:
-    return "" if member.unit in (None, "1") else str(member.unit)
+    unit = member.display or member.unit
+    return "" if unit in (None, "1") else str(unit)
+
+
+def _shown(member: Quantity, value: Any) -> str:
+    """A value of a quantity, in the unit in which it is shown."""
+    if not member.display or value is None or isinstance(value, (str, Formula)) or callable(value):
+        return _value(value)
+    try:
+        return _value(scale(member.display).written(np.asarray(value, dtype=float)))
+    except (
+        ModelError,
+        TypeError,
+        ValueError,
+    ):  # units that are none, values of others: what the compiler refuses
+        return f"{_value(value)} {member.unit}"
 
 
 def _spoken(part: PlacedPart, name: str) -> str:
     """The value of a parameter, the start of a variable."""
     member = part.members[name]
     if isinstance(member, Parameter):
-        return _value(part.value(name))
+        return _shown(member, part.value(name))
     given = part.modifications.get(name)
     if given is not None and not isinstance(given, (Start, Bounds, Mapping)):
-        return f"== {_value(number_of(given, part.scope))}"  # an equation
+        return f"== {_shown(member, in_si(number_of(given, part.scope), member.unit))}"  # an equation
     start = part.attribute(name, "start")
     if start is None:
         return ""
     if isinstance(member, Mode) and start in range(len(member.names)):
         return member.names[int(start)]
-    return _value(start) + (" (fixed)" if part.attribute(name, "fixed") is True else "")
+    return _shown(member, start) + (" (fixed)" if part.attribute(name, "fixed") is True else "")
 
 
 def _words(part: PlacedPart, name: str) -> str:
     member = part.members[name]
     low, high = part.attribute(name, "min"), part.attribute(name, "max")
-    limits = [f"at least {_value(low)}"] if low is not None else []
-    limits += [f"at most {_value(high)}"] if high is not None else []
+    limits = [f"at least {_shown(member, low)}"] if low is not None else []
+    limits += [f"at most {_shown(member, high)}"] if high is not None else []
     return "; ".join(filter(None, [member.description, ", ".join(limits)]))
 
 

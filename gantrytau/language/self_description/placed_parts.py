@@ -8,7 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.errors import ModelError
 from gantrytau.language.declarations import Array, Bounds, Formula, Parameter, Start, evaluate
+from gantrytau.language.scales import given
+
+NUMBERS = {"start", "min", "max", "nominal"}  # attributes in the unit of their quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +43,17 @@ class PlacedPart:
         given = self.modifications.get(name, getattr(member, "value", None))
         if isinstance(given, Mapping):
             given = given.get("value", getattr(member, "value", None))
-        return number_of(given, self.scope)
+        return in_si(number_of(given, self.scope), getattr(member, "unit", None))
 
     def attribute(self, name: str, key: str) -> Any:
         """An attribute of a quantity, such as its start."""
         given = self.modifications.get(name)
         if isinstance(given, (Start, Bounds)):
             given = {k: v for k, v in given.attributes().items() if v is not None}
-        declared = getattr(self.members[name], key, None)
-        return number_of(given.get(key, declared) if isinstance(given, Mapping) else declared, self.scope)
+        member = self.members[name]
+        declared = getattr(member, key, None)
+        found = number_of(given.get(key, declared) if isinstance(given, Mapping) else declared, self.scope)
+        return in_si(found, member.unit) if key in NUMBERS else found
 
     def parts(self, name: str) -> list["PlacedPart"]:
         """The component of that name; all of an array."""
@@ -80,12 +86,21 @@ class _Numbers:
         member = self.__dict__["_members"].get(name)
         if not isinstance(member, Parameter):
             raise AttributeError(name)
-        given = self._given.get(name, member.value)
-        found = evaluate(given.get("value", member.value) if isinstance(given, Mapping) else given, self)
+        said = self._given.get(name, member.value)
+        found = evaluate(said.get("value", member.value) if isinstance(said, Mapping) else said, self)
+        found = in_si(found, member.unit)
         if found is None:
             raise AttributeError(name)  # nobody said it
         values = np.asarray(found, dtype=float)
         return float(values) if values.ndim == 0 else ca.DM(values)
+
+
+def in_si(value: Any, unit: str | None) -> Any:
+    """A value that was written with a unit, "700 mm", as a number in SI; all else as it is, wrong units too."""
+    try:
+        return given("describe", value, unit)
+    except ModelError:
+        return value
 
 
 def number_of(value: Any, scope: Any) -> Any:

@@ -252,3 +252,27 @@ def test_instances_read_as_they_are_made():
     assert repr(Cart(s=Bounds(-1, 1))) == "Cart(s=Bounds(-1, 1))"
     assert repr(Cart.open()) == "Cart()"
     assert repr(Cart.__new__(Cart)) == "Cart()"  # while it is made
+
+
+def test_values_with_units_are_brought_to_those_in_which_they_are_shown():
+    class Arm(Model):
+        L = Parameter("700 mm", unit="m", display="mm", description="length", min="1 cm")
+        twice = Parameter(2 * L, unit="m", description="twice the length")
+        phi = Real(unit="rad", display="deg", start=np.pi / 2, description="angle")
+        place = Parameter(["1 m", "20 cm"], unit="m", shape=2, description="place")
+        wrong = Parameter("2 kg", unit="m", description="what the compiler refuses")
+
+    said = rows(describe(Arm), "Parameters")
+    assert (said["L"]["value"], said["L"]["unit"]) == ("700.0", "mm")
+    assert said["L"]["description"] == "length; at least 10.0"
+    assert (said["twice"]["value"], said["twice"]["unit"]) == ("1.4", "m")
+    assert said["place[2]"]["value"] == "[1.0, 0.2]"
+    assert said["wrong"]["value"] == "'2 kg'"
+    assert rows(describe(Arm), "Variables")["phi"] == {
+        "name": "phi",
+        "start": "90.0",
+        "unit": "deg",
+        "description": "angle",
+    }
+    assert rows(describe(Arm(L="2 m")), "Parameters")["L"]["value"] == "2000.0"
+    assert "value: 2000.0" in _attributes(describe(Arm(L="2 m"), "L"))

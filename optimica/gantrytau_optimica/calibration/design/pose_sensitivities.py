@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, real, shown, vectors
@@ -37,7 +38,7 @@ LEAST = 1e-3  # of the largest sensitivity: what pictures still tell apart
 
 
 @dataclass(frozen=True, eq=False)
-class PoseSensitivities:
+class PoseSensitivities(Record):
     """Derivatives of N poses by p parameters; prints itself as a table.
 
     names: of the parameters: `arms[0].length`, `arms[0].offset[1]`, `turntables[0].rotation[2]` (a local turn, rad), and
