@@ -62,8 +62,9 @@ class Dae(Translated):
         """The equations, written out: every block with the component equations it comes from, or the flat model.
 
         text: one line per solved unknown; latex: align environments to be included in a document (amsmath);
-        html: one page by component and by block, with tables of variables; modelica: the flat model as a class
-        that Modelica tools read. Raises ModelError for another format or a function that the format lacks.
+        html: one page by component, by block, and a table of quantities; modelica: the flat model as a class
+        that Modelica tools read. With find= of `translate`, all but modelica have only what the wanted names depend on,
+        states being known. Raises ModelError for another format or a function that the format lacks.
         """
         return write_equations(self, format, lambda: str(self.diagnosis))
 

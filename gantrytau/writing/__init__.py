@@ -11,6 +11,7 @@ FORMATS = ("text", "latex", "html", "modelica")
 def write_equations(dae: Translated, format: str, summary: Callable[[], str]) -> str:
     """The equations as "text", "latex", "html" (blocks, with their origin) or "modelica" (the flat model).
 
+    Of a translation with `find=`, what the wanted names depend on, but "modelica" is the whole model always.
     summary: what the page opens with. Raises ModelError for another format, and for a function that the
     format has no words for.
     """
@@ -23,9 +24,9 @@ def write_equations(dae: Translated, format: str, summary: Callable[[], str]) ->
 
         return latex_text(dae)
     if format == "html":
-        from gantrytau.writing.html import html_page
+        from gantrytau.writing.equations_page.equations_page import html_page
 
-        return html_page(dae, summary())
+        return html_page(dae, "" if dae.request.find else summary())
     if format == "modelica":
         from gantrytau.writing.modelica import modelica_text
 

@@ -6,11 +6,13 @@ The fragment is included in a document with \usepackage{amsmath}; it defines not
 import re
 
 from gantrytau.compiler.translated import Translated
+from gantrytau.writing.excerpt import Excerpt, excerpt
+from gantrytau.writing.instants_written import AtInstants, pieces_written
 from gantrytau.writing.names import GREEK, Name, name_of
-from gantrytau.writing.sections import Section, sections
+from gantrytau.writing.sections import Section, section_text
 from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.syntax import ATOM, CHOICE, POWER, PRODUCT, SUM, Arguments, Written, infix
-from gantrytau.writing.text import event_lines, plain_number
+from gantrytau.writing.text import plain_number
 
 WORDS = {
     "or": r" \lor ", "and": r" \land ", "not": r"\lnot ", "neg": "-",
@@ -30,7 +32,7 @@ AROUND = {
     "floor": (r"\lfloor ", r" \rfloor"),
     "ceil": (r"\lceil ", r" \rceil"),
 }
-LETTERS = {letter: "\\" + word for word, letter in GREEK.items() if word not in ("w", "lambda_")} | {
+LETTERS = {letter: "\\" + word for word, letter in GREEK.items() if word not in ("w", "th", "lambda_")} | {
     "φ": r"\varphi"
 }
 SPECIAL = {
@@ -131,22 +133,48 @@ def latex_name(name: Name) -> str:
 
 
 def latex_text(dae: Translated) -> str:
-    """A LaTeX fragment: what is known, the states, and every block with its origin."""
+    """A LaTeX fragment: what is known, the states, and every block with its origin, or those that what is wanted needs."""
+    found, syntax = excerpt(dae), LatexSyntax()
     lines = [f"% Equations of {dae.name} in the order of their solution; needs \\usepackage{{amsmath}}."]
     lines += [rf"\section*{{Equations of {escaped(dae.name)}}}"]
-    for words, names in (("Known", dae.known), ("States", dae.states)):
-        spoken = ", ".join(f"${LatexSyntax().symbol(n).text}$" for n in names)
+    states = [name if name == symbol else f"{name} = {symbol}" for name, symbol in found.states]
+    rows = [("Known", found.known), ("States", states), *([("Wanted", found.wanted)] if found.wanted else [])]
+    for words, names in rows:
+        spoken = ", ".join(f"${' = '.join(syntax.symbol(x).text for x in n.split(' = '))}$" for n in names)
         lines.append(rf"\noindent {words}: {spoken or 'none'}.\par")
-    for line in event_lines(dae):
-        lines.append(rf"\noindent \texttt{{{escaped(' '.join(line.split()))}}}\par")
-    for section in sections(dae):
+    for one in found.instants:
+        lines += _instant(one)
+    for section in found.sections:
         lines += ["", *_section(section)]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_answers(found)]) + "\n"
+
+
+def _instant(one: AtInstants) -> list[str]:
+    """A statement on instants as a sentence, and what its expressions share."""
+    shared, says = pieces_written(one, LatexSyntax())
+    words, note = (
+        "".join(escaped(p) if isinstance(p, str) else f"${p.text}$" for p in part) for part in says
+    )
+    where = "".join(f", ${name} = {expression}$" for name, expression in shared)
+    return [rf"\noindent {words}{where}{f' ({note})' if note else ''}\par"]
+
+
+def _answers(found: Excerpt) -> list[str]:
+    """What the wanted names are that no block gives."""
+    if not found.answers:
+        return []
+    names, syntax = [name for name, _ in found.answers], LatexSyntax()
+    text = written_at(", ".join(names), [e for _, e in found.answers], syntax)
+    rows = [f"{name} &= {_broken(expression)}" for name, expression in text.definitions]
+    rows += [
+        f"{syntax.symbol(n).text} &= {_broken(e.text)}" for n, e in zip(names, text.expressions, strict=True)
+    ]
+    return ["", r"\noindent so that", r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}"]
 
 
 def _section(section: Section) -> list[str]:
     syntax = LatexSyntax()
-    text = written_at(section.origin, (line.right for line in section.lines), syntax)
+    text = section_text(section, syntax)
     rows = [f"{name} &= {_broken(expression)}" for name, expression in text.definitions]
     for line, value in zip(section.lines, text.expressions, strict=True):
         left = "0" if line.left is None else syntax.symbol(line.left).text

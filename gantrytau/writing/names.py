@@ -1,5 +1,6 @@
 """Names of a model as a typesetter sees them: Greek letters, subscripts, dots for derivatives."""
 
+import re
 from dataclasses import dataclass
 
 from gantrytau.language.symbols import split_derivative
@@ -8,8 +9,10 @@ from gantrytau.language.symbols import split_derivative
 GREEK = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η",
     "theta": "θ", "kappa": "κ", "lambda": "λ", "lambda_": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ",
-    "sigma": "σ", "tau": "τ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "w": "ω",
+    "sigma": "σ", "tau": "τ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "w": "ω", "th": "θ",
+    "Gamma": "Γ", "Theta": "Θ", "Lambda": "Λ", "Xi": "Ξ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
+NUMBERED = re.compile(r"([^\W\d_]+)(\d+)")  # phi1, q12
 MOST_DOTS = 2
 
 
@@ -50,8 +53,10 @@ def _part(member: str) -> Part:
     indices = tuple(i for i in inside.rstrip("]").split(",") if i)
     if word in GREEK:
         return Part(GREEK[word], indices)
-    head, _, tail = word.partition("_")
+    head, *tails = word.split("_")
+    numbered = NUMBERED.fullmatch(head)
+    head, digits = (numbered[1], (numbered[2],)) if numbered else (head, ())
     letter = GREEK.get(head, head)
-    if len(letter) == 1 and tail and "_" not in tail:  # v_x, phi_rel; kinetic_energy stays a word
-        return Part(letter, (tail, *indices))
+    if len(letter) == 1 and all(tails):  # v_x, phi_rel, q1; kinetic_energy stays a word
+        return Part(letter, (*digits, *tails, *indices))
     return Part(word, indices)

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
+from gantrytau.language.statements import Equation
+from gantrytau.writing.collect import collected
+from gantrytau.writing.graph import Graph
+from gantrytau.writing.subexpressions import Text, located, written
+from gantrytau.writing.syntax import Syntax
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +28,7 @@ class Line:
 class Section:
     """One block: its lines, and where its equations come from.
 
-    kind: how it is solved; unknowns: names; torn: how many unknowns are found first.
+    kind: how it is solved; unknowns: names; torn: how many unknowns are found first; keys: its equations.
     """
 
     number: int
@@ -31,6 +37,12 @@ class Section:
     torn: int
     origins: tuple[str, ...]
     lines: tuple[Line, ...]
+    keys: tuple[Key, ...] = ()
+
+    @property
+    def leaves(self) -> tuple[str, ...]:
+        """Names of the symbols that stand in its lines."""
+        return symbol_names(line.right for line in self.lines)
 
     @property
     def single(self) -> bool:
@@ -64,18 +76,41 @@ def sections(dae: Translated) -> list[Section]:
             lines = [Line(None, residual, tear.name()) for tear, residual in pairs]
             lines += [Line(symbol.name(), value) for symbol, value in block.inner]
         origins = origin_words(dae, block.equations)
-        found.append(Section(number, block.kind, block.unknowns, len(block.tears), origins, tuple(lines)))
+        torn = len(block.tears)
+        found.append(
+            Section(number, block.kind, block.unknowns, torn, origins, tuple(lines), block.equations)
+        )
     return found
+
+
+def symbol_names(expressions: Iterable[ca.SX]) -> tuple[str, ...]:
+    """Names of the symbols in some expressions."""
+    return tuple(leaf.name() for leaf in ca.symvar(ca.SX(column(list(expressions)))))
+
+
+def section_text(section: Section, syntax: Syntax) -> Text:
+    """The right-hand sides of a block, equal terms collected; a ModelError about them names their origin."""
+    graph = Graph()
+    with located(section.origin):
+        return written(collected(graph, graph.read(line.right for line in section.lines)), syntax)
 
 
 def origin_words(dae: Translated, equations: Iterable[Key]) -> tuple[str, ...]:
     """Where equations come from, rows of one vector equation put together: 'tool (Tool), equation 2, rows 0 to 2'."""
+    return tuple(name + words for name, words, _ in origins_of(dae, equations))
+
+
+def origins_of(dae: Translated, equations: Iterable[Key]) -> list[tuple[str, str, Equation]]:
+    """Names of equations, words on rows and differentiation, and one of the rows each."""
     rows: dict[tuple[str, str], list[int]] = {}
+    first: dict[tuple[str, str], Equation] = {}
     for index, times in equations:
-        name, _, row = dae.reduced.equations[index].name.partition(", row ")
+        equation = dae.reduced.equations[index]
+        name, _, row = equation.name.partition(", row ")
         often = "" if times == 0 else ", differentiated " + ("once" if times == 1 else f"{times} times")
+        first.setdefault((name, often), equation)
         rows.setdefault((name, often), []).extend([int(row)] if row else [])
-    return tuple(f"{name}{_row_words(found)}{often}" for (name, often), found in rows.items())
+    return [(key[0], _row_words(found) + key[1], first[key]) for key, found in rows.items()]
 
 
 def _row_words(rows: list[int]) -> str:

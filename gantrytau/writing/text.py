@@ -1,9 +1,9 @@
 """The blocks of a Dae as plain text, in the order of solution, with the component equation each line comes from."""
 
-import casadi as ca
-
 from gantrytau.compiler.translated import Translated
-from gantrytau.writing.sections import Section, sections
+from gantrytau.writing.excerpt import Excerpt, excerpt
+from gantrytau.writing.instants_written import AtInstants, at_instants, pieces_written
+from gantrytau.writing.sections import Section, section_text
 from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
 
@@ -54,54 +54,55 @@ class PlainSyntax:
 
 def block_text(dae: Translated) -> str:
     """One line per solved unknown, in the order of solution, with the component equation it comes from."""
+    found = excerpt(dae)
     lines = [
         f"{dae.name}",
-        f"known: {', '.join(dae.known) or 'nothing'}",
-        f"states: {', '.join(dae.states) or 'none'}",
+        f"known: {', '.join(found.known) or 'nothing'}",
+        f"states: {', '.join(map(_state, found.states)) or 'none'}",
     ]
-    lines += event_lines(dae)
-    for section in sections(dae):
+    if found.wanted:
+        remarks = [(name, found.remark(name)) for name in found.wanted]
+        wanted = ", ".join(f"{name} ({remark})" if remark else name for name, remark in remarks)
+        lines += [f"wanted: {wanted}", *filter(None, [found.left_out])]
+    lines += [line for one in found.instants for line in _instant(one)]
+    for section in found.sections:
         lines += _section(section)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_answers(found)]) + "\n"
+
+
+def _state(state: tuple[str, str]) -> str:
+    """A state, and the symbol by which the equations know it."""
+    name, symbol = state
+    return name if name == symbol else f"{name} = {symbol}"
 
 
 def event_lines(dae: Translated) -> list[str]:
     """What is set at instants, line by line."""
-    lines = []
-    for held in dae.flat.sampled:
-        place = held.path or "the model"
-        (value, period), where = _written_out(held.name, [held.expression, held.period])
-        lines += [f"sampled: {held.name} = {value}    # every {period} s, from {place}", *where]
-    for friction in dae.flat.frictions:
-        place, force, speed = friction.path or "the model", friction.force, friction.speed
-        parts = [friction.coulomb, friction.smooth, friction.breakaway]
-        (coulomb, smooth, breakaway), where = _written_out(force, parts)
-        law = f"sign({speed})*({coulomb}) + {smooth}"
-        lines.append(
-            f"friction: {force} = {law}; at rest as {speed} = 0 needs, up to {breakaway}    # from {place}"
-        )
-        lines += where
-    for one in dae.flat.whens:
-        place, names = one.path or "the model", [n for n, _ in (*one.reinits, *one.assignments)]
-        values = [e for _, e in (*one.reinits, *one.assignments)]
-        (condition, *texts), where = _written_out(one.label, [one.condition, *values])
-        done = [f"{n} := {value}" for n, value in zip(names, texts, strict=True)]
-        done += [f"terminate: {one.message}"] if one.message else []
-        word = "when" if one.after < 0 else "elsewhen"
-        holds = condition.removeprefix("if ").removesuffix(" then 1 else 0")  # as a number it is written
-        lines += [f"{word} {holds}: {', '.join(done)}    # from {place}", *where]
-    return lines
+    return [line for one in at_instants(dae.flat) for line in _instant(one)]
 
 
-def _written_out(place: str, expressions: list[ca.SX]) -> tuple[list[str], list[str]]:
-    """Expressions as texts, and lines with what they share."""
-    text = written_at(place, expressions, PlainSyntax())
-    where = [f"      with {name} = {expression}" for name, expression in text.definitions]
-    return [e.text for e in text.expressions], where
+def _instant(one: AtInstants) -> list[str]:
+    """A statement on instants as a line, and lines with what its expressions share."""
+    text, says = pieces_written(one, PlainSyntax())
+    words, note = ("".join(s if isinstance(s, str) else s.text for s in part) for part in says)
+    where = [f"      with {name} = {expression}" for name, expression in text]
+    return [words + (f"    # {note}" if note else ""), *where]
+
+
+def _answers(found: Excerpt) -> list[str]:
+    """What the wanted names are that no block gives."""
+    if not found.answers:
+        return []
+    names = [name for name, _ in found.answers]
+    text = written_at(", ".join(names), [e for _, e in found.answers], PlainSyntax())
+    lines = [f"      with {name} = {expression}" for name, expression in text.definitions]
+    return ["so that", *lines] + [
+        f"      {n} = {e.text}" for n, e in zip(names, text.expressions, strict=True)
+    ]
 
 
 def _section(section: Section) -> list[str]:
-    text = written_at(section.origin, (line.right for line in section.lines), PlainSyntax())
+    text = section_text(section, PlainSyntax())
     where = [f"      with {name} = {expression}" for name, expression in text.definitions]
     if section.single:
         value = text.expressions[0].text

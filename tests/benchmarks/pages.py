@@ -1,10 +1,11 @@
-"""Pages of motions: the fastest one of the six-link robot, slowed down to a second, 60 pictures."""
+"""Pages of the six-link robot: its fastest motion, slowed down to a second, 60 pictures; its equations."""
 
 import sys
 from collections.abc import Iterator
 
-from gantrytau import animate
+from gantrytau import animate, translate
 from gantrytau.commands.demo.motion_problems import SixLinks
+from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_optimica import optimize
 from tests.benchmarks.table import Row, at_most, in_turn, print_table
 
@@ -12,7 +13,7 @@ ROUNDS = 3
 
 
 def rows() -> Iterator[Row]:
-    """Seconds and megabytes of a page."""
+    """Seconds and sizes of pages."""
     fastest = optimize(SixLinks, elements=20)
     sizes = list[int]()
 
@@ -23,6 +24,8 @@ def rows() -> Iterator[Row]:
     figure = "page of a motion of six links, 1 s at 60 pictures"
     yield at_most(f"{figure}: made in", times["make"], 3.0, "s")
     yield at_most(f"{figure}: size", max(sizes) / 1e6, 3.0, "MB")
+    equations = translate(SixLinkGantryTau(prototypes.D1)).equations("html")
+    yield at_most("page of the equations of six links: size", len(equations.encode()) / 1e3, 300.0, "kB")
 
 
 if __name__ == "__main__":

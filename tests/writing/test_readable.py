@@ -2,7 +2,6 @@
 
 import re
 from html.parser import HTMLParser
-from xml.etree import ElementTree
 
 import casadi as ca
 import pytest
@@ -11,8 +10,9 @@ from matplotlib.mathtext import MathTextParser
 from gantrytau import Input, Model, ModelError, Parameter, Real, der, translate
 from gantrytau.mechanics.translational import LinearFriction
 from gantrytau_models import GantryTau, Pendulum, prototypes
+from tests.writing.page_reader import PageOfEquations
 
-VOID = {"meta", "br"}
+VOID = {"meta", "br", "p", "td", "th", "tr"}  # or closed by what follows
 
 
 class Rotor(Model):
@@ -73,7 +73,7 @@ class Page(HTMLParser):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
-        assert self.open.pop() == tag
+        assert self.open.pop() == tag, self.getpos()
 
     def handle_data(self, data):
         self.texts.append(data)
@@ -95,11 +95,11 @@ def test_every_block_is_in_every_format(dae):
     for number, block in enumerate(dae.blocks, start=1):
         assert f"\n[{number}] " in text
         assert rf"\paragraph{{Block {number}}}" in latex
-        assert f"[{number}] " in page
+        assert f"[{number}]" in page
         for key in block.equations:
             name = dae.reduced.equations[key[0]].name.partition(",")[0]
             assert name in text
-            assert name in page
+            assert name in page or name.endswith("(connection)")
     assert latex.count(r"\begin{align*}") == len(dae.blocks)
 
 
@@ -112,23 +112,12 @@ def test_the_page_is_closed_in_itself_and_its_links_arrive(html):
     assert not page.values("src")
 
 
-def test_the_page_has_every_equation_variable_and_value(dae, html):
+def test_the_page_has_every_quantity_and_its_description(dae, html):
     page = read_page(html)
-    texts = set(page.texts)
-    assert {e.name for e in dae.flat.equations} <= {
-        t.removesuffix(" (follows from the others)") for t in texts
-    }
-    assert set(dae.variables) - set(dae.flat.definitions) | set(dae.parameters) <= texts
+    names = {row.name for row in PageOfEquations(html).quantities.values()}
+    assert names == {v.name for v in (*dae.flat.variables, *dae.flat.parameters, *dae.flat.propagated)}
     descriptions = {v.description for v in (*dae.flat.variables, *dae.flat.parameters)} - {""}
-    assert descriptions <= texts
-
-
-def test_formulas_of_the_page_are_well_formed(dae, html):
-    formulas = re.findall(r"<math.*?</math>", html, flags=re.DOTALL)
-    assert len(formulas) >= len(dae.flat.equations) + len(dae.blocks)
-    for formula in formulas:
-        for fraction in ElementTree.fromstring(formula).iter():
-            assert fraction.tag not in ("mfrac", "msup") or len(fraction) == 2
+    assert descriptions <= set(page.texts)
 
 
 def test_latex_has_balanced_braces_and_environments(dae):
