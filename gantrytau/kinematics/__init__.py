@@ -6,6 +6,7 @@ from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
 from gantrytau.kinematics.modes.assembly_study import AssemblyStudy, assembly_study
 from gantrytau.kinematics.rods.configurations import Configuration
+from gantrytau.kinematics.turntable_screw import TurntableScrew
 from gantrytau.kinematics.workspace.grid_spacing import grid_spacing
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
 from gantrytau.kinematics.workspace.pose_limits import Limits, examine
@@ -27,6 +28,7 @@ __all__ = [
     "RodTurntable",
     "Rods",
     "SingleRod",
+    "TurntableScrew",
     "Workspace",
     "accuracy",
     "assembly_modes",

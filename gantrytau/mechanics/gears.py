@@ -6,7 +6,7 @@ flange_a leaves at flange_b: a.tau a.phi' + b.tau b.phi' = 0, and the same with 
 
 from math import pi
 
-from gantrytau import Model, Parameter, connect
+from gantrytau import Model, Parameter, Real, connect, cos, fabs, require, sin, sqrt
 from gantrytau.mechanics import rotational, translational
 
 
@@ -63,3 +63,42 @@ class BallScrew(Model):
     def equations(self):
         yield self.flange_b.s == self.lead * self.flange_a.phi / (2 * pi)
         yield self.flange_a.tau == -self.lead * self.flange_b.f / (2 * pi)
+
+
+class ScrewLever(Model):
+    """A spindle at flange_a between two pivots, which swings a lever at flange_b: the drive of a turntable.
+
+    length^2 = base^2 + crank^2 - 2 base crank cos(angle + phi) by the law of cosines; both angles are 0 together. At its
+    dead centres, where angle + phi is 0 or pi, it moves nothing; what swings there may go through.
+    `gantrytau.kinematics.TurntableScrew` has the same in numbers.
+    """
+
+    base = Parameter(
+        0.3, unit="m", min=0.0, description="from the axis of the lever to the pivot of the spindle"
+    )
+    crank = Parameter(
+        0.1, unit="m", min=0.0, description="from the axis of the lever to the pivot of the nut"
+    )
+    angle = Parameter(
+        pi / 2, unit="rad", description="from base to crank about the axis where flange_b is at 0; -pi to pi"
+    )
+    lead = Parameter(0.005, unit="m", description="by which a turn lengthens the screw; negative shortens it")
+    length = Real(unit="m", description="from pivot to pivot", start=0.3)
+    lever = Real(unit="m", description="distance of the screw from the axis, with the sign of angle")
+    flange_a = rotational.Flange()
+    flange_b = rotational.Flange()
+
+    def equations(self):
+        a, b = self.flange_a, self.flange_b
+        yield require(self.base > 0, "expected a distance above zero")
+        yield require(self.crank > 0, "expected a distance above zero")
+        yield require(
+            fabs(sin(self.angle)) > 1e-6, "expected an angle between 0 and pi, or -pi and 0, in rad"
+        )
+        opening = self.angle + b.phi
+        squares, product = self.base**2 + self.crank**2, 2 * self.base * self.crank
+        yield self.length == sqrt(squares - product * cos(opening))
+        yield self.lead * a.phi == 2 * pi * (self.length - sqrt(squares - product * cos(self.angle)))
+        yield self.lever == product / 2 * sin(opening) / self.length
+        # the force in the screw is 2 pi tau / lead, and acts on the lever
+        yield self.lead * b.tau == -2 * pi * self.lever * a.tau

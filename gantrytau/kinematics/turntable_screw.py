@@ -1,0 +1,158 @@
+"""Ball screws that turn turntables: between angles of motors and angles of turntables, both ways, with slopes.
+
+A spindle hangs in a pivot P on what carries the turntable, its nut in a pivot Q on the turntable, both across the axis O:
+
+    l(phi)^2 = OP^2 + OQ^2 - 2 OP OQ cos(angle + phi)          law of cosines
+    theta    = 2 pi (l(phi) - l(0)) / lead                     angle of the motor
+    theta'   = 2 pi h / lead,    h = OP OQ sin(angle + phi) / l = l'         h: distance of the spindle from the axis
+
+The thesis says that motors turn the turntables q4 to q6 of the F1 (section 4.5), and prints no numbers of their drives.
+`gears.ScrewLever` is the same as a component.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gantrytau.errors import ModelError
+from gantrytau.kinematics.poses import floats, real, shown
+
+FLAT = 1e-6  # of OP and OQ: how far pivots may be from one plane across the axis
+
+
+@dataclass(frozen=True, kw_only=True)
+class TurntableScrew:
+    """A ball screw between a pivot on what carries a turntable and one on the turntable, free of play.
+
+    base: OP, crank: OQ, distances of the pivots of spindle and nut from the axis, m; angle: from OP to OQ about the axis
+    where the turntable is at 0, between 0 and pi or between -pi and 0, rad; lead: by which a turn of the motor lengthens the
+    screw, m, negative where it shortens it. All methods take numbers or arrays and answer the same shape; NaN beyond the
+    dead centres, where screw and axis are in line and no motor turns the table. Raises ModelError for numbers that make
+    no screw.
+    """
+
+    base: float
+    crank: float
+    angle: float
+    lead: float
+
+    def __post_init__(self):
+        for name in ("base", "crank"):
+            if not 0 < real(getattr(self, name)) < np.inf:
+                raise ModelError(
+                    f"TurntableScrew: found {name}={getattr(self, name)!r}, expected a distance above 0 in m",
+                    argument=name,
+                )
+        if not 0 < abs(real(self.angle)) < math.pi:
+            raise ModelError(
+                f"TurntableScrew: found angle={self.angle!r}, expected one between 0 and pi, or between -pi and 0, in rad: "
+                "at 0 and pi the screw points to the axis; convert degrees with math.radians",
+                argument="angle",
+            )
+        if not 0 < abs(real(self.lead)) < np.inf:
+            raise ModelError(
+                f"TurntableScrew: found lead={self.lead!r}, expected the travel of a turn in m, not 0",
+                argument="lead",
+            )
+
+    @classmethod
+    def of_places(cls, *, axis: ArrayLike, base: ArrayLike, nut: ArrayLike, lead: float) -> Self:
+        """The screw of pivots at places (3,) in m, in axes whose origin is on the axis (3,) of the turntable, which is at 0.
+
+        Raises ModelError for shapes, pivots on the axis, and pivots that are not in one plane across it: that screw would
+        swing out of its plane.
+        """
+        vectors = {"axis": floats(axis), "base": floats(base), "nut": floats(nut)}
+        for name, vector in vectors.items():
+            if vector.shape != (3,) or not np.isfinite(vector).all():
+                raise ModelError(
+                    f"TurntableScrew.of_places: found {name} = {shown(vector)}, expected three finite numbers",
+                    argument=name,
+                )
+        way, start, end = vectors.values()
+        size = np.linalg.norm(way)
+        if size == 0:
+            raise ModelError(
+                "TurntableScrew.of_places: found an axis of length 0, expected a direction", argument="axis"
+            )
+        n = way / size
+        out_of_plane = abs(float(n @ (end - start)))
+        start, end = start - n * (n @ start), end - n * (n @ end)
+        if out_of_plane > FLAT * max(np.linalg.norm(start), np.linalg.norm(end)):
+            raise ModelError(
+                f"TurntableScrew.of_places: found pivots {out_of_plane:.3g} m apart along the axis, expected them in one "
+                "plane across it; move one of them",
+                argument="nut",
+            )
+        angle = math.atan2(float(n @ np.cross(start, end)), float(start @ end))
+        return cls(
+            base=float(np.linalg.norm(start)), crank=float(np.linalg.norm(end)), angle=angle, lead=lead
+        )
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The angles of the turntable at the dead centres, rad; it turns between them."""
+        return (-self.angle, math.pi - self.angle) if self.angle > 0 else (-math.pi - self.angle, -self.angle)
+
+    def length(self, phi: Any) -> np.ndarray:
+        """From pivot to pivot with the turntable at phi, m."""
+        return self._length(self._opening(phi))
+
+    def motor(self, phi: Any) -> np.ndarray:
+        """The angle of the motor with the turntable at phi, rad; 0 with it at 0."""
+        # a difference of squares, so that small angles keep their digits
+        opening = self._opening(phi)
+        half = 2 * np.sin((opening + self.angle) / 2) * np.sin((opening - self.angle) / 2)
+        longer = 2 * self.base * self.crank * half / (self._length(opening) + self._length(self.angle))
+        return 2 * math.pi / self.lead * longer
+
+    def turntable(self, theta: Any) -> np.ndarray:
+        """The angle of the turntable with the motor at theta, rad; NaN where the screw does not get so long or so short."""
+        length = self._length(self.angle) + _numbers(theta, "theta") * self.lead / (2 * math.pi)
+        with np.errstate(invalid="ignore"):
+            # half angles keep their digits near both dead centres
+            far = (self.base + self.crank) ** 2 - length**2
+            near = length**2 - (self.base - self.crank) ** 2
+            opening = 2 * np.arctan2(np.sqrt(near), np.sqrt(far))
+            opening = np.where((length > 0) & (near > 0) & (far > 0), opening, np.nan)
+        return (math.copysign(1.0, self.angle) * opening - self.angle)[()]
+
+    def lever(self, phi: Any) -> np.ndarray:
+        """The distance h of the screw from the axis, which a force in it acts on, m; its sign is that of `angle`."""
+        opening = self._opening(phi)
+        return self.base * self.crank * np.sin(opening) / self._length(opening)
+
+    def ratio(self, phi: Any) -> np.ndarray:
+        """How much faster the motor turns than the turntable at phi, and how much less torque it needs; d theta / d phi."""
+        return 2 * math.pi / self.lead * self.lever(phi)
+
+    def ratio_slope(self, phi: Any) -> np.ndarray:
+        """The derivative of `ratio` by phi, 1/rad: der(w of the motor) = ratio der(w) + ratio_slope w^2."""
+        opening = self._opening(phi)
+        length = self._length(opening)
+        lever = self.base * self.crank * np.sin(opening) / length
+        return 2 * math.pi / self.lead * (self.base * self.crank * np.cos(opening) - lever**2) / length
+
+    def _opening(self, phi: Any) -> np.ndarray:
+        """The angle from OP to OQ; NaN at the dead centres and beyond."""
+        found = _numbers(phi, "phi")
+        least, most = self.range
+        with np.errstate(invalid="ignore"):
+            return np.where((found > least) & (found < most), self.angle + found, np.nan)[()]
+
+    def _length(self, opening: Any) -> Any:
+        # |OP - OQ|^2 + 4 OP OQ sin^2: no difference of large numbers where the pivots are near each other
+        return np.sqrt(
+            (self.base - self.crank) ** 2 + 4 * self.base * self.crank * np.sin(np.asarray(opening) / 2) ** 2
+        )
+
+
+def _numbers(value: Any, name: str) -> np.ndarray:
+    """Numbers as an array of floats; ModelError for what holds none."""
+    found = floats(value)
+    if found.shape == () and np.isnan(found) and not isinstance(value, (float, np.floating)):
+        raise ModelError(f"TurntableScrew: found {name} = {shown(value)}, expected numbers in rad")
+    return found
