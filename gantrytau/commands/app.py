@@ -9,7 +9,7 @@ from gantrytau.commands import controller, fmu, vision
 from gantrytau.commands.calibrate.calibrate_command import calibrate
 from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
-from gantrytau.commands.doctor_command import doctor
+from gantrytau.commands.doctor.doctor_command import doctor
 from gantrytau.commands.equations_command import equations
 from gantrytau.commands.estimate.estimate_command import estimate
 from gantrytau.commands.identify.identify_command import identify

@@ -1,13 +1,13 @@
 """The results of all cases as one dataset with named axes."""
 
-import importlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau.ensembles.cases import CASE, SEED, Axes, Case
-from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.errors import ModelError
+from gantrytau.results.files import extra_module
 from gantrytau.results.result import Result
 
 if TYPE_CHECKING:
@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 def labelled(axes: Axes, cases: Sequence[Case], values: Sequence[Any], title: str) -> "xarray.Dataset":
     """The dataset of a study; values: of each case, None where there is none. Raises ModelError for what is no number."""
-    try:
-        xarray: Any = importlib.import_module("xarray")
-    except ImportError as error:
-        raise GantryTauError(
-            "xarray: not installed, but to_xarray needs it; pip install 'gantrytau[results]'"
-        ) from error
+    xarray: Any = extra_module("xarray")
     first = next((v for v in values if v is not None), None)
     if first is None:
         raise ModelError(f"{title}: no case has a result; look at .failures")

@@ -13,6 +13,7 @@ from gantrytau.ensembles.labelled_array import labelled
 from gantrytau.ensembles.workers.worker import Outcome
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.results.display_units import Display
+from gantrytau.results.files import extra_module
 from gantrytau.results.result import Result
 from gantrytau.whole_files import replacing
 
@@ -89,6 +90,8 @@ class Study(Record):
             raise ModelError(
                 f"{path}: found the suffix '{path.suffix}', expected .nc; name it {path.stem}.nc"
             )
+        for module in ("h5netcdf", "h5py"):
+            extra_module(module)
         table = self.to_xarray()
         with replacing(path) as partial:
             table.to_netcdf(partial, engine="h5netcdf")

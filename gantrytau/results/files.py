@@ -45,7 +45,7 @@ def save(result: Series, path: str | os.PathLike[str], display: Display = None) 
 
 def dataset(result: Series) -> "xarray.Dataset":
     """A result as xarray's Dataset: coordinate `time`, vectors and matrices whole, units as attributes."""
-    xarray = _extra("xarray")
+    xarray = extra_module("xarray")
     elements = {str(element) for names in result.arrays.values() for element in names.flat}
     variables = {}
     for name in (*result.arrays, *(name for name in result.names if name not in elements)):
@@ -75,13 +75,13 @@ def _write_csv(result: Series, path: Path, shown: Mapping[str, Shown] | None = N
 
 
 def _write_netcdf(result: Series, path: Path) -> None:
-    _extra("h5netcdf")
-    _extra("h5py")
+    extra_module("h5netcdf")
+    extra_module("h5py")
     dataset(result).to_netcdf(path, engine="h5netcdf")
 
 
 def _write_parquet(result: Series, path: Path) -> None:
-    arrow, parquet = _extra("pyarrow"), _extra("pyarrow.parquet")
+    arrow, parquet = extra_module("pyarrow"), extra_module("pyarrow.parquet")
     names = ("time", *result.names)
     fields = [arrow.field(name, arrow.float64(), metadata=_attributes(result, name)) for name in names]
     schema = arrow.schema(fields, metadata={"title": result.title})
@@ -136,8 +136,8 @@ def _columns_of_letters(texts: list[str]) -> np.ndarray:
     return np.array(["".join(letters) for letters in zip(*padded, strict=True)])
 
 
-def _extra(module: str) -> Any:
-    """An optional module, or an error that says how to install it."""
+def extra_module(module: str) -> Any:
+    """A module of the extra `results`; GantryTauError that says how to install it where it is missing."""
     try:
         return importlib.import_module(module)
     except ImportError as error:

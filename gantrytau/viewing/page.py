@@ -198,8 +198,12 @@ def _cone() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mesh(file: Path | None) -> Any:
-    import trimesh
-
+    try:
+        import trimesh
+    except ImportError:
+        raise ModelError(
+            f"{file}: found no trimesh, which reads meshes, expected it installed; pip install 'gantrytau[view]'"
+        ) from None
     why = "no faces"
     try:
         found = trimesh.load_mesh(str(file))

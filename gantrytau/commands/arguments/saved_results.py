@@ -49,6 +49,7 @@ def _csv(file: Path) -> dict[str, Any]:
 def _netcdf(file: Path, option: str) -> dict[str, Any]:
     """Scalar by name; vectors and matrices are written whole."""
     try:
+        import h5netcdf  # noqa: F401 - xarray would tell of an unknown engine
         import xarray
 
         with xarray.open_dataset(file, engine="h5netcdf") as opened:

@@ -1,0 +1,1 @@
+"""`gantrytau doctor`: whether an installation works."""
