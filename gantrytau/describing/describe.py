@@ -102,13 +102,21 @@ def object_described(thing: Any, name: str = "") -> Description:
         found = describe(getattr(thing, name))
         words = told_of(cls).get(name, "") or first_sentence(_doc(getattr(cls, name, None)))
         return Description(name, f"of {cls.__name__}", words, (), found.tables, found.text)
-    told = told_of(cls)
-    rows = [(key, short(getattr(thing, key, None)), told.get(key, "")) for key in names]
+    told, said = told_of(cls), _metadata(thing)
+    rows = [(key, short(getattr(thing, key, None)), *said.get(key, ("", told.get(key, "")))) for key in names]
     summary = first_sentence(cls.__doc__) if names or cls.__module__.startswith("gantrytau") else ""
-    tables = (Listing.of("Fields", ("name", "value", "description"), rows),)
+    tables = (Listing.of("Fields", ("name", "value", "unit", "description"), rows),)
     return Description(
         cls.__name__, "", summary, (), tables, _said(thing) if names else short(thing, 4 * LENGTH)
     )
+
+
+def _metadata(thing: Any) -> dict[str, tuple[str, str]]:
+    """Unit and description of fields that say them in their metadata, as those of prototypes."""
+    if not is_dataclass(thing):
+        return {}
+    told = {f.name: f.metadata for f in fields(thing) if "unit" in f.metadata}
+    return {n: ("" if m["unit"] == "1" else m["unit"], m.get("description", "")) for n, m in told.items()}
 
 
 def _said(thing: Any) -> str:

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_models.quantities import (
     REMEDY,
@@ -111,7 +112,7 @@ class Arm:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Robot:
+class _Robot(Record):
     """What all Gantry-Tau robots have."""
 
     name: str

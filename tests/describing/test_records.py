@@ -282,3 +282,14 @@ def test_a_study_and_its_cases_are_short():
     assert len(repr(found)) < LONGEST
     assert "2 cases" in found._repr_html_()
     assert len(repr(found.cases[0])) < LONGEST
+
+
+def test_prototypes_have_units_and_descriptions():
+    rows = {row["name"]: row for row in describe(prototypes.L1).as_mapping()["Fields"]}
+    assert rows["plate_mass"] == {
+        "name": "plate_mass",
+        "value": str(prototypes.L1.plate_mass),
+        "unit": "kg",
+        "description": "mass of the plate and tool",
+    }
+    assert len(repr(prototypes.L1)) < LONGEST

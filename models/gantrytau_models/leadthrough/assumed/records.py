@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau_models.quantities import hold_numbers, quantities_of, quantity
 
@@ -13,7 +14,7 @@ _FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True, kw_only=True)
-class SurfaceRecord:
+class SurfaceRecord(Record):
     """A surface that a tool is led along; z = slope x + ripple, in axes of the tool. No value is printed."""
 
     name: str
@@ -28,7 +29,7 @@ class SurfaceRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OperatorRecord:
+class OperatorRecord(Record):
     """How somebody leads a tool along a surface. No value is printed."""
 
     name: str

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
 from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
 from gantrytau.whole_files import replacing
@@ -22,7 +23,7 @@ _COVARIANCE = {"cxx": (0, 0), "cxy": (0, 1), "cxz": (0, 2), "cyy": (1, 1), "cyz"
 _ACTUATOR = re.compile(r"q[1-9]\d*")
 
 
-class Measurements:
+class Measurements(Record):
     """Measured poses of a robot, and measured guideways. SI units; the first axis is the pose.
 
     q: actuator positions (N, n), carts in m first, then angles in rad; r: tool positions (N, 3) in m; R: orientations of

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gantrytau import ModelError
+from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.report.report import nominal_values, scalars
 
@@ -13,7 +14,7 @@ HOLDERS = ("arms", "links", "turntables", "tool")
 
 
 @dataclass(frozen=True)
-class ParameterRow:
+class ParameterRow(Record):
     """A number of a calibration, in m or rad: value and change from the nominal one, None where there is none.
 
     deviation: standard deviation, None for a number that was held, NaN for one that data do not hold.

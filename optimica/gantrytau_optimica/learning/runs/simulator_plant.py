@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from gantrytau import ModelError, Result, Samples
+from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.learning.pose_maps import PoseMap
 from gantrytau_optimica.learning.readings import with_readings
@@ -15,7 +16,7 @@ Names = str | Sequence[str]  # of a vector, of a scalar where there is one, or o
 LATE = 1e-6  # of a period, by which a time may be off
 
 
-class SimulatorPlant:
+class SimulatorPlant(Record):
     """A robot under its servos that a function simulates, `simulator(inputs, stop)`, from rest at the first references.
 
         SimulatorPlant(lambda inputs, stop: cosimulate({"rig": "rig.fmu"}, stop=stop, step=0.004, inputs=inputs), ...)
