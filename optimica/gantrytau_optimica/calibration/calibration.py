@@ -6,15 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import GantryTauError, Model, ModelError
+from gantrytau import Description, GantryTauError, Model, ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.report.described_calibration import calibration_described
 from gantrytau_optimica.calibration.report.report import write_report
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 
 
 class Calibration(FittedRods):
     """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements."""
+
+    def __describe__(self, name: str = "") -> Description:
+        return calibration_described(self, name)
 
     @cached_property
     def kinematics(self) -> Any:

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from gantrytau import Description, ModelError
+from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
@@ -23,7 +23,6 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
     rod_links,
 )
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
-from gantrytau_optimica.calibration.judging.described_calibration import calibration_described
 from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.link_systems import LinkSystem, link_systems
 from gantrytau_optimica.calibration.judging.plausibility import Misses
@@ -66,9 +65,6 @@ class FittedRods(Record):
             f"<Calibration of {self.nominal_rods.name}, model {self.model}: {len(self.names)} numbers from "
             f"{len(self.rows)} poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
         )
-
-    def __describe__(self, name: str = "") -> Description:
-        return calibration_described(self, name)
 
     def with_findings(self, findings: Sequence[Finding]) -> Self:
         """The same with other findings, without working anything out anew."""
