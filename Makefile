@@ -5,7 +5,7 @@ VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 LOCK := pyproject.toml constraints.txt
 
-.PHONY: demo test bench lint style types pytest clean
+.PHONY: demo test bench docs lint style types pytest clean
 
 demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
@@ -20,6 +20,10 @@ pytest: $(VENV)/installed-dev
 
 bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
+
+# Notebooks are executed again only where they, or the packages, have changed.
+docs: $(VENV)/installed-docs
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m notebooks.site.builder
 
 lint: style types
 
@@ -44,6 +48,11 @@ $(VENV)/installed-dev: $(LOCK) | $(VENV)/bin/pip
 $(VENV)/installed-bench: $(LOCK) | $(VENV)/bin/pip
 	@echo "Installing gantrytau and the peers it is measured against into $(VENV) ..."
 	$(PIP) install --quiet -e '.[bench]' -c constraints.txt
+	@touch $(VENV)/installed $@
+
+$(VENV)/installed-docs: $(LOCK) | $(VENV)/bin/pip
+	@echo "Installing gantrytau and what its site is built with into $(VENV) ..."
+	$(PIP) install --quiet -e '.[docs]' -c constraints.txt
 	@touch $(VENV)/installed $@
 
 $(VENV)/bin/pip:
