@@ -110,20 +110,15 @@ def directive(name: str, head: str, body: list[str], colons: int, options: str =
 
 
 def _class_body(cls: type, link: Callable[[str], str | None]) -> Iterator[str]:
-    bases = [
-        base
-        for base in cls.__mro__[1:]
-        if base.__module__.startswith(OWN) and not base.__name__.startswith("_")
-    ]
-    known = ", ".join(f"{{py:obj}}`{b.__name__} <{link(b.__name__)}>`" for b in bases if link(b.__name__))
-    if known:
-        yield f"Is a {known}."
+    bases = [base for base in cls.__bases__ if base.__module__.startswith(OWN) and link(base.__name__)]
+    if bases:
+        yield f"A {', '.join(f'{{py:obj}}`{base.__name__} <{link(base.__name__)}>`' for base in bases)}."
     doc = cls.__dict__.get("__doc__") or ""
     generated = dataclasses.is_dataclass(cls) and doc.startswith(f"{cls.__name__}(")
     if doc and not generated:
         yield markdown(doc, arguments(cls), link)
     if issubclass(cls, Declared) and cls not in (Declared, Model, Connector):
-        yield from component_tables(cls)
+        yield from component_tables(cls, link)
         return
     yield _fields_with_units(cls)
     for name, member in _members(cls):

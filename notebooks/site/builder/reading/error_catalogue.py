@@ -135,5 +135,5 @@ def split(text: str) -> tuple[str, str]:
     sentence = re.fullmatch(r"(.*[a-z0-9)\]⟩]\.) ([A-Z][a-z]+ .{8,})", text)
     if sentence:
         return sentence[1], sentence[2]
-    expected = re.fullmatch(r".*, expected (.+)", text)
+    expected = re.fullmatch(r".*\bexpected (.+)", text)
     return text, f"expected: {expected[1]}" if expected else ""

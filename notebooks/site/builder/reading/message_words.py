@@ -103,6 +103,10 @@ def spoken(node: ast.expr) -> str:
         return str(node.value)
     if isinstance(node, ast.IfExp):
         return spoken(node.body)
+    if isinstance(node, ast.BoolOp):
+        return spoken(node.values[0])
+    if isinstance(node, ast.JoinedStr):
+        return next((spoken(v.value) for v in node.values if isinstance(v, ast.FormattedValue)), "...")
     if isinstance(node, ast.BinOp):
         return spoken(node.right if isinstance(node.left, ast.Constant) else node.left)
     if isinstance(node, ast.GeneratorExp | ast.ListComp | ast.SetComp):
