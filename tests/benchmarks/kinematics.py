@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gantrytau.kinematics import Kinematics, accuracy, assembly_modes
+from gantrytau.kinematics import Kinematics, accuracy, assembly_modes, assembly_study
 from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
 from tests.kinematics.test_assembly_modes import HOME, f1_hexapod, link_errors, random_hexapod
@@ -132,6 +132,15 @@ def _assembly_modes() -> Iterator[Row]:
             ([e.max() < 1e-12 for e in errors], "doubles"), (exact, "long numbers"),
         ))  # fmt: skip
         yield shown(f"assembly modes, {name}, of 100 with all 40 within 1e-9 mm", words)
+    robot = Kinematics(F1GantryTau(prototypes.F1))
+    begin = time.perf_counter()
+    study = assembly_study(robot, HOME + spread * random.uniform(-1, 1, (50, 6)))
+    each = 1e3 * (time.perf_counter() - begin) / len(study)
+    yield at_least(
+        "study of assembly modes, poses of 50 with all 40, 16 in the thesis", int(study.complete.sum()), 49
+    )
+    yield at_most("study of assembly modes, time of a pose", each, 100, "ms")
+    yield shown("study of assembly modes, poses by real modes", str(study.histogram))
 
 
 def _errors_of_d1() -> Iterator[Row]:

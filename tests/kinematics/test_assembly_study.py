@@ -1,12 +1,13 @@
 """Assembly modes over many poses: numbers of the thesis, distances, pictures, and requests that cannot be met."""
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gantrytau import ModelError, StructureError
-from gantrytau.kinematics import Kinematics, assembly_study
+from gantrytau.kinematics import Kinematics, Limits, assembly_study, workspace
 from gantrytau.viewing.film import film_of
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 
@@ -42,6 +43,7 @@ def test_eight_modes_are_two_groups_of_four(f1):
     # section 4.5: "two groups of four", the two solutions of the kinematics of three degrees; here Table 5.5 at q = 0
     study = assembly_study(f1, np.zeros(6))
     assert study.counts.tolist() == [8]
+    assert str(study).startswith("Assembly modes of F1GantryTau, 1 pose: 8 real ones, 8 in the mean")
     assert study.groups.tolist() == [[4, 4]]
     r, _ = study.modes[0].poses
     three = [c.r for c in f1.configurations(q=np.zeros(6))]
@@ -58,6 +60,25 @@ def test_the_branch_is_the_pose_that_forward_kinematics_answers(f1, study):
         np.testing.assert_allclose(modes.poses[0][study.branch[k]], r[k], atol=1e-9)
         np.testing.assert_allclose(modes.poses[1][study.branch[k]], R[k], atol=1e-9)
         assert not modes.crossed[study.branch[k]]
+
+
+def test_ball_joints_of_the_f1_leave_one_mode(f1):
+    # Figure 4.16: poses within 45 degrees at the ball joints; carts may go half a metre either way
+    limits = Limits(strokes=(-0.5, 0.5), ball_joint=math.radians(45))
+    inside = workspace(f1, limits, places=30)
+    q = inside.examined.q[inside.examined.inside]
+    study = assembly_study(f1, q)
+    assert len(study) > 20
+    assert (study.branch >= 0).all()
+    assert (study.counts >= 4).all()
+    np.testing.assert_array_equal(study.within(math.radians(45)), 1)
+    own = [angles[k] for angles, k in zip(study.angles, study.branch, strict=True)]
+    expected = f1.ball_joint_angles(inside.places, np.tile(f1.home.R, (len(q), 1, 1)), q).max(axis=(1, 2))
+    np.testing.assert_allclose(own, expected, atol=1e-9)
+    np.testing.assert_array_equal(study.within(math.pi), study.counts)
+    for limit in (0.0, 45.0, np.nan):
+        with pytest.raises(ModelError, match="expected an angle above 0 and up to pi in rad"):
+            study.within(limit)
 
 
 def test_distances_are_those_of_the_joints_on_the_plate(f1, study):
@@ -131,7 +152,7 @@ def test_a_picture_for_each_mode(study, tmp_path):
     figure = study.plot_modes(row, file=tmp_path / "robots.png")
     assert len(figure.axes) == 8
     titles = [axis.get_title() for axis in figure.axes]
-    own = [k for k, title in enumerate(titles) if "the robot's" in title]
+    own = [k for k, title in enumerate(titles) if "the robot’s" in title]
     assert own == [study.branch[row]]
     free = [k for k, title in enumerate(titles) if "no links crossed" in title]
     assert len(free) == study.feasible[row]
@@ -153,6 +174,15 @@ def test_the_film_shows_mode_k_from_second_k_on(study):
         during = (film.times > k + 0.1) & (film.times < k + 0.9)
         place = film.values("plate[4].r", (3,))[during]
         np.testing.assert_allclose(place, np.broadcast_to(r[k] + R[k] @ joints[4], place.shape), atol=1e-12)
+
+
+def test_the_page_goes_from_mode_to_mode(study, tmp_path):
+    pytest.importorskip("viser")
+    row = int(study.counts.argmax())
+    page = study.view(row, file=tmp_path / "modes.html")
+    assert page.file == tmp_path / "modes.html"
+    assert page.title == f"{study.counts[row]} assembly modes of F1GantryTau"
+    assert page.file.stat().st_size < 3e6
 
 
 def test_links_that_cannot_meet_have_no_mode_to_show(f1):

@@ -37,7 +37,8 @@ class AssemblyStudy(Record):
 
     names: of the robots; robot: (N,), which of them a row is of; q: (N, n), m and rad; modes: the record of
     `assembly_modes` of each row, real modes first; branch: (N,), which mode `Kinematics.fk` answers, -1 where it answers
-    none. Rows are all poses of the first robot, then those of the next one.
+    none; angles: for each row the largest angle of a ball joint in each real mode, (k,) in rad, from axes along the links in
+    the home pose. Rows are all poses of the first robot, then those of the next one.
     """
 
     names: tuple[str, ...]
@@ -45,6 +46,7 @@ class AssemblyStudy(Record):
     q: np.ndarray
     modes: tuple[AssemblyModes, ...]
     branch: np.ndarray
+    angles: tuple[np.ndarray, ...]
     _geometries: tuple[RodGeometry, ...] = field(repr=False)
 
     def __len__(self) -> int:
@@ -53,7 +55,7 @@ class AssemblyStudy(Record):
     def __str__(self) -> str:
         words = ", ".join(dict.fromkeys(self.names))
         lines = [
-            f"Assembly modes of {words}, {len(self)} poses: {self.counts.min()} to {self.counts.max()} real ones, "
+            f"Assembly modes of {words}, {len(self)} pose{'s' * (len(self) > 1)}: {_span(self.counts)} real ones, "
             f"{self.counts.mean():.3g} in the mean",
             "  real modes  poses  without crossed links",
         ]
@@ -91,6 +93,15 @@ class AssemblyStudy(Record):
         """How many real modes lie on the one side of the plane through the joints on the carts, and on the other, (N, 2)."""
         return np.array([[int((found.group == side).sum()) for side in (1, -1)] for found in self.modes])
 
+    def within(self, limit: float) -> np.ndarray:
+        """How many real modes have no ball joint beyond an angle in rad, (N,): those that the robot could be in."""
+        if not 0 < real(limit) <= np.pi:
+            raise ModelError(
+                f"within: found a limit of {limit!r}, expected an angle above 0 and up to pi in rad; convert degrees with "
+                "math.radians"
+            )
+        return np.array([int((angles <= real(limit)).sum()) for angles in self.angles])
+
     @property
     def histogram(self) -> dict[int, int]:
         """How many poses have so many real modes, by the number of modes."""
@@ -100,17 +111,22 @@ class AssemblyStudy(Record):
     @cached_property
     def nearest(self) -> np.ndarray:
         """Between the two real modes of a pose that are nearest to each other, (N,) in m, see `distances`; NaN below two."""
-        return np.array([_least(self.distances(row)) for row in range(len(self))])
+        found = np.array([self._gaps(row).min(initial=np.inf) for row in range(len(self))])
+        return np.where(self.counts < 2, np.nan, found)
 
     @cached_property
     def to_next(self) -> np.ndarray:
         """From the mode that the robot is in to the nearest other one, (N,) in m; NaN where either is not there."""
-        return np.array([
-            np.nan if self.branch[row] < 0 else _least(self.distances(row)[self.branch[row]][None])
-            for row in range(len(self))
-        ])  # fmt: skip
+        found = [self._gaps(row)[k].min() if k >= 0 else np.nan for row, k in enumerate(self.branch)]
+        return np.where(self.counts < 2, np.nan, found)
 
-    def distances(self, row: int) -> np.ndarray:
+    def _gaps(self, row: int) -> np.ndarray:
+        """`distances`, infinite from a mode to itself."""
+        found = self.distances(row)
+        np.fill_diagonal(found, np.inf)
+        return found
+
+    def distances(self, row: int = 0) -> np.ndarray:
         """Between the real modes of a row, (k, k) in m: the root of the mean square way of the joints on the plate."""
         r, R = self.modes[self._row(row)].poses
         joints = r[:, None] + self._geometries[self.robot[row]].on_plate @ np.swapaxes(R, 1, 2)
@@ -126,7 +142,12 @@ class AssemblyStudy(Record):
         Raises ModelError for a row that there is not, or that has no real mode.
         """
         modes = self._with_modes(row)
-        return draw_modes(self._geometries[self.robot[row]], self.q[row], modes, int(self.branch[row]), file)
+        captions = [
+            f"mode {k}, side {'+' if modes.group[k] > 0 else '−'}{', the robot’s' if k == self.branch[row] else ''}\n"
+            f"ball joints to {np.degrees(angle):.0f}°"
+            for k, angle in enumerate(self.angles[row])
+        ]
+        return draw_modes(self._geometries[self.robot[row]], self.q[row], modes, captions, file)
 
     def motion(self, row: int = 0) -> Result:
         """The real modes of a row one after the other, from the second k on that of number k, for `animate`.
@@ -180,7 +201,7 @@ def assembly_study(
         raise ModelError(f"assembly_study: found diameter={diameter!r}, expected 0 or more, in m")
     robots = [_with_six_links(one) for one in given]
     places = [_coordinates(one, q) for one in robots]
-    modes, branch = [], []
+    modes, branch, angles = [], [], []
     for one, rows in zip(robots, places, strict=True):
         geometry = one.linked("assembly_study").geometry
         r, R = one.fk(rows)
@@ -191,12 +212,14 @@ def assembly_study(
                 raise StructureError(f"row {k} of {one.dae.name}: {error}") from error
             modes.append(found)
             branch.append(_own(found, geometry, r[k], R[k]))
+            angles.append(_largest_angles(one, rows[k], found))
     return AssemblyStudy(
         names=tuple(one.dae.name for one in robots),
         robot=np.repeat(np.arange(len(robots)), [len(rows) for rows in places]),
         q=np.concatenate(places),
         modes=tuple(modes),
         branch=np.array(branch),
+        angles=tuple(angles),
         _geometries=tuple(one.linked().geometry for one in robots),
     )
 
@@ -235,10 +258,10 @@ def _own(modes: AssemblyModes, geometry: RodGeometry, r: np.ndarray, R: np.ndarr
     return int(away.argmin()) if away.min() < SAME else -1
 
 
-def _least(distances: np.ndarray) -> float:
-    """The least above zero of distances, of which those of a mode from itself are zero; NaN if there is none."""
-    others = distances[distances > 0]
-    return float(others.min()) if others.size else np.nan
+def _largest_angles(robot: Kinematics, q: np.ndarray, modes: AssemblyModes) -> np.ndarray:
+    """The largest angle of a ball joint in each real mode, (k,) in rad."""
+    r, R = modes.poses
+    return robot.ball_joint_angles(r, R, np.tile(q, (len(r), 1))).max(axis=(1, 2), initial=0.0)
 
 
 def _span(numbers: np.ndarray) -> str:

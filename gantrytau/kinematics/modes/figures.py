@@ -1,6 +1,7 @@
 """Figures of assembly modes: how many there are, and the robot in each of them. Dressler (2012), Figures 4.17 and 4.18."""
 
 import os
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -68,9 +69,9 @@ def draw_histogram(
 
 
 def draw_modes(
-    geometry: RodGeometry, q: np.ndarray, modes: AssemblyModes, branch: int, file: FileName | None
+    geometry: RodGeometry, q: np.ndarray, modes: AssemblyModes, captions: Sequence[str], file: FileName | None
 ) -> "Figure":
-    """The robot in each real mode, one picture each; see `AssemblyStudy.plot_modes`."""
+    """The robot in each real mode, one picture each, under its caption; see `AssemblyStudy.plot_modes`."""
     import matplotlib.pyplot as plt
 
     if file is not None:
@@ -82,17 +83,20 @@ def draw_modes(
     columns = min(_COLUMNS, len(B))
     rows = -(-len(B) // columns)
     shape = np.clip((high - low)[2] / max(np.linalg.norm((high - low)[:2]), 1e-9), 0.5, 1.5)
-    figure = plt.figure(figsize=(3.0 * columns, (0.8 + 2.6 * shape) * rows), layout="constrained")
+    figure = plt.figure(figsize=(3.0 * columns, (1.0 + 2.6 * shape) * rows), layout="constrained")
     for k, ends in enumerate(B):
         axis: Any = figure.add_subplot(rows, columns, k + 1, projection="3d")
         _draw_robot(axis, geometry, A, ends, rails, {link for pair in modes.crossed[k] for link in pair})
         for name, least, most in zip("xyz", low, high, strict=True):
             getattr(axis, f"set_{name}lim")(least, most)
             getattr(axis, f"set_{name}label")(f"{name} [m]", fontsize="xx-small", labelpad=-6)
-        axis.set_box_aspect(np.maximum(high - low, 0.15 * (high - low).max()), zoom=1.15)
+        axis.set_box_aspect(np.maximum(high - low, 0.15 * (high - low).max()), zoom=1.0)
         axis.tick_params(labelsize="xx-small", pad=-2)
         axis.locator_params(nbins=4)
-        axis.set_title(_title(modes, k, branch), fontsize="small")
+        pairs = ", ".join(f"{i}-{j}" for i, j in modes.crossed[k])
+        axis.set_title(
+            f"{captions[k]}\n{f'crossed {pairs}' if pairs else 'no links crossed'}", fontsize="small"
+        )
     return finished(figure, file)
 
 
@@ -113,14 +117,6 @@ def _draw_robot(
     axis.add_collection3d(
         Poly3DCollection(B[faces], facecolor="tab:orange", edgecolor="0.3", linewidth=0.4, alpha=0.5)
     )
-
-
-def _title(modes: AssemblyModes, k: int, branch: int) -> str:
-    """Number, side and crossed links of a mode."""
-    pairs = ", ".join(f"{i + 1}-{j + 1}" for i, j in modes.crossed[k])
-    what = f"crossed {pairs}" if pairs else "no links crossed"
-    own = ", the robot's" if k == branch else ""
-    return f"{k + 1}, side {'+' if modes.group[k] > 0 else '−'}{own}\n{what}"
 
 
 def mode_scene(geometry: RodGeometry, q: np.ndarray, modes: AssemblyModes, name: str) -> Result:
