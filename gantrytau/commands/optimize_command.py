@@ -10,6 +10,7 @@ import typer
 from gantrytau import GantryTauError, SolveError
 from gantrytau.commands.arguments import solver_options
 from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.display_option import Displayed, check_display, displayed
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
 from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To
 from gantrytau.commands.arguments.problem_name import ProblemName
@@ -46,6 +47,7 @@ def optimize(
     guess: solver_options.Guess = None,
     plot: Plotted = None,
     to: To = None,
+    display: Displayed = None,
     save: Saved = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
     prototype: PrototypeName = None,
@@ -59,7 +61,7 @@ def optimize(
     from gantrytau_optimica import Optimization
 
     with reporting(json, source_of(problem), solver_options.SPELLING):
-        drawn = listed(plot)
+        drawn, units = listed(plot), displayed(display)
         place = picture_output.place(drawn, to)
         result_output.rehearse(save)
         policy: dict[str, Any] = dict(elements=elements, points=points, scheme=scheme, tolerance=tolerance)
@@ -71,21 +73,23 @@ def optimize(
             policy["guess"] = read_result(guess)
         chosen = build(problem, prototype, set_ or (), Kind(Optimization, "problem", "move.py:Fastest"))
         flat = _flat(chosen, drawn)
+        check_display(units, flat, drawn)
         try:
             optimum = _solved(chosen, quiet, policy)
         except SolveError as error:
             _leave(error, chosen, save, json)
-        _answer(optimum, chosen, flat, Wanted(save, drawn, place, json))
+        _answer(optimum, chosen, flat, Wanted(save, drawn, place, json, units))
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is wanted of an optimum: a file, pictures of variables and their place, and JSON."""
+    """What is wanted of an optimum: a file, pictures of variables and their place, JSON, and in which units."""
 
     save: Path | None
     drawn: tuple[str, ...]
     place: str | None
     json: bool
+    units: Any = None
 
 
 def _answer(optimum: "Optimum", chosen: Chosen, flat: "FlatModel", wanted: Wanted) -> None:
@@ -137,11 +141,13 @@ def _written(optimum: "Optimum", wanted: Wanted, files: list[str]) -> str:
     """Write the files of a solution, named in `files`; why some are not written, which does not cost the answer."""
     wrong: list[str] = []
     try:
-        files += result_output.save(optimum, wanted.save)
+        files += result_output.save(optimum, wanted.save, wanted.units)
     except GantryTauError as error:
         wrong.append(str(error))
     try:
-        files += picture_output.draw(optimum, wanted.drawn, wanted.place) if wanted.place else []
+        files += (
+            picture_output.draw(optimum, wanted.drawn, wanted.place, wanted.units) if wanted.place else []
+        )
     except GantryTauError as error:
         wrong.append(str(error))
     return "\n".join(wrong)

@@ -6,6 +6,7 @@ import typer
 
 from gantrytau import DoubtfulResult, SolveError
 from gantrytau.commands.arguments.choice import source_of
+from gantrytau.commands.arguments.display_option import Displayed, check_display, displayed, of_table
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
     Inputs,
@@ -51,6 +52,7 @@ def simulate(
     output: Saved = None,
     plot: Plotted = None,
     to: To = None,
+    display: Displayed = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
     json: Json = False,
@@ -61,11 +63,12 @@ def simulate(
     """
     with reporting(json, source_of(model), SPELLING):
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
-        kept = listed(outputs)
+        kept, units = listed(outputs), displayed(display)
         result_output.rehearse(output)
         place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
         dae = _translated(chosen, (*drawn, *kept))
+        check_display(units, dae.flat, drawn)
         policy = dict(
             stop=stop, start=start, tolerance=tolerance, points=points, max_step=max_step, seed=seed
         )
@@ -75,14 +78,14 @@ def simulate(
                 result = _simulated(dae, signals, outputs=(*kept, *drawn) if kept else None, **policy)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
-        files = result_output.save(result, output)
+        files = result_output.save(result, output, units)
         if place:
-            files += picture_output.draw(result, drawn, place)
+            files += picture_output.draw(result, drawn, place, units)
         summary = {**_summary(chosen, dae, result, files), "warnings": told}
         if json:
             typer.echo(as_json(summary))
         else:
-            _show(summary, dae, result)
+            _show(summary, dae, result, units)
 
 
 def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
@@ -116,7 +119,7 @@ def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> 
     }
 
 
-def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
+def _show(summary: dict[str, Any], dae: "Dae", result: "Result", units: Any) -> None:
     """The states at both ends as a table; texts of the model are no markup."""
     from rich.box import SIMPLE
     from rich.console import Console
@@ -135,10 +138,9 @@ def _show(summary: dict[str, Any], dae: "Dae", result: "Result") -> None:
         for heading in ("start", "end", "least", "greatest"):
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("unit")
-        for name in states:
-            values = result[name]
+        for name, (values, unit) in of_table(result, states, units).items():
             numbers = (values[0], values[-1], values.min(), values.max())
-            table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(result.unit(name)))
+            table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(unit))
         Console().print(table)
     for file in summary["files"]:
         typer.echo(f"Written: {file}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError
+from gantrytau.commands.arguments.display_option import Displayed, displayed
 from gantrytau.commands.arguments.options import Json, Plotted, To
 from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.arguments.study_file import EXAMPLE, StudyFile, read_study
@@ -61,6 +62,7 @@ def study(
     ] = None,
     plot: Plotted = None,
     to: To = None,
+    display: Displayed = None,
     example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
     json: Json = False,
 ) -> None:
@@ -77,7 +79,7 @@ def study(
                 "no file: expected that of a study; `gantrytau study --example > study.toml` begins one"
             )
         drawn = listed(plot)
-        place = picture_output.place(drawn, to)
+        place, units = picture_output.place(drawn, to), displayed(display)
         writable_place("--output", output, ".nc")
         asked = read_study(file)
         keywords = dict(asked.keywords)
@@ -88,7 +90,7 @@ def study(
             with writable(output):
                 files.append(str(found.save(output)))
         if place:
-            files += picture_output.draw(found, drawn, place)
+            files += picture_output.draw(found, drawn, place, units)
         if json:
             typer.echo(as_json(_summary(asked.name, found, files)))
         else:

@@ -9,7 +9,7 @@ class Emf(TwoPins):
     """Converts without loss: v = k w, torque k i on the flange, against the ground."""
 
     k = Parameter(0.05, unit="N.m/A", description="torque for a current, and voltage for an angular velocity")
-    w = Real(unit="rad/s", description="angular velocity of the flange")
+    w = Real(unit="rad/s", display="rpm", description="angular velocity of the flange")
     flange = rotational.Flange()
 
     def equations(self):

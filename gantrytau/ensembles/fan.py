@@ -41,7 +41,13 @@ def draw_fan(
     ]
     if not scalars:
         raise ModelError(f"{title}: plot() found no names, expected those of variables, as plot('x')")
+    varied = [name for name in cases[0][0].chosen if name in first and name not in first.arrays]
     shown = shown_units(first, ("time", *scalars), display, DECLARED, "plot")
+    shown |= {
+        name: one
+        for name, one in shown_units(first, varied, None, DECLARED, "plot").items()
+        if name not in shown
+    }
     figure, axes = plt.subplots(
         len(scalars),
         sharex=True,
@@ -65,15 +71,23 @@ def _lines(axis: Any, cases: Sequence[tuple[Case, Result]], name: str, shown: Ma
     """One line for each case; where they are many, one colour for each value of the name that was given first."""
     import matplotlib.pyplot as plt
 
-    words = [str(case) for case, _ in cases]
+    told = [[_told(key, value, shown.get(key)) for key, value in c.names.items()] for c, _ in cases]
+    words = [", ".join(parts) or str(case) for parts, (case, _) in zip(told, cases, strict=True)]
     if len(cases) > LABELS:
-        words = [f"{key}={spoken(value)}" for key, value in (next(iter(c.names.items())) for c, _ in cases)]
+        words = [parts[0] for parts in told]
     groups = list(dict.fromkeys(words))
     colours = dict(zip(groups, plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(groups))), strict=True))
     for text, (_, result) in zip(words, cases, strict=True):
         label = text if len(groups) <= LABELS or text in (groups[0], groups[-1]) else None
         times, values = shown["time"].of(result.time), shown[name].of(result[name])
         axis.plot(times, values, color=colours[text], linewidth=1.0, label=label)
+
+
+def _told(name: str, value: Any, shown: Shown | None) -> str:
+    """What tells a case from others, in the unit in which it is shown."""
+    if shown is None or shown.scale is None or not isinstance(value, (int, float)):
+        return f"{name}={spoken(value)}"
+    return f"{name}={spoken(shown.of(float(value)))} {shown.unit}"
 
 
 def _bands(axis: Any, cases: Sequence[tuple[Case, Result]], name: str, shown: Mapping[str, Shown]) -> None:

@@ -52,6 +52,7 @@ USUAL = {  # what people write in place of a coherent unit, the most usual first
 }  # fmt: skip
 SPELLINGS = {"µ": "u", "μ": "u", "°C": "degC", "°F": "degF", "°": "deg", "Ω": "Ohm", "·": ".", "⋅": ".", "*": ".",
              "²": "2", "³": "3", "^": ""}  # fmt: skip
+DIGITS = 12  # behind the first, that a number of few digits may have
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*(?P<number>{_NUMBER}|\[.*\])\s*(?P<unit>[^\d\s\[\].,+_-].*?|1/.*?)?\s*")
 
@@ -69,22 +70,35 @@ class Scale:
 
     def si(self, numbers: Any) -> Any:
         """Numbers in this unit, an array or one, in SI, to a rounding or two; ModelError below absolute zero."""
+        if self.zero and np.any(np.asarray(numbers) < -self.zero):
+            low = float(np.min(numbers))
+            raise ModelError(f"found {low:g} {self.text}, expected at least {-self.zero:g}, absolute zero")
+        return self._si(numbers)
+
+    def _si(self, numbers: Any) -> Any:
         if self.zero:
-            if np.any(np.asarray(numbers) < -self.zero):
-                low = float(np.min(numbers))
-                raise ModelError(
-                    f"found {low:g} {self.text}, expected at least {-self.zero:g}, absolute zero"
-                )
             return (numbers + self.zero) * self.slope
         if self._plain:  # 700 mm are 700 / 1000 m, which 700 * 0.001 is not
             return numbers * self.factor.numerator / self.factor.denominator
         return numbers * self.slope
 
     def written(self, values: Any) -> Any:
-        """Values in SI, an array or one, in this unit; `si` undoes it to a rounding or two."""
-        if self._plain and not self.zero:
-            return values * self.factor.denominator / self.factor.numerator
-        return values / self.slope - self.zero
+        """Values in SI, an array or one, in this unit; `si` undoes it to a rounding or two.
+
+        Where a number of few digits is the same in SI, it is that one: 60 deg, and not 59.99999999999999.
+        """
+        plain = self._plain and not self.zero
+        whole = np.asarray(values, dtype=float)
+        found = (
+            whole * self.factor.denominator / self.factor.numerator
+            if plain
+            else whole / self.slope - self.zero
+        )
+        with np.errstate(all="ignore"):
+            power = 10.0 ** (DIGITS - np.floor(np.log10(np.abs(found))))
+            rounded = np.round(found * power) / power
+            found = np.where(self._si(rounded) == whole, rounded, found)
+        return found if found.ndim else float(found)
 
     @property
     def slope(self) -> float:

@@ -25,14 +25,14 @@ BESIDE = "a relative sensor carries no torque; connect it beside a component, no
 class Flange(Connector):
     """One end of a shaft."""
 
-    phi = Real(unit="rad", description="angle")
+    phi = Real(unit="rad", display="deg", description="angle")
     tau = Flow(unit="N.m", description="cut torque, positive into the component")
 
 
 class Fixed(Model):
     """A shaft end that does not turn."""
 
-    phi = Parameter(0.0, unit="rad", description="angle")
+    phi = Parameter(0.0, unit="rad", display="deg", description="angle")
     flange = Flange()
 
     def equations(self):
@@ -43,8 +43,8 @@ class Inertia(Model):
     """A turning mass."""
 
     J = Parameter(1.0, unit="kg.m2", min=0.0, description="moment of inertia")
-    phi = Real(unit="rad", description="angle")
-    w = Real(unit="rad/s", description="angular velocity")
+    phi = Real(unit="rad", display="deg", description="angle")
+    w = Real(unit="rad/s", display="rpm", description="angular velocity")
     flange_a = Flange()
     flange_b = Flange()
 
@@ -58,7 +58,7 @@ class Inertia(Model):
 class Compliant(Model):
     """Base of components between two flanges that carry one torque tau."""
 
-    phi_rel = Real(unit="rad", description="angle from flange_a to flange_b")
+    phi_rel = Real(unit="rad", display="deg", description="angle from flange_a to flange_b")
     tau = Real(unit="N.m", description="torque at flange_b")
     flange_a = Flange()
     flange_b = Flange()
@@ -73,7 +73,7 @@ class Spring(Compliant):
     """A linear torsion spring."""
 
     c = Parameter(1.0, unit="N.m/rad", description="stiffness")
-    phi_rel0 = Parameter(0.0, unit="rad", description="angle without torque")
+    phi_rel0 = Parameter(0.0, unit="rad", display="deg", description="angle without torque")
 
     def equations(self):
         yield from super().equations()
@@ -95,7 +95,7 @@ class SpringDamper(Compliant):
 
     c = Parameter(1.0, unit="N.m/rad", description="stiffness")
     d = Parameter(1.0, unit="N.m.s/rad", description="damping")
-    phi_rel0 = Parameter(0.0, unit="rad", description="angle without torque at rest")
+    phi_rel0 = Parameter(0.0, unit="rad", display="deg", description="angle without torque at rest")
     w_rel = Real(unit="rad/s", description="rate of phi_rel")
 
     def equations(self):
@@ -257,7 +257,7 @@ class Torque(Model):
 class Position(Model):
     """Turns the flange as a given function of time, whatever torque that takes."""
 
-    phi = Input(unit="rad", description="angle", start=0.0)
+    phi = Input(unit="rad", display="deg", description="angle", start=0.0)
     tau = Real(
         unit="N.m", description="torque that it takes, positive with the angle", undetermined=TWICE_HELD
     )
@@ -271,8 +271,8 @@ class Position(Model):
 class Speed(Model):
     """Turns the flange with a given speed, whatever torque that takes; its angle starts at `phi`, `phi=Fixed(0.5)`."""
 
-    w = Input(unit="rad/s", description="angular velocity", start=0.0)
-    phi = Real(unit="rad", description="angle", start=0.0)
+    w = Input(unit="rad/s", display="rpm", description="angular velocity", start=0.0)
+    phi = Real(unit="rad", display="deg", description="angle", start=0.0)
     tau = Real(
         unit="N.m", description="torque that it takes, positive with the angle", undetermined=TWICE_HELD
     )
@@ -289,6 +289,7 @@ class AngleSensor(Model):
 
     phi = Output(
         unit="rad",
+        display="deg",
         description="angle",
         undetermined="a sensor of angle carries no torque, so it holds nothing",
     )
@@ -302,7 +303,7 @@ class AngleSensor(Model):
 class SpeedSensor(Model):
     """Measures the angular velocity of a flange."""
 
-    w = Output(unit="rad/s", description="angular velocity")
+    w = Output(unit="rad/s", display="rpm", description="angular velocity")
     flange = Flange()
 
     def equations(self):
@@ -313,7 +314,9 @@ class SpeedSensor(Model):
 class RelativeSensor(Model):
     """Measures angle and speed between two flanges; connect it beside what it measures, not in between."""
 
-    phi_rel = Output(unit="rad", description="angle from flange_a to flange_b", undetermined=BESIDE)
+    phi_rel = Output(
+        unit="rad", display="deg", description="angle from flange_a to flange_b", undetermined=BESIDE
+    )
     w_rel = Output(unit="rad/s", description="rate of phi_rel", undetermined=BESIDE)
     flange_a = Flange()
     flange_b = Flange()

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from gantrytau.describing.described import Description
 from gantrytau.results.described_result import series_described
-from gantrytau.results.display_units import Display
+from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.figures import draw
 from gantrytau.results.files import dataset, save
-from gantrytau.results.series import Series
+from gantrytau.results.series import Series, Values
 
 if TYPE_CHECKING:
     import xarray
@@ -37,6 +37,11 @@ class Result(Series):
         a unit that measures something else.
         """
         return draw(self, names, file, display)
+
+    def shown(self, *names: str, display: Display = None) -> dict[str, tuple[Values, str]]:
+        """Values and unit of variables, as figures and tables show them; display: as of `plot`."""
+        found = shown_units(self, names, display, DECLARED, "shown")
+        return {name: (found[name].of(self[name]), found[name].unit) for name in names}
 
     def save(self, path: str | os.PathLike[str], *, display: Display = None) -> Path:
         """Write all variables to a file and return its path; the suffix chooses the format.

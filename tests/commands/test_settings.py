@@ -14,12 +14,34 @@ def test_numbers_and_vectors(text, value):
     assert number("--set", "m", text) == value
 
 
-@pytest.mark.parametrize("text", ["x", "[1, a]", "[]", "'text'", "None", "1+", "nan", "{1: 2}", "(" * 300])
+@pytest.mark.parametrize("text", ["x", "[1, a]", "[]", "'text'", "None", "nan", "{1: 2}", "(" * 300])
 def test_what_is_no_number(text):
     with pytest.raises(
-        CommandError, match=r"--set m=.*: expected a number as 2.5, a vector as '\[1, 2, 3\]'"
+        CommandError, match=r"--set m=.*: expected a number as 2.5, one with its unit as '700 mm', a vector"
     ):
         number("--set", "m", text)
+
+
+@pytest.mark.parametrize("text", ["700 mm", "[1, 2, 3] mm", "90 deg", "-5 degC", "30 %", ".5 in"])
+def test_values_with_units_are_left_to_the_model(text):
+    assert number("--set", "m", text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1+", "found '1+', expected a number and its unit"),
+        ("0,7 m", "expected a number and its unit, as '2.5 mm'; decimals have a point"),
+        ("700 MM", "there is no unit 'MM'; did you mean 'mm'?"),
+        ("-300 degC", "expected at least -273.15, absolute zero"),
+        ("[1, a] mm", "expected a number and its unit"),
+    ],
+)
+def test_what_is_no_value_with_a_unit(text, words):
+    with pytest.raises(CommandError) as caught:
+        number("--set", "m", text)
+    assert str(caught.value).startswith(f"--set m={text}: ")
+    assert words in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["m", "=2", "m=", "m= "])

@@ -213,7 +213,12 @@ def test_studies_vary_values_with_units():
     table = found.to_xarray()
     assert table["L"].values.tolist() == [0.5, 1.0]
     assert table["phi.start"].values.tolist() == [np.radians(10), np.radians(20)]
-    assert found.plot("phi").axes[0].get_ylabel() == "phi [deg]"
+    axis = found.plot("phi").axes[0]
+    assert axis.get_ylabel() == "phi [deg]"
+    assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == [
+        "L=0.5, phi=10 deg",
+        "L=0.5, phi=20 deg",
+    ]
     assert found.plot("phi", display="rev").axes[0].get_ylabel() == "phi [rev]"
     with pytest.raises(ModelError, match="parameters: L: found '1 s', a time"):
         study(Swing(), over={"L": ["500 mm", "1 s"]}, stop=0.1)

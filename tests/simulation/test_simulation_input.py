@@ -25,6 +25,10 @@ from tests.simulation.test_simulation import Circuit, Oscillator
         ({"f": math.nan}, "expected finite numbers"),
         (
             {"f": "strong"},
+            "input f: found 'strong', expected a number and its unit, as '2.5 kN'",
+        ),
+        (
+            {"f": object()},
             "expected a number, a function of time, Samples(times, values) or a signal as white_noise",
         ),
         ({"f": ([0.0, 1.0], [0.0, math.nan])}, "input f: Samples: row 1 is not finite, expected numbers"),

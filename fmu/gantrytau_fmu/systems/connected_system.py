@@ -8,7 +8,7 @@ from typing import Any
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.units import BASE, dimension
 from gantrytau_fmu.systems.component import Component, Scalar, numeric
-from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of
+from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units
 
 SHOWN, FEW = 6, 5  # names that a message lists, and with their values
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI
@@ -224,6 +224,7 @@ def _starts(
                 raise ModelError(f"start {name}: found {value!r}, expected a text", argument="start")
             values: Sequence[float | str] = [value]
         else:
+            value = without_units("start", name, value, scalars[0].unit)
             values = numbers_of("start", name, value, len(places))
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
             if not known.has_start:
@@ -302,6 +303,7 @@ def _drives(
                     "parameters are set with start=",
                     argument="inputs",
                 )
+        value = without_units("inputs", name, value, components[places[0][0]].scalars[places[0][1]].unit)
         drives = drives_of(name, value, len(places), span)
         found.update(zip(places, drives, strict=True))
     return found

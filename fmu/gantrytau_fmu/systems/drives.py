@@ -10,6 +10,8 @@ import numpy as np
 from gantrytau import Samples
 from gantrytau.errors import ModelError
 from gantrytau.inputs.input_signal import with_course
+from gantrytau.language.scales import given
+from gantrytau.language.units import dimension
 
 ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
 
@@ -58,6 +60,36 @@ def drives_of(name: str, value: Any, count: int, span: tuple[float, float]) -> l
     if isinstance(course, Samples):
         return _samples(name, course, count, span)
     return [Drive(lambda t, x=number: x) for number in numbers_of("inputs", name, course, count)]
+
+
+def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
+    """A value for a variable of an FMU, texts such as "700 mm" brought to its unit, all else as it is.
+
+    Raises ModelError for a text of another kind, and for samples that say one, and where the FMU has a unit that is not SI.
+    """
+    texts = isinstance(value, str) or (
+        isinstance(value, (list, tuple)) and any(isinstance(x, str) for x in value)
+    )
+    said = isinstance(value, Samples) and value.unit is not None
+    if not (texts or said):
+        return value
+    place = f"{argument} {name}"
+    try:
+        dimension(unit or "1")
+    except ModelError:
+        if said:
+            return value
+        raise ModelError(
+            f"{place}: found {value!r}, expected a number in '{unit}', the unit of this FMU; convert it",
+            argument=argument,
+        ) from None
+    try:
+        if said:
+            value.check_unit(place, unit or None)
+            return value
+        return given(place, value, unit or None)
+    except ModelError as error:
+        raise ModelError(str(error), argument=argument) from None
 
 
 def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:

@@ -38,12 +38,15 @@ def read_result(file: Path, option: str = "--guess") -> "Result":
 
 
 def _csv(file: Path) -> dict[str, Any]:
-    """Column by name, without its unit."""
+    """Column by name, without its unit, in SI."""
+    from gantrytau import column_of
+
     with file.open(newline="", encoding="utf-8-sig") as opened:
         header, *rows = [row for row in csv.reader(opened) if row] or [[]]
-    names = [head.rpartition(" [")[0] or head for head in header]
-    table = np.array(rows, dtype=float).reshape(len(rows), len(names))
-    return dict(zip(names, table.T, strict=True))
+    columns = [column_of(head) for head in header]
+    table = np.array(rows, dtype=float).reshape(len(rows), len(columns))
+    pairs = zip(columns, table.T, strict=True)
+    return {name: values if unit is None else unit.si(values) for (name, unit), values in pairs}
 
 
 def _netcdf(file: Path, option: str) -> dict[str, Any]:

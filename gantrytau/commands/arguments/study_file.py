@@ -11,7 +11,7 @@ from gantrytau import did_you_mean, read_toml
 from gantrytau.commands.arguments.choice import Choice
 from gantrytau.commands.arguments.loading import load, similar
 from gantrytau.commands.arguments.model_choice import build
-from gantrytau.commands.arguments.values import signal
+from gantrytau.commands.arguments.values import signal, with_unit
 from gantrytau.commands.printing.reporting import CommandError, refusing
 
 RANGE = ("from", "to", "number")
@@ -39,7 +39,7 @@ combine = "grid"      # every combination; "zip" takes the first values of all n
 
 [over]                # parameters, start values, inputs
 L = [0.5, 1.0, 2.0]                       # m
-x = { from = 0.05, to = 0.45, number = 9 }  # m
+x = { from = "50 mm", to = "450 mm", number = 9 }  # numbers without quotes are SI
 
 [set]                 # parameters that are the same in all cases
 damping = 0.02
@@ -94,12 +94,27 @@ def _values(file: Path, name: str, values: Any) -> Any:
     if not isinstance(values, dict):
         return values
     first, last, count = (values.get(key) for key in RANGE)
+    if isinstance(first, str) and isinstance(last, str) and isinstance(count, int) and count > 1:
+        return _with_units(f"{file}: over.{name}", first, last, count)
     good = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in (first, last))
     if set(values) != set(RANGE) or not good or not isinstance(count, int) or count < 2:
         raise CommandError(
             f"{file}: over.{name}: found {values!r}, expected a list, or {{ from = 0.1, to = 0.9, number = 9 }}"
         )
     return np.linspace(float(first or 0), float(last or 0), count).tolist()
+
+
+def _with_units(place: str, first: str, last: str, count: int) -> list[str]:
+    """Texts from one to another, in the unit that both have."""
+    parts = [with_unit(place, text).strip() for text in (first, last)]
+    units = [text.lstrip("-+.eE0123456789 ") for text in parts]
+    numbers = [text.removesuffix(unit) for text, unit in zip(parts, units, strict=True)]
+    if units[0] != units[1]:
+        raise CommandError(
+            f"{place}: found from {first} to {last}, expected one unit; write both in {units[0]}"
+        )
+    least, greatest = (float(number) for number in numbers)
+    return [f"{x!r} {units[0]}" for x in np.linspace(least, greatest, count).tolist()]
 
 
 def _function(file: Path, text: str) -> Any:

@@ -2,15 +2,17 @@
 
 import ast
 import csv
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gantrytau
-from gantrytau import InputSignal, ModelError, Samples, did_you_mean
-from gantrytau.commands.printing.reporting import CommandError
+from gantrytau import InputSignal, ModelError, Samples, column_of, did_you_mean, si
+from gantrytau.commands.printing.reporting import CommandError, refusing
 
 KINDS = ("linear", "constant")  # of samples
+_VALUE = re.compile(r"[-+]?\.?\d.*|\[.*\]\s*\S+")  # begins like a number, or a vector with something behind
 SIGNALS = ("white_noise", "prbs", "steps", "chirp", "multisine")
 
 
@@ -37,7 +39,7 @@ def listed(texts: list[str] | None) -> tuple[str, ...]:
 
 
 def number(option: str, name: str, text: str) -> Any:
-    """A number, a truth value or a vector such as `[1, 2, 3]`; CommandError for all else."""
+    """A number, a truth value, a vector such as `[1, 2, 3]`, or a text with a unit; CommandError for all else."""
     try:
         value = {"true": True, "false": False}.get(text.lower())
         value = ast.literal_eval(text) if value is None else value
@@ -45,11 +47,23 @@ def number(option: str, name: str, text: str) -> Any:
         value = None
     if isinstance(value, tuple):
         value = list(value)
+    if value is None and _VALUE.match(text):
+        return with_unit(f"{option} {name}={text}", text)
     if value is None or not _numeric(value):
         raise CommandError(
-            f"{option} {name}={text}: expected a number as 2.5, a vector as '[1, 2, 3]', true or false"
+            f"{option} {name}={text}: expected a number as 2.5, one with its unit as '700 mm', a vector as '[1, 2, 3]', "
+            "true or false"
         )
     return value
+
+
+def with_unit(place: str, text: str) -> str:
+    """A text such as "700 mm" or "[1, 2, 3] mm", which the model reads; CommandError for what is none."""
+    try:
+        si(text)
+    except ModelError as error:
+        raise CommandError(f"{place}: {str(error).removeprefix('si: ')}") from error
+    return text
 
 
 def _numeric(value: Any) -> bool:
@@ -70,7 +84,7 @@ def signal(text: str) -> tuple[str, Any]:
         column, colon, kind = rest.removeprefix(":").rpartition(":")
         if kind not in KINDS:
             column, kind = f"{column}{colon}{kind}", "linear"
-        return name, _kept(text, lambda: Samples(*samples(Path(path + dot), column or name), kind=kind))
+        return name, _kept(text, lambda: samples(Path(path + dot), column or name, kind))
     if "(" in value and value.endswith(")") and value[0].isalpha():
         return name, _kept(text, lambda: _called(text, value))
     return name, number("--input", name, value)
@@ -105,8 +119,8 @@ def _kept(text: str, make: Callable[[], Any]) -> Any:
         raise CommandError(f"--input {text}: {error}") from error
 
 
-def samples(file: Path, column: str) -> tuple[list[float], list[float]]:
-    """Times in s and values of a column of a CSV file with a header; `name [unit]` answers to `name` too."""
+def samples(file: Path, column: str, kind: Any = "linear") -> Samples:
+    """A column of a CSV file with a header and a column `time`, in SI; `name [unit]` answers to `name` too."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as opened:
             rows = [row for row in csv.reader(opened) if row]
@@ -129,7 +143,11 @@ def samples(file: Path, column: str) -> tuple[list[float], list[float]]:
         table = [[float(row[places[name]]) for name in ("time", column)] for row in rows[1:]]
     except (ValueError, IndexError):
         raise CommandError(f"{file}: {_bad_row(rows, places['time'], places[column])}") from None
-    return [time for time, _ in table], [value for _, value in table]
+    with refusing(f"{file}: "):
+        (_, clock), (_, unit) = (column_of(header[places[name]]) for name in ("time", column))
+    times, values = zip(*table, strict=True)
+    times = [time if clock is None else clock.si(time) for time in times]
+    return Samples(times, values, kind=kind, unit=unit and unit.text)
 
 
 def _bad_row(rows: list[list[str]], *places: int) -> str:

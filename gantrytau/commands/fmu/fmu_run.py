@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError, did_you_mean
+from gantrytau.commands.arguments.display_option import Displayed, displayed
 from gantrytau.commands.arguments.options import Inputs, Json, Plotted, Saved, Seed, To
 from gantrytau.commands.arguments.values import listed, number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
@@ -71,6 +72,7 @@ def run(
     output: Saved = None,
     plot: Plotted = None,
     to: To = None,
+    display: Displayed = None,
     json: Json = False,
 ) -> None:
     """Run an FMU of any tool, or a system of FMUs, and print where its variables begin and end.
@@ -85,7 +87,7 @@ def run(
         drawn, signals = listed(plot), dict(signal(text) for text in input_ or ())
         start = dict(_setting(text) for text in set_ or ())
         result_output.rehearse(output)
-        place = picture_output.place(drawn, to)
+        place, units = picture_output.place(drawn, to), displayed(display)
         policy: dict[str, Any] = dict(stop=stop, step=step, start=start, tolerance=tolerance)
         policy |= dict(inputs=signals, seed=seed)
         told: list[str] = []
@@ -94,9 +96,9 @@ def run(
                 result = _result(file, policy, order=order or DEFAULT_ORDER, me=me, isolate=isolate)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
-        files = result_output.save(result, output)
+        files = result_output.save(result, output, units)
         if place:
-            files += picture_output.draw(result, drawn, place)
+            files += picture_output.draw(result, drawn, place, units)
         summary = {
             "file": str(file),
             "time": {"start": result.time[0], "stop": result.time[-1], "points": len(result.time)},

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from gantrytau import in_unit
 from gantrytau.commands.arguments.model_choice import Chosen
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def show(optimum: "Optimum", flat: "FlatModel", files: list[str]) -> None:
             (q for q in (*flat.parameters, *flat.variables) if name in (q.name, *q.elements)), None
         )
         unit = quantity.unit if quantity and quantity.unit not in (None, "1") else ""
+        if quantity and quantity.display:
+            value, unit = in_unit(value, quantity.display), quantity.display
         words = f" ({quantity.description})" if quantity and quantity.description else ""
         typer.echo(f"  {name} = {value:.8g} {unit}".rstrip() + words)
     typer.echo(f"Built in {optimum.build_time:.2f} s, solved in {optimum.solve_time:.2f} s")

@@ -54,9 +54,11 @@ def rehearse(to: str, option: str = "--to") -> None:
         raise CommandError(f"{option} {to}: the folder '{file.parent}' does not exist; create it first")
 
 
-def draw(result: "Result | Optimum | Study", names: tuple[str, ...], to: str) -> list[str]:
-    """Draw the variables; the files written."""
-    return shown(lambda file: result.plot(*names, file=file), to)
+def draw(
+    result: "Result | Optimum | Study", names: tuple[str, ...], to: str, display: Any = None
+) -> list[str]:
+    """Draw the variables, in units as `display` says; the files written."""
+    return shown(lambda file: result.plot(*names, file=file, display=display), to)
 
 
 def shown(plot: Callable[[str | None], Any], to: str, option: str = "--plot") -> list[str]:

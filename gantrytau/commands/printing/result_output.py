@@ -1,9 +1,10 @@
 """Saving a result to the file that the command line names."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from gantrytau import GantryTauError, SolveError
+from gantrytau.commands.arguments.display_option import of_file
 from gantrytau.commands.printing.reporting import FAULT, INTERRUPTED, fail, writable
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -29,12 +30,12 @@ def rehearse(file: Path | None) -> None:
                 trial.unlink(missing_ok=True)
 
 
-def save(result: "Result | Optimum", file: Path | None) -> list[str]:
-    """Write the result, if a file is named; the files written."""
+def save(result: "Result | Optimum", file: Path | None, display: Any = None) -> list[str]:
+    """Write the result, if a file is named, a CSV file in units as `display` says; the files written."""
     if file is None:
         return []
     with writable(file):
-        return [str(result.save(file))]
+        return [str(result.save(file, **of_file(display, file)))]
 
 
 def stop(error: SolveError, spelling: Spelling, output: Path | None, json: bool) -> NoReturn:

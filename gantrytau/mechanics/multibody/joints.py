@@ -75,12 +75,17 @@ class Revolute(TwoFrames):
     )
     phi = Real(
         unit="rad",
+        display="deg",
         description="angle from frame_a to frame_b about n",
         prefer=StateSelect.PREFER,
         undetermined=TURNS,
     )
     w = Real(
-        unit="rad/s", description="angular velocity about n", prefer=StateSelect.PREFER, undetermined=TURNS
+        unit="rad/s",
+        display="deg/s",
+        description="angular velocity about n",
+        prefer=StateSelect.PREFER,
+        undetermined=TURNS,
     )
     tau = Real(unit="N.m", description="driving torque about n")
     axis = rotational.Flange()
@@ -110,8 +115,12 @@ class Cylindrical(TwoFrames):
     s = Real(unit="m", description="coordinate along n", prefer=StateSelect.PREFER, undetermined=SLIDES)
     v = Real(unit="m/s", description="speed along n", prefer=StateSelect.PREFER, undetermined=SLIDES)
     f = Real(unit="N", description="driving force along n")
-    phi = Real(unit="rad", description="angle about n", prefer=StateSelect.PREFER, undetermined=TURNS)
-    w = Real(unit="rad/s", description="its rate", prefer=StateSelect.PREFER, undetermined=TURNS)
+    phi = Real(
+        unit="rad", display="deg", description="angle about n", prefer=StateSelect.PREFER, undetermined=TURNS
+    )
+    w = Real(
+        unit="rad/s", display="deg/s", description="its rate", prefer=StateSelect.PREFER, undetermined=TURNS
+    )
     tau = Real(unit="N.m", description="driving torque about n")
     axis_s, support_s = translational.Flange(), translational.Flange()
     axis_phi, support_phi = rotational.Flange(), rotational.Flange()
@@ -139,8 +148,8 @@ class Universal(TwoFrames):
 
     n_a = Parameter([1.0, 0.0, 0.0], unit="1", description="first axis, resolved in frame_a", evaluate=True)
     n_b = Parameter([0.0, 1.0, 0.0], unit="1", description="second axis, resolved in frame_b", evaluate=True)
-    phi_a = Real(unit="rad", description="angle about n_a")
-    phi_b = Real(unit="rad", description="angle about n_b")
+    phi_a = Real(unit="rad", display="deg", description="angle about n_a")
+    phi_b = Real(unit="rad", display="deg", description="angle about n_b")
     first = Revolute(n=n_a)
     second = Revolute(n=n_b)
     axis_a = rotational.Flange()

@@ -15,7 +15,7 @@ class Motor(Model):
     )
     J = Parameter(0.0, unit="kg.m2", min=0.0, description="inertia of the rotor and what turns with it")
     v = Real(unit="m/s", description="speed of the cart along its guideway")
-    w = Real(unit="rad/s", description="angular velocity of the rotor")
+    w = Real(unit="rad/s", display="rpm", description="angular velocity of the rotor")
     tau = Input(unit="N.m", description="torque of the motor", start=0.0)
     f = Real(unit="N", description="force on the cart along its guideway, before friction")
 

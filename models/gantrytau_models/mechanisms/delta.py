@@ -52,7 +52,9 @@ class Rod(Model):
 class Arm(Model):
     """A driven arm and its rods. Its axes: x outwards, z up; phi turns the arm about y, downwards where positive."""
 
-    azimuth = Parameter(0.0, unit="rad", description="direction of the arm, about z of the base")
+    azimuth = Parameter(
+        0.0, unit="rad", display="deg", description="direction of the arm, about z of the base"
+    )
     base_radius = Parameter(unit="m", min=0.0, description="from the centre of the base to the arm's axis")
     length = Parameter(unit="m", min=0.0, description="from the arm's axis to its elbow")
     plate_radius = Parameter(
@@ -77,8 +79,8 @@ class Arm(Model):
     motor_inertia = Parameter(
         0.0, unit="kg.m2", min=0.0, description="inertia of motor and gear, seen at the arm"
     )
-    phi = Real(unit="rad", description="angle below the level", start=PHI)
-    w = Real(unit="rad/s", description="angular velocity")
+    phi = Real(unit="rad", display="deg", description="angle below the level", start=PHI)
+    w = Real(unit="rad/s", display="deg/s", description="angular velocity")
     tau = Input(unit="N.m", description="torque of the motor, positive downwards", start=0.0)
     frame_a = Frame()
     frame_b = Frame()

@@ -57,8 +57,15 @@ class Turntable(TwoFrames):
     axis = Parameter(shape=3, unit="1", description="axis of rotation, resolved in frame_b", evaluate=True)
     m = Parameter(unit="kg", min=0.0, description="mass, centred in the origin of frame_b")
     J = Parameter(shape=(3, 3), unit="kg.m2", description="inertia about the origin, resolved in frame_b")
-    phi = Real(unit="rad", description="angle against what carries it", prefer=StateSelect.PREFER)
-    w = Real(unit="rad/s", description="angular velocity against what carries it", prefer=StateSelect.PREFER)
+    phi = Real(
+        unit="rad", display="deg", description="angle against what carries it", prefer=StateSelect.PREFER
+    )
+    w = Real(
+        unit="rad/s",
+        display="deg/s",
+        description="angular velocity against what carries it",
+        prefer=StateSelect.PREFER,
+    )
     tau = Input(unit="N.m", description="torque of the motor", start=0.0)
     base = FixedTranslation(r=offset)
     seat = Seat(orientation=orientation)

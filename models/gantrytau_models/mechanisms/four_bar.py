@@ -67,8 +67,8 @@ class Bar(TwoFrames):
         unit="kg.m2",
         description="inertia about the centre of mass, in frame_a; of a slender bar unless set otherwise",
     )
-    phi = Real(unit="rad", description="angle from the line of the pivots, about the normal")
-    w = Real(unit="rad/s", description="angular velocity about the normal")
+    phi = Real(unit="rad", display="deg", description="angle from the line of the pivots, about the normal")
+    w = Real(unit="rad/s", display="deg/s", description="angular velocity about the normal")
     body = Body(m=m, r_cm=r_cm, J=J)
     rod = FixedTranslation(r=lambda self: ca.vertcat(self.length, 0, 0))
 

@@ -29,8 +29,13 @@ class WristJoint(TwoFrames):
         unit="kg.m2",
         description="inertia about the centre of mass, resolved in frame_b",
     )
-    phi = Real(unit="rad", description="angle about the axis", prefer=StateSelect.PREFER)
-    w = Real(unit="rad/s", description="angular velocity about the axis", prefer=StateSelect.PREFER)
+    phi = Real(unit="rad", display="deg", description="angle about the axis", prefer=StateSelect.PREFER)
+    w = Real(
+        unit="rad/s",
+        display="deg/s",
+        description="angular velocity about the axis",
+        prefer=StateSelect.PREFER,
+    )
     tau = Input(unit="N.m", description="torque of the motor", start=0.0)
     arm = FixedTranslation(r=offset)
     joint = Revolute(n=axis, phi=dict(prefer=StateSelect.DEFAULT), w=dict(prefer=StateSelect.DEFAULT))

@@ -92,3 +92,11 @@ def test_what_cannot_be_set_says_what_can(build):
         cosimulate({"a": build("states", lines)}, stop=1.0, step=0.1, start={"a.y": 1.0})
     with pytest.raises(ModelError, match=r"inputs a\.u: a has no variable 'u'; it has no input$"):
         cosimulate({"a": build("states", lines)}, stop=1.0, step=0.1, inputs={"a.u": 1.0})
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_start_values_may_bring_their_units(build, fmi):
+    system = {"a": spring(build, fmi)}
+    assert cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 N/mm"}).final("a.y") == 2000.0
+    with pytest.raises(ModelError, match=r"start a\.k: found '2 mm', a length, expected a stiffness in N/m"):
+        cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 mm"})
