@@ -215,7 +215,9 @@ def test_studies_vary_values_with_units():
     assert table["phi.start"].values.tolist() == [np.radians(10), np.radians(20)]
     axis = found.plot("phi").axes[0]
     assert axis.get_ylabel() == "phi [deg]"
-    assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == [
+    legend = axis.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()][:2] == [
         "L=0.5, phi=10 deg",
         "L=0.5, phi=20 deg",
     ]

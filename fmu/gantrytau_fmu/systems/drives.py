@@ -67,29 +67,27 @@ def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
 
     Raises ModelError for a text of another kind, and for samples that say one, and where the FMU has a unit that is not SI.
     """
+    samples = value if isinstance(value, Samples) and value.unit is not None else None
     texts = isinstance(value, str) or (
         isinstance(value, (list, tuple)) and any(isinstance(x, str) for x in value)
     )
-    said = isinstance(value, Samples) and value.unit is not None
-    if not (texts or said):
+    if samples is None and not texts:
         return value
     place = f"{argument} {name}"
     try:
         dimension(unit or "1")
     except ModelError:
-        if said:
-            return value
         raise ModelError(
-            f"{place}: found {value!r}, expected a number in '{unit}', the unit of this FMU; convert it",
+            f"{place}: found {value!r}, expected numbers in '{unit}', the unit of this FMU; convert them",
             argument=argument,
         ) from None
     try:
-        if said:
-            value.check_unit(place, unit or None)
-            return value
-        return given(place, value, unit or None)
+        if samples is None:
+            return given(place, value, unit or None)
+        samples.check_unit(place, unit or None)
     except ModelError as error:
         raise ModelError(str(error), argument=argument) from None
+    return samples
 
 
 def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:
