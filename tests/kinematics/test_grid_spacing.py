@@ -80,7 +80,7 @@ def test_other_robots_have_so_many_places_too():
 
 def test_what_is_no_number_of_places_is_refused(l1):
     wrongly: Any = grid_spacing
-    for places in (0, -3, 2.5, math.nan, "many", None, True):
+    for places in (0, -3, 2.5, math.nan, "many", None, True, 10**400):
         with pytest.raises(ModelError, match="expected a whole number from 1") as caught:
             wrongly(places, 1.0)
         assert caught.value.argument == "places"
@@ -95,5 +95,7 @@ def test_what_is_no_number_of_places_is_refused(l1):
         grid_spacing(10, np.array([[0, 1]] * 3), dimensions=2)
     with pytest.raises(ModelError, match=r"found both spacing=0.1 and places=10, expected one of them"):
         workspace(l1, LIMITS, spacing=0.1, places=10)
+    with pytest.raises(ModelError, match=r"expected 2e.07 at most; take a wider spacing, fewer places or"):
+        workspace(l1, LIMITS, places=10**9)
     with pytest.raises(ModelError, match="found places=0, expected a whole number"):
         workspace(l1, LIMITS, places=0)

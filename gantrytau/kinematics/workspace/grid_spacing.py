@@ -10,6 +10,7 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.kinematics.workspace.cells import Cells
 
+MOST = 10**12  # places, of which no machine examines as many
 CLOSE = 0.02  # of the number of places inside
 ROUNDS = 8  # of a guess, which the number of places inside corrects; whole cells leave a few per cent
 
@@ -61,9 +62,11 @@ def settled_spacing(places: int, box: np.ndarray, inside: Callable[[float], int]
 
 
 def _whole(places: Any, where: str) -> int:
-    if isinstance(places, bool) or not isinstance(places, (int, np.integer)) or places < 1:
+    whole = isinstance(places, (int, np.integer)) and not isinstance(places, bool)
+    if not whole or not 1 <= places <= MOST:
+        found = "more" if whole and places > MOST else f"places={places!r}"
         raise ModelError(
-            f"{where}: found places={places!r}, expected a whole number from 1", argument="places"
+            f"{where}: found {found}, expected a whole number from 1 to {MOST:.0e}", argument="places"
         )
     return int(places)
 

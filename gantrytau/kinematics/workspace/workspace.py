@@ -144,7 +144,7 @@ def _cells(name: str, box: np.ndarray, spacing: float) -> list[np.ndarray]:
     if counts.prod() > _MOST:
         raise ModelError(
             f"{name}: found a spacing of {spacing:g} m for a box of {extents.tolist()} m, {counts.prod():.3g} places; "
-            f"expected {_MOST:.0e} at most; take a wider spacing or a smaller box"
+            f"expected {_MOST:.0e} at most; take a wider spacing, fewer places or a smaller box"
         )
     return [
         low + (np.arange(int(n)) + 0.5) / n * extent

@@ -172,7 +172,7 @@ def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
             f"measurements: found arrays of the shapes {shapes}, expected q (N, n), r (N, 3), R (N, 3, 3)"
         )
     rows = np.flatnonzero(
-        np.all([np.isfinite(each).reshape(len(q), -1).all(axis=1) for each in arrays], axis=0)
+        np.all([np.isfinite(each).all(axis=tuple(range(1, each.ndim))) for each in arrays], axis=0)
     )
     if rows.size == 0:
         raise ModelError(

@@ -250,6 +250,10 @@ def test_what_does_not_fit_is_refused():
     for places in ([0.0], [1.0, 0.0], [0.0, np.nan], "ab", 3.0):
         with pytest.raises(ModelError, match=r"guideways\[0\]: found .* two coordinates at least"):
             wrongly(robot, poses, guideways=[places] * 3)
+    with pytest.raises(ModelError, match="found no finite numbers in any of 0 rows, expected poses"):
+        pose_sensitivities(robot, np.zeros((0, 3)))
+    with pytest.raises(ModelError, match="found no finite numbers in any of 1 rows"):
+        pose_sensitivities(robot, np.array([[0.0, 0.0, 9.0]]))  # out of reach
     with pytest.raises(ModelError, match="expected Measurements"):
         wrongly(robot, 3)
     with pytest.raises(ModelError, match=r"found q of shape \(2,\)"):
