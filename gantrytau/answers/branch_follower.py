@@ -2,9 +2,10 @@
 
 The way is q(s) = a + s (b - a), 0 <= s <= 1. Each trial step of s predicts along the tangent of the branch, at the same
 time taking back what is left of f, and corrects once by Newton's method. It is accepted where the correction is small
-beside the step and the Jacobians before and after are alike, so that no singular one lies between; else a smaller
-one is tried. Where the branch turns back (a fold) or meets another one the steps become too small, and there is no answer.
-All that is compared is invariant to the units of equations and unknowns.
+beside the step, or beside such a step at the start, as unknowns that turn back stand still there; and where the Jacobians
+before and after are alike, so that no singular one lies between. Else a smaller one is tried. Where the branch turns back
+(a fold) or meets another one the steps become too small, and there is no answer. All that is compared is invariant to the
+units of equations and unknowns.
 """
 
 import casadi as ca
@@ -27,12 +28,13 @@ def follow(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca
     residual: (y, q) -> f, (n,); start: y where q is `begin`. The result has no derivatives: it is a first guess.
     """
     n, count = start.numel(), begin.numel()
-    rows, columns = _sizes(residual, start, begin)
-    along = _along(residual, begin, rows, columns)
+    rows, columns = sizes_at(residual, start, begin)
+    along = residual_along(residual, begin, rows, columns)
+    reach = reach_along(residual, start, begin, columns)
     state, q = ca.MX.sym("state", n + 2), ca.MX.sym("q", count)
     keep = ca.Function("keep", [state, q], [state])
     going = ca.logic_and(state[0] > 0, state[1] > SMALLEST)
-    step = ca.Function.if_else("step", _trial(along, n, count), keep)
+    step = ca.Function.if_else("step", _trial(along, (begin, reach), n), keep)
     trial = ca.Function("trial", [state, q], [step(going, state, q)])
     found = state
     for _ in range(TRIALS[1]):
@@ -47,7 +49,7 @@ def follow(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca
     return y, arrived
 
 
-def _sizes(residual: ca.Function, start: ca.DM, begin: ca.DM) -> tuple[ca.DM, ca.DM]:
+def sizes_at(residual: ca.Function, start: ca.DM, begin: ca.DM) -> tuple[ca.DM, ca.DM]:
     """What rows are divided by and unknowns are measured in, from the Jacobian at the start."""
     numbers = np.array(ca.Function("jacobian", *_with_jacobian(residual))(start, begin))
     if not np.all(np.isfinite(numbers)):
@@ -62,7 +64,7 @@ def _with_jacobian(residual: ca.Function) -> tuple[list[ca.SX], list[ca.SX]]:
     return [y, q], [ca.densify(ca.jacobian(residual(y, q), y))]
 
 
-def _along(residual: ca.Function, begin: ca.DM, rows: ca.DM, columns: ca.DM) -> ca.Function:
+def residual_along(residual: ca.Function, begin: ca.DM, rows: ca.DM, columns: ca.DM) -> ca.Function:
     """(z, s, b) -> residual, its Jacobian by z, its derivative by s; z are the unknowns in their sizes."""
     z, s, end = ca.SX.sym("z", columns.numel()), ca.SX.sym("s"), ca.SX.sym("end", begin.numel())
     f = residual(z * columns, begin + s * (end - begin)) / rows
@@ -70,16 +72,30 @@ def _along(residual: ca.Function, begin: ca.DM, rows: ca.DM, columns: ca.DM) -> 
     return ca.Function("along", [z, s, end], parts, {"cse": True})
 
 
-def _trial(along: ca.Function, n: int, count: int) -> ca.Function:
-    """(what is left of the way, step, z), b -> the same after one trial."""
-    state, end = ca.MX.sym("state", n + 2), ca.MX.sym("end", count)
+def reach_along(residual: ca.Function, start: ca.DM, begin: ca.DM, columns: ca.DM) -> ca.DM:
+    """Squares of how far unknowns, in their sizes, go at first for one of each argument, were the others held."""
+    y, q = residual.sx_in()
+    f = residual(y, q)
+    both = ca.Function("both", [y, q], [ca.densify(ca.jacobian(f, y)), ca.densify(ca.jacobian(f, q))])
+    by_y, by_q = (np.array(m) for m in both(start, begin))
+    if not (np.all(np.isfinite(by_y)) and np.all(np.isfinite(by_q))):
+        return ca.DM.zeros(begin.numel())
+    slopes = np.linalg.lstsq(by_y * np.array(columns).T, by_q, rcond=None)[0]
+    return ca.DM(np.sum(slopes**2, axis=0))
+
+
+def _trial(along: ca.Function, way: tuple[ca.DM, ca.DM], n: int) -> ca.Function:
+    """(what is left of the way, step, z), b -> the same after one trial; way: where it begins, and reach along it."""
+    begin, reach = way
+    state, end = ca.MX.sym("state", n + 2), ca.MX.sym("end", begin.numel())
     left, h, z = state[0], state[1], state[2:]
     f, before, slope = along(z, 1 - left, end)
     step = -_solved(before, f + h * slope)
     f, after, _ = along(z + step, 1 - left + h, end)
     both = _solved(after, ca.horzcat(f, before))
     correction = -both[:, 0]
-    beside = ca.sumsqr(correction) / (ca.sumsqr(step) * NEAR**2 + ca.sumsqr(z) * ROUNDING**2)
+    usual = ca.sumsqr(step) + h**2 * ca.dot(reach, (end - begin) ** 2)
+    beside = ca.sumsqr(correction) / (usual * NEAR**2 + ca.sumsqr(z) * ROUNDING**2)
     bend = ca.fmax(ca.sqrt(beside), _change(n)(both[:, 1:]) / np.log(ALIKE))  # grows as the step does
     good = bend <= 1
     h = h * ca.fmax(ca.fmin(WANTED / bend, CHANGES[1]), CHANGES[0])
@@ -92,20 +108,27 @@ def _solved(matrix: ca.MX, right: ca.MX) -> ca.MX:
     return right / matrix if matrix.numel() == 1 else ca.solve(matrix, right, "qr", {"eps": 0.0})
 
 
-def _change(n: int) -> ca.Function:
-    """The largest logarithm of the pivots of a matrix, without signs; infinite where one is not positive.
+def pivots_of(matrix: ca.SX) -> list[ca.SX]:
+    """The pivots of a matrix (n, n) in its order.
 
-    There is a pivot for each leading principal minor, so that they are positive if no singular matrix lies on the way
-    from the identity.
+    There is one for each leading principal minor, so that they are positive if no singular matrix lies on the way from
+    the identity.
     """
-    matrix = ca.SX.sym("matrix", n, n)
+    n = matrix.shape[0]
     a = [[matrix[i, j] for j in range(n)] for i in range(n)]
-    largest = ca.SX(0)
     for k in range(n):
-        size = ca.if_else(a[k][k] > 0, ca.fabs(ca.log(a[k][k])), ca.inf)
-        largest = ca.if_else(largest > size, largest, size)
         for i in range(k + 1, n):
             factor = a[i][k] / a[k][k]
             for j in range(k + 1, n):
                 a[i][j] -= factor * a[k][j]
+    return [a[k][k] for k in range(n)]
+
+
+def _change(n: int) -> ca.Function:
+    """The largest logarithm of the pivots of a matrix, without signs; infinite where one is not positive."""
+    matrix = ca.SX.sym("matrix", n, n)
+    largest = ca.SX(0)
+    for pivot in pivots_of(matrix):
+        size = ca.if_else(pivot > 0, ca.fabs(ca.log(pivot)), ca.inf)
+        largest = ca.if_else(largest > size, largest, size)
     return ca.Function("change", [matrix], [largest])

@@ -1,25 +1,42 @@
 """Functions from any given names to any wanted names: the blocks sliced to what is asked for."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import casadi as ca
 
 from gantrytau.answers.function_through import Question, function_through
 from gantrytau.answers.implicit_blocks import one_where
 from gantrytau.compiler.blocks.pattern import Pattern, block_pattern
+from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated, carefully, solved
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
+Answer = TypeVar("Answer")
 DROPPED = "constraints that were left out"
 OPEN = 1e-6  # of the size of a loop, by which they may be violated
 
 
 def function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.Function:
     """See Dae.function."""
+    return composed(dae, given, find, function_through, _closed)
+
+
+def composed(
+    dae: Translated,
+    given: Sequence[str],
+    find: Sequence[str],
+    through: Callable[..., Answer],
+    closed: Callable[[Answer], Answer],
+) -> Answer:
+    """What `through` makes of the question and of blocks that lead from the given to the wanted; see `function_through`.
+
+    closed: takes away the last result, which must be zero, and makes the others NaN where it is not.
+    """
     given, find = names(given), names(find)
     dae = _with_parameters(dae, given)
     columns = [[ca.SX.sym(n) for n in dae.expand(name)] for name in given]
@@ -32,11 +49,13 @@ def function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.F
         dropped = _dropped(dae, given)
         pattern = _pattern(dae, known, [*targets, dropped]) if dropped.numel() else None
         if pattern is not None:
-            whole = _compose(dae, pattern, known, [*targets, dropped], given, [*find, DROPPED], columns)
-            return _closed(whole)
+            question, quick = _asked(
+                dae, pattern, known, [*targets, dropped], given, [*find, DROPPED], columns
+            )
+            return closed(_answered(dae, question, quick, through))
         pattern = _pattern(dae, known, targets)
         if pattern is not None:
-            return _compose(dae, pattern, known, targets, given, find, columns)
+            return _answered(dae, *_asked(dae, pattern, known, targets, given, find, columns), through)
         inputs = _sufficient_inputs(dae, known, targets) if inputs is None else inputs
     raise StructureError(_undetermined(dae, known, targets, inputs or [], given, find))
 
@@ -178,8 +197,14 @@ def _whole(dae: Translated, scalars: Sequence[str]) -> list[str]:
     return list(left)
 
 
-def _compose(dae, pattern: Pattern, known, targets, given, find, columns) -> ca.Function:
-    """The function through the blocks of a pattern, where pivots may vanish through careful ones."""
+def _answered(
+    dae: Translated, question: Question, quick: SolvedBlocks, through: Callable[..., Answer]
+) -> Answer:
+    return through("f", question, quick, lambda: carefully(dae, quick), dae.start)
+
+
+def _asked(dae, pattern: Pattern, known, targets, given, find, columns) -> tuple[Question, SolvedBlocks]:
+    """What is asked of the blocks of a pattern, and these blocks."""
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
     definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]
     definitions += [
@@ -203,7 +228,7 @@ def _compose(dae, pattern: Pattern, known, targets, given, find, columns) -> ca.
     )
     quick = solved(dae, pattern)
     _refuse_time(question.inserted(quick), dae)
-    return function_through("f", question, quick, lambda: carefully(dae, quick), dae.start)
+    return question, quick
 
 
 def _start_of(dae: Translated, scalars: Sequence[str]) -> list[float]:

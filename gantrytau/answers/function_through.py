@@ -49,7 +49,7 @@ def function_through(
 
     start: numbers of all symbols where the model starts; careful: makes the blocks for where `quick` cannot be trusted.
     """
-    doubtful = [m > 0 for m in _parted(question, quick)[-1] if not m.is_constant()]
+    doubtful = [m > 0 for m in parted(question, quick)[-1] if not m.is_constant()]
     if not doubtful:
         return plain_function(name, question, quick, start)
     inside, outside = question.names
@@ -74,7 +74,7 @@ def plain_function(
     trusted: Sequence[ca.SX] = (),
 ) -> ca.Function:
     """The targets through blocks as they are solved; trusted: adds whether all these hold, 1 or 0, as the last result."""
-    residuals, extents, targets, _ = _parted(question, blocks)
+    residuals, extents, targets, _ = parted(question, blocks)
     inside, outside = question.names
     if trusted:
         targets, outside = [*targets, reduce(ca.logic_and, trusted)], [*outside, "trusted"]
@@ -91,7 +91,7 @@ def plain_function(
     return solved_one_by_one(name, parts, targets, question.arguments, question.start(), names)
 
 
-def _parted(question: Question, blocks: SolvedBlocks) -> tuple[ca.SX, ca.SX, list[ca.SX], list[ca.SX]]:
+def parted(question: Question, blocks: SolvedBlocks) -> tuple[ca.SX, ca.SX, list[ca.SX], list[ca.SX]]:
     """Residuals and extents of blocks without closed form, targets and margins in the arguments."""
     count = len(blocks.tears)
     sizes = [count, count, *(t.numel() for t in question.targets), len(blocks.margins)]

@@ -81,16 +81,24 @@ def _linear(part: Implicit, scales: Scales, y: ca.SX, known: ca.SX, values: ca.M
     A singular matrix leaves numbers of rounding. An arbitrary right-hand side beside that of the equations tells it: its
     solution is as large as the inverse.
     """
-    f, size = part.residual, y.numel()
-    matrix, right = ca.jacobian(f, y), -ca.substitute(f, y, ca.SX.zeros(size))
+    parts, sizes, other, columns = linear_parts(part.residual, part.rows, scales, y, known)
+    (a, b), row = parts(values), sizes(values)
+    both = ca.solve(ca.mtimes(ca.diag(row), a), ca.horzcat(row * b, other), "qr", {"eps": 0.0})
+    return both[:, 0] / columns * one_where(ca.sumsqr(both[:, 1]) <= SINGULAR**-2)
+
+
+def linear_parts(residual: ca.SX, extents: ca.SX, scales: Scales, y: ca.SX, known: ca.SX):
+    """Functions of what is known, to the equations (matrix, right-hand side) and to sizes of rows; another right-hand side;
+    units of y.
+    """
+    size = y.numel()
+    matrix, right = ca.jacobian(residual, y), -ca.substitute(residual, y, ca.SX.zeros(size))
     matrix = matrix @ ca.diag(1 / scales.columns)
-    rows = [1 / ca.fmax(extent(matrix[i, :], np.ones(size)), part.rows[i]) for i in range(size)]
+    rows = [1 / ca.fmax(extent(matrix[i, :], np.ones(size)), extents[i]) for i in range(size)]
     sizes = ca.Function("sizes", [known], [ca.vertcat(*rows)], {"cse": True, "is_diff_out": [False]})
     parts = ca.Function("linear", [known], [matrix, ca.densify(right)], {"cse": True})
-    (a, b), row = parts(values), sizes(values)
     other = ca.DM(np.random.default_rng(0).uniform(0.5, 1.0, size) * SIGNS[np.arange(size) % len(SIGNS)])
-    both = ca.solve(ca.mtimes(ca.diag(row), a), ca.horzcat(row * b, other), "qr", {"eps": 0.0})
-    return both[:, 0] / scales.columns * one_where(ca.sumsqr(both[:, 1]) <= SINGULAR**-2)
+    return parts, sizes, other, scales.columns
 
 
 def one_where(condition: ca.MX) -> ca.MX:

@@ -33,7 +33,8 @@ class Kinematics(Record):
 
     tool: name of the component whose `.r` (and `.R`) is the pose; joints: names of the actuator coordinates, by default
     the `s` or `phi` next to each force or torque that drives the model, lengths first; tolerance: m by which links may
-    miss their lengths where ik of a robot with three carts is given an orientation too.
+    miss their lengths where ik of a robot with three carts is given an orientation too, and by which a pose may be
+    beside those that a robot with fewer than six joints has.
 
     Poses are r (N, 3) in m and R (N, 3, 3) from plate to world, or one pose without the first axis; q is (N, n) in m and
     rad. Where there is no solution, or the argument is NaN, rows are NaN. Raises ModelError for arrays of other shapes and
@@ -271,7 +272,9 @@ class Kinematics(Record):
     def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
         names = tuple(scalar for name in names for scalar in self.dae.expand(name))
-        return ModelFunctions(self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names))
+        return ModelFunctions(
+            self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names), self._tolerance
+        )
 
 
 def _length(tolerance: float) -> float:

@@ -1,54 +1,114 @@
 """Kinematics of any model from its own equations, where no closed form is known: functions between joints and pose.
 
-The functions of `Dae.function` are evaluated for many poses at once through buffers of NumPy's memory; the way through
-CasADi's own matrices takes a hundred times longer. Both answer on the branch of the start values.
+They are array functions of the model and answer on the branch of its start values. A robot with n joints has n
+coordinates of its pose, of the position and then of elements 1 to 3 of the quaternion, those that its joints move at the
+start. The rest of a pose follows from these; where another rest is asked for, the pose is out of reach.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
+from gantrytau.answers.many_points.array_function import ArrayFunction
+from gantrytau.answers.many_points.elimination import solved
 from gantrytau.dae import Dae
-from gantrytau.errors import ModelError
-from gantrytau.interruption import on_interrupt
-from gantrytau.kinematics.rods.lengths_by_newton import limited, solved
+from gantrytau.errors import ModelError, StructureError
+from gantrytau.kinematics.rods.lengths_by_newton import limited
 from gantrytau.kinematics.rods.rod_robots import Home
 from gantrytau.kinematics.rotations import of_quaternion, of_quaternions, quaternions, skewed
 
-BLOCK = 8  # poses of one call: they take longer than the call, and Ctrl-C is heard in a second where none is in reach
 MOST = 30  # iterations from `near`
 CLOSE = 1e-11  # of a joint, in m or rad, relative to its size: what the iteration of the inverse leaves
+MOVES = 1e-6  # of the largest of its kind, by which joints move a coordinate that can be chosen
+SPIN = [
+    [2, 1],
+    [0, 2],
+    [1, 0],
+]  # rows and columns of the elements of a skew matrix that are those of its vector
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFunctions:
-    """A model with a `tool` and driven `joints`; three joints: a position is a pose, six: an orientation besides."""
+    """A model with a `tool` and driven `joints`; tolerance: m and elements of R by which the rest of a pose may miss."""
 
     dae: Dae
     tool: str
     joints: tuple[str, ...]
     home: Home
+    tolerance: float
 
     def ik(self, r, R=None, sides=None):
         """Joints q and iterations (none are counted: they run inside the functions)."""
-        return self._joints_of(self._pose(r, R)), np.zeros(len(r), dtype=int)
+        x = self._coordinates(r, R)
+        q = self._joints_of(x)
+        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
+            there, turned = self._pose_of(x)
+            with np.errstate(invalid="ignore"):
+                missed = np.abs(there - r).max(axis=1)
+                if R is not None:
+                    missed = np.maximum(missed, np.abs(turned - R).max(axis=(1, 2)))
+                q[~(missed <= self.tolerance)] = np.nan
+        return q, np.zeros(len(r), dtype=int)
 
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) where Newton on the inverse starts, else the branch of the start values."""
         if near is not None:
-            return self._forward_from(self._pose(near[0], near[1] if len(self.joints) == 6 else None), q)
-        found = _over_poses(self._forward, list(q.T[:, :, None]))
-        if self._turns:
-            R = found[1].reshape(-1, 3, 3).transpose(0, 2, 1)
-        else:
-            R = np.array(np.broadcast_to(np.eye(3), (len(q), 3, 3)))
-            R[np.isnan(found[0][:, 0])] = np.nan
-        return found[0], R, np.zeros(len(q), dtype=int)
+            return self._forward_from(self._coordinates(near[0], near[1] if self.turning else None), q)
+        return *self._posed(self._forward(*q.T)), np.zeros(len(q), dtype=int)
+
+    def jacobian(self, r, R=None):
+        """dq/dpose (N, n, 3), with an orientation (N, n, 6); zero along what the joints do not decide."""
+        slopes = self._slopes_of(self._coordinates(r, R))
+        places = np.array(self.places)
+        found = np.zeros((len(r), len(self.joints), 6 if self.turning else 3))
+        moved = places[places < 3]
+        found[:, :, moved] = slopes[:, :, : len(moved)]
+        if R is not None:
+            found[:, :, 3:] = (
+                slopes[:, :, len(moved) :] @ _turns_of_quaternions(R)[:, places[places >= 3] - 3]
+            )
+        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
+            found[np.isnan(self.ik(r, R)[0]).any(axis=1)] = np.nan
+        return found
+
+    @property
+    def turning(self) -> bool:
+        """Whether the joints decide on the orientation beside the position."""
+        return max(self.places) >= 3
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        """The coordinates of the pose that the inverse is given: 0 to 2 of the position, 3 to 5 of the quaternion."""
+        count = len(self.joints)
+        if count == 6:
+            return (0, 1, 2, 3, 4, 5)
+        if count == 3:
+            try:
+                self.dae.function([f"{self.tool}.r"], self.joints)
+                return (0, 1, 2)
+            except StructureError:
+                pass  # the position has other than three degrees of freedom
+        chosen = _independent(self._moves)
+        if len(chosen) < count:
+            raise ModelError(
+                f"Kinematics: found {count} joints of {self.dae.name}, which move {self.tool} in {len(chosen)} ways, "
+                "expected as many; name joints= that decide on its pose, or start elsewhere if it starts in a singular one"
+            )
+        return tuple(chosen)
+
+    @property
+    def _moves(self) -> np.ndarray:
+        """What the joints do at the start to the position, and to elements 1 to 3 of the quaternion, (3 or 6, n)."""
+        slopes = self._forward.slopes(*self.home.q[:, None])[0]
+        if f"{self.tool}.q" not in self.dae.vectors:
+            return slopes[:3]
+        rates = slopes[3:].reshape(3, 3, -1).transpose(2, 1, 0) @ self.home.R.T  # dR R.T, skew
+        spins = np.stack([rates[:, i, j] for i, j in SPIN])
+        return np.vstack([slopes[:3], _turns_of_quaternions(self.home.R[None])[0] @ spins])
 
     def _forward_from(self, x: np.ndarray, q: np.ndarray):
-        """Poses of which the inverse is q, from poses x (N, 3 or 6) near them; NaN where Newton does not end."""
+        """Poses of which the inverse is q, from coordinates x (N, n) near them; NaN where Newton does not end."""
         x, iterations = np.array(x), np.zeros(len(q), dtype=int)
         rows = np.flatnonzero(np.isfinite(x).all(axis=1) & np.isfinite(q).all(axis=1))
         x[np.setdiff1d(np.arange(len(q)), rows)] = np.nan
@@ -62,141 +122,116 @@ class ModelFunctions:
             x[rows] += limited(solved(self._slopes_of(x[rows]), error))
             iterations[rows] += 1
         x[rows] = np.nan
-        R = self._orientation(x)
-        return x[:, :3], R, iterations
+        return *self._pose_of(x), iterations
 
-    def _orientation(self, x: np.ndarray) -> np.ndarray:
-        """Orientations of poses as the inverse takes them."""
-        if len(self.joints) == 6:
+    def _pose_of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses of coordinates."""
+        if len(self.places) == 6:
             with np.errstate(invalid="ignore"):
                 scalar = np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
-            return of_quaternions(np.column_stack([scalar, x[:, 3:]]))
-        if self._turns:
-            return _over_poses(self._following, [x])[0].reshape(-1, 3, 3).transpose(0, 2, 1)
-        R = np.array(np.broadcast_to(np.eye(3), (len(x), 3, 3)))
-        R[np.isnan(x[:, 0])] = np.nan
-        return R
+            return x[:, :3], of_quaternions(np.column_stack([scalar, x[:, 3:]]))
+        return self._posed(self._following(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
-        return _over_poses(self._inverse, [x])[0]
+        return _whole(np.hstack(self._inverse(*self._arguments(x))))
 
     def _slopes_of(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of the joints by the elements of poses, (N, n, 3 or 6)."""
-        found = _over_poses(self._slopes, [x])[0]
-        return found.reshape(len(x), x.shape[1], -1).transpose(0, 2, 1)
+        """Slopes of the joints by the coordinates of poses, (N, n, n)."""
+        return _whole(self._inverse.slopes(*self._arguments(x)))
 
-    def jacobian(self, r, R=None):
-        """dq/dpose (N, n, 3), with six joints (N, n, 6)."""
-        found = self._slopes_of(self._pose(r, R))
-        if R is None or found.shape[2] == 3:
-            return found
-        q = quaternions(R)
-        # a rotation vector turns the quaternion (w, v) by half of (w I - [v]x) in its last three elements
-        turn = (q[:, 0, None, None] * np.eye(3) - skewed(q[:, 1:])) / 2
-        return np.concatenate([found[:, :, :3], found[:, :, 3:] @ turn], axis=2)
+    @cached_property
+    def _forward(self) -> ArrayFunction:
+        """Position and orientation, column after column, from the joints one by one."""
+        return self.dae.array_function(self.joints, self._wanted)
+
+    @cached_property
+    def _inverse(self) -> ArrayFunction:
+        """Joints from coordinates of the pose."""
+        return self.dae.array_function(self._given, self.joints)
+
+    @cached_property
+    def _following(self) -> ArrayFunction:
+        """The whole pose from its coordinates."""
+        return self.dae.array_function(self._given, self._wanted)
 
     @property
-    def _turns(self) -> bool:
-        return f"{self.tool}.R" in self.dae.vectors
+    def _wanted(self) -> list[str]:
+        return [f"{self.tool}.r", *(n for n in orientations(self.tool) if n in self.dae.vectors)][:2]
 
-    @cached_property
-    def _forward(self) -> ca.Function:
-        """Position and orientation, column after column, from the joints one by one."""
-        wanted = [f"{self.tool}.r"] + ([f"{self.tool}.R"] if self._turns else [])
-        return _dense(self.dae.function(list(self.joints), wanted))
+    @property
+    def _given(self) -> list[str]:
+        """Names of the coordinates of the pose; the position in one where it is whole."""
+        whole = self.places[:3] == (0, 1, 2)
+        names = [f"{self.tool}.{'r' if k < 3 else 'q'}[{k if k < 3 else k - 2}]" for k in self.places]
+        return [f"{self.tool}.r", *names[3:]] if whole else names
 
-    @cached_property
-    def _following(self) -> ca.Function:
-        """Orientation, column after column, that follows from a position."""
-        return _dense(self.dae.function([f"{self.tool}.r"], [f"{self.tool}.R"]))
+    def _arguments(self, x: np.ndarray) -> list[np.ndarray]:
+        """Coordinates as the functions take them."""
+        return [x[:, :3], *x[:, 3:].T] if self.places[:3] == (0, 1, 2) else list(x.T)
 
-    @cached_property
-    def _slopes(self) -> ca.Function:
-        """Jacobian of the inverse, column after column."""
-        x = ca.MX.sym("pose", self._inverse.numel_in(0))
-        return ca.Function("slopes", [x], [ca.densify(ca.jacobian(self._inverse(x), x))])
+    def _posed(self, found: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and orientations; a tool without orientation keeps that of the world."""
+        both = _whole(np.hstack(found))
+        r = both[:, :3]
+        if len(found) > 1:
+            return r, both[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1)
+        R = np.array(np.broadcast_to(np.eye(3), (len(r), 3, 3)))
+        R[np.isnan(r[:, 0])] = np.nan
+        return r, R
 
-    @cached_property
-    def _inverse(self) -> ca.Function:
-        """Joints from a pose: r, and elements 1 to 3 of the quaternion with six joints, as one column."""
-        six = len(self.joints) == 6
-        names = [f"{self.tool}.r"] + [f"{self.tool}.q[{k}]" for k in (1, 2, 3) if six]
-        function = self.dae.function(names, list(self.joints))
-        x = ca.MX.sym("pose", 6 if six else 3)
-        parts = [x[:3], *(x[3 + k] for k in range(3) if six)]
-        return ca.Function("inverse", [x], [ca.densify(ca.vertcat(*function.call(parts)))])
+    def _coordinates(self, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """Coordinates (N, n) of poses."""
+        if (R is not None) != self.turning:
+            count = len(self.joints)
+            raise ModelError(
+                f"Kinematics: found {count} joints and {'no' if R is None else 'an'} orientation R for {self.dae.name}, "
+                f"expected {'one, as joints turn the tool' if R is None else 'none, as it follows from the position'}; "
+                "name others by joints="
+            )
+        if R is None:
+            return r[:, list(self.places)]
+        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
 
-    def _pose(self, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
-        """Arguments of the inverse."""
-        count = len(self.joints)
-        if count == 3 and R is None:
-            return r
-        if count == 6 and R is not None:
-            return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)
-        raise ModelError(
-            f"Kinematics: found {count} joints and {'no' if R is None else 'an'} orientation R for {self.dae.name}, "
-            "expected three joints and a position, or six and an orientation besides; name others by joints="
-        )
+
+def _whole(found: np.ndarray) -> np.ndarray:
+    """The same with poses NaN of which some numbers are, as where one arm of two is too short."""
+    found[~np.isfinite(found).reshape(len(found), -1).all(axis=1)] = np.nan
+    return found
+
+
+def _independent(moves: np.ndarray) -> list[int]:
+    """Rows of the position, then of the orientation, that are independent, those that move most first; in order."""
+    chosen: list[int] = []
+    left = np.array(moves)
+    for kind in (range(3), range(3, len(moves))):
+        largest = np.linalg.norm(moves[list(kind)], axis=1).max(initial=0.0)
+        while len(chosen) < moves.shape[1]:
+            sizes = {k: float(np.linalg.norm(left[k])) for k in kind}
+            best = max(sizes, key=lambda k: sizes[k], default=-1)
+            if best < 0 or not sizes[best] > MOVES * largest:
+                break
+            chosen.append(best)
+            along = left[best] / sizes[best]
+            left = left - np.outer(left @ along, along)
+    return sorted(chosen)
+
+
+def _turns_of_quaternions(R: np.ndarray) -> np.ndarray:
+    """Change of elements 1 to 3 of quaternions by a rotation vector in the world, (N, 3, 3)."""
+    q = quaternions(R)
+    # a rotation vector turns the quaternion (w, v) by half of (w I - [v]x) in its last three elements
+    return (q[:, 0, None, None] * np.eye(3) - skewed(q[:, 1:])) / 2
+
+
+def orientations(tool: str) -> tuple[str, str]:
+    """Where the orientation of a tool may stand: its own, or that of the frame of a body."""
+    return f"{tool}.R", f"{tool}.frame_a.R"
 
 
 def home_of(values: dict, tool: str, joints: tuple[str, ...]) -> Home:
     """The start of a model as a pose; values as `Dae.evaluate` answers."""
-    R = values.get(f"{tool}.R")
-    q = values.get(f"{tool}.q")
+    R = next((values[n] for n in orientations(tool) if n in values), None)
     if R is None:
+        q = values.get(f"{tool}.q")
         R = np.eye(3) if q is None else of_quaternion(np.asarray(q))
     return Home(np.array([float(values[n]) for n in joints]), np.asarray(values[f"{tool}.r"]), np.asarray(R))
-
-
-def _dense(function: ca.Function) -> ca.Function:
-    """The same function with all zeros of its results stored."""
-    x = function.mx_in()
-    return ca.Function("dense", x, [ca.densify(y) for y in function.call(x)])
-
-
-def _over_poses(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
-    """Results (N, k) of a function for arguments (N, l); NaN where one is not finite, which CasADi would report."""
-    known = np.all([np.isfinite(argument).all(axis=1) for argument in arguments], axis=0)
-    found = [np.full((len(known), function.numel_out(i)), np.nan) for i in range(function.n_out())]
-    for result, part in zip(found, _in_blocks(function, [a[known] for a in arguments]), strict=True):
-        result[known] = part
-    return found
-
-
-def _in_blocks(function: ca.Function, arguments: list[np.ndarray]) -> list[np.ndarray]:
-    """The same for finite arguments, a block of poses in one call."""
-    count = len(arguments[0])
-    whole = count - count % BLOCK
-    found = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
-    asked: list[bool] = []
-    with on_interrupt(
-        lambda: asked.append(True)
-    ):  # inside CasADi it would be a RuntimeError, or a failed iteration
-        _fill(function, arguments, found, whole, asked)
-    return found
-
-
-def _fill(
-    function: ca.Function, arguments: list[np.ndarray], found: list[np.ndarray], whole: int, asked: list[bool]
-) -> None:
-    """Results into `found`: the first rows in blocks, then the rest; until an end is asked for."""
-    count = len(arguments[0])
-    for size, firsts in ((BLOCK, range(0, whole, BLOCK)), (count - whole, range(whole, count, BLOCK))):
-        if not firsts:
-            continue
-        mapped = function.map(size)
-        buffer, run = mapped.buffer()
-        inside = [np.empty((size, function.numel_in(i))) for i in range(function.n_in())]
-        outside = [np.empty((size, function.numel_out(i))) for i in range(function.n_out())]
-        for i, memory in enumerate(inside):
-            buffer.set_arg(i, memory.data)
-        for i, memory in enumerate(outside):
-            buffer.set_res(i, memory.data)
-        for first in firsts:
-            for memory, argument in zip(inside, arguments, strict=True):
-                memory[:] = argument[first : first + size]
-            run()
-            if asked:
-                raise KeyboardInterrupt
-            for memory, result in zip(outside, found, strict=True):
-                result[first : first + size] = memory

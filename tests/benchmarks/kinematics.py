@@ -10,13 +10,23 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau.kinematics import Kinematics, accuracy, assembly_modes, assembly_study
-from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
+from gantrytau.kinematics.rotations import turned
+from gantrytau_models import (
+    DeltaRobot,
+    F1GantryTau,
+    FiveBar,
+    GantryTau,
+    SixLinkGantryTau,
+    StewartPlatform,
+    prototypes,
+)
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
 from tests.kinematics.test_assembly_modes import HOME, f1_hexapod, link_errors, random_hexapod
 from tests.kinematics.test_kinematics_f1 import LIMIT, poses
 from tests.references.cart_errors import CASE_1, CASE_2, slice_between_guideways
 
 POSES = 1_000_000
+MANY = 50_000  # of robots without closed form
 # (4.9) pose after pose, as it is written down
 LOOP = r"""
 #include <math.h>
@@ -37,6 +47,7 @@ def rows() -> Iterator[Row]:
     """All figures of kinematics."""
     yield from _three_links()
     yield from _others()
+    yield from _through_equations()
     yield from _right_poses()
     yield from _assembly_modes()
     yield from _errors_of_d1()
@@ -81,10 +92,9 @@ def _others() -> Iterator[Row]:
     for name, robot in (
         ("six links", SixLinkGantryTau(prototypes.D1)),
         ("F1", F1GantryTau(prototypes.F1)),
-        ("delta robot, no closed form", DeltaRobot()),
     ):
         kinematics = Kinematics(robot)
-        count = 1000 if name.startswith("delta") else 20_000
+        count = 20_000
         q = kinematics.home.q + random.uniform(-0.1, 0.1, (count, len(kinematics.joints)))
         r, R = kinematics.fk(q)
         given = R if len(kinematics.joints) == 6 else None
@@ -92,6 +102,35 @@ def _others() -> Iterator[Row]:
         times = in_turn(calls, 3)
         rates = ", ".join(f"{count / times[word]:.2g}" for word in ("ik", "fk"))
         yield shown(f"{name}, inverse and forward, poses per second", rates)
+
+
+def _through_equations() -> Iterator[Row]:
+    """Robots that have nothing but their equations, within 0.2 m about the start."""
+    random = np.random.default_rng(2)
+    delta, stewart, bars = (
+        Kinematics(DeltaRobot()),
+        Kinematics(StewartPlatform(), tool="platform"),
+        Kinematics(FiveBar()),
+    )
+    r = delta.home.r + random.uniform(-0.2, 0.2, (MANY, 3))
+    q = delta.ik(r)
+    place = stewart.home.r + random.uniform(-0.1, 0.1, (MANY, 3))
+    turn = turned(np.broadcast_to(stewart.home.R, (MANY, 3, 3)), random.uniform(-0.1, 0.1, (MANY, 3)))
+    legs = stewart.ik(place, turn)
+    motors = bars.home.q + random.uniform(-0.3, 0.3, (MANY, 2))
+    bars.fk(motors)
+    calls = {
+        "delta robot, inverse": lambda: delta.ik(r),
+        "delta robot, forward": lambda: delta.fk(q),
+        "Stewart platform, inverse": lambda: stewart.ik(place, turn),
+        "Stewart platform, forward": lambda: stewart.fk(legs),
+        "five bars, forward": lambda: bars.fk(motors),
+    }
+    times = in_turn(calls, 3)
+    for name, duration in times.items():
+        target = {"delta robot, inverse": 200_000}.get(name)
+        rate, figure = float(f"{MANY / duration:.3g}"), f"{name}, poses per second"
+        yield shown(figure, f"{rate:g}") if target is None else at_least(figure, rate, target)
 
 
 def _right_poses() -> Iterator[Row]:

@@ -1,15 +1,17 @@
 """Kinematics of models that are no Gantry-Tau, through their own equations."""
 
+import itertools
 import signal
 import threading
 
 import numpy as np
 import pytest
 
-from gantrytau import GantryTauError
+from gantrytau import GantryTauError, Model, Real, Start, connect
 from gantrytau.errors import ModelError
 from gantrytau.kinematics import Kinematics, assembly_modes
 from gantrytau.kinematics.rotations import turned
+from gantrytau.mechanics.multibody import Body, FixedTranslation, PointMass, Prismatic, Revolute, World
 from gantrytau_models import DeltaRobot, GantryTau, Pendulum, StewartPlatform, prototypes
 
 ALONG_X = np.array([1.0, 0.0, 0.0])
@@ -50,7 +52,7 @@ def test_poses_that_are_no_numbers_are_nan_without_a_word(delta, capfd):
 
 
 def test_an_interrupt_ends_the_call_between_two_blocks(delta):
-    """Poses out of reach take longest; Ctrl-C while CasADi iterates is no failure of the iteration."""
+    """Poses out of reach take longest; Ctrl-C while CasADi iterates is no failure of the iteration, and ends arrays too."""
     main = threading.main_thread().ident
     assert main is not None
     timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))
@@ -145,11 +147,48 @@ def test_what_only_links_answer_is_told(delta):
         delta.ik(delta.home.r, np.eye(3))
 
 
-def test_a_model_that_nothing_drives():
-    from gantrytau import Real, connect
-    from gantrytau.language.model import Model
-    from gantrytau.mechanics.multibody import PointMass, Prismatic, World
+class PlanarArm(Model):
+    """Two bars that turn about z."""
 
+    world = World()
+    shoulder, elbow = Revolute(phi=Start(0.5)), Revolute(phi=Start(1.0))
+    upper, fore = FixedTranslation(r=[0.4, 0.0, 0.0]), FixedTranslation(r=[0.3, 0.0, 0.0])
+    tool = Body(m=1.0, J=np.eye(3))
+
+    def equations(self):
+        chain = [self.world, self.shoulder, self.upper, self.elbow, self.fore]
+        for one, other in itertools.pairwise(chain):
+            yield connect(one.frame_b, other.frame_a)
+        yield connect(self.fore.frame_b, self.tool.frame_a)
+
+
+def test_an_arm_of_two_joints_of_ones_own():
+    """Its tool is in a plane and turns as it goes; the elbow by the law of cosines."""
+    arm = Kinematics(PlanarArm(), joints=["shoulder.phi", "elbow.phi"])
+    r = np.random.default_rng(5).uniform([0.2, 0.2, 0.0], [0.45, 0.45, 0.0], (400, 3))
+    q = arm.ik(r)
+    elbow = np.arccos((np.sum(r**2, axis=1) - 0.4**2 - 0.3**2) / (2 * 0.4 * 0.3))
+    np.testing.assert_allclose(q[:, 1], elbow, atol=1e-12)
+    there, R = arm.fk(q)
+    np.testing.assert_allclose(there, r, atol=1e-12)
+    np.testing.assert_allclose(np.arctan2(R[:, 1, 0], R[:, 0, 0]), q.sum(axis=1), atol=1e-12)
+    assert np.isnan(arm.ik([0.3, 0.3, 0.1])).all()
+    assert np.isnan(arm.ik(np.tile([0.6, 0.6, 0.0], (300, 1)))).all()
+    with pytest.raises(GantryTauError, match="shoulder.phi is given twice"):
+        Kinematics(PlanarArm(), joints=["shoulder.phi", "shoulder.phi"]).ik(r[0])
+
+
+def test_as_many_ways_to_move_as_joints():
+    with pytest.raises(ModelError, match="found 2 joints and an orientation R for PlanarArm, expected none"):
+        Kinematics(PlanarArm(), joints=["shoulder.phi", "elbow.phi"]).ik([0.3, 0.3, 0.0], np.eye(3))
+    stretched = PlanarArm(elbow=dict(phi=Start(0.0)))
+    with pytest.raises(
+        ModelError, match="found 2 joints of PlanarArm, which move tool in 1 ways, expected as many"
+    ):
+        Kinematics(stretched, joints=["shoulder.phi", "elbow.phi"]).ik([0.3, 0.3, 0.0])
+
+
+def test_a_model_that_nothing_drives():
     class Thing(Model):
         r = Real(3, unit="m")
         body = PointMass(m=1.0)

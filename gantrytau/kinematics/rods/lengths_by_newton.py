@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gantrytau.answers.many_points.elimination import solved
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import turned
 
@@ -73,18 +74,6 @@ def _solve_block(
             q[rows[:, None], np.array(joints, dtype=int)] += step[:, len(pose) :]
     for lost in (rows, spoiled):
         q[lost], r[lost], R[lost] = np.nan, np.nan, np.nan
-
-
-def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """matrix^-1 right, (N, k) of (N, k, k) and (N, k) or (N, k, l) of (N, k, l); NaN where the matrix is singular."""
-    stacked = right if right.ndim == 3 else right[:, :, None]
-    try:
-        found = np.linalg.solve(matrix, stacked)
-    except np.linalg.LinAlgError:  # one singular matrix among many
-        singular = ~(np.abs(np.linalg.det(matrix)) > 0.0)
-        found = np.linalg.solve(np.where(singular[:, None, None], np.eye(matrix.shape[1]), matrix), stacked)
-        found[singular] = np.nan
-    return found if right.ndim == 3 else found[:, :, 0]
 
 
 def limited(step: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gantrytau.answers.many_points.elimination import solved
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.modes.link_crossings import crossings
@@ -18,7 +19,7 @@ from gantrytau.kinematics.rods.closed_form import (
     meeting,
     slopes_of_three_links,
 )
-from gantrytau.kinematics.rods.lengths_by_newton import solve_lengths, solved
+from gantrytau.kinematics.rods.lengths_by_newton import solve_lengths
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import best_rotation
 

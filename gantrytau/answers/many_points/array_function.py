@@ -1,0 +1,155 @@
+"""A function of a model for arrays: many points at once, with the answers of `Dae.function` point by point.
+
+Closed forms are computed instruction by instruction, blocks without are followed along their branches; where pivots
+are too small for the closed forms that divide by them, the careful blocks answer, for these points alone. Few points, and
+models with tables or functions from outside, go point by point.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gantrytau.answers.causality import composed, function
+from gantrytau.answers.function_through import Question
+from gantrytau.answers.many_points.array_program import NotForArrays
+from gantrytau.answers.many_points.point_by_point import PointByPoint
+from gantrytau.answers.many_points.through_blocks import ThroughBlocks
+from gantrytau.compiler.blocks.solution import SolvedBlocks
+from gantrytau.compiler.translated import Translated
+from gantrytau.errors import ModelError
+
+FEW = 256  # points that are answered sooner one by one than arrays are made ready
+TOGETHER = 32768  # points whose unknowns stay in memory that is near
+
+
+@dataclass(frozen=True, eq=False)
+class _Arrays:
+    """Arguments (k, N) and results (m, N) through blocks that are quick, and through those of `slow` where they must be."""
+
+    question: Question
+    quick: SolvedBlocks
+    slow: Callable[[], SolvedBlocks]
+    start: Mapping[str, float]
+
+    def __call__(self, q: np.ndarray) -> list[np.ndarray]:
+        return self._answered(q)[0]
+
+    def slopes(self, q: np.ndarray) -> np.ndarray:
+        """Slopes of all results, below each other, by all arguments, (N, m, k)."""
+        _, tears, doubtful = self._answered(q)
+        found = self.first.slopes(q, tears)
+        if doubtful.size:
+            there = q[:, doubtful]
+            found[doubtful] = self.second.slopes(there, self.second.tears(there))
+        return found
+
+    def _answered(self, q: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+        """Results, tears, and where the careful way is taken."""
+        tears = self.first.tears(q)
+        found, trusted = self.first.targets(q, tears)
+        doubtful = np.flatnonzero(~trusted)
+        if doubtful.size:
+            there = q[:, doubtful]
+            some, _ = self.second.targets(there, self.second.tears(there))
+            for whole, part in zip(found, some, strict=True):
+                whole[:, doubtful] = part
+        return found, tears, doubtful
+
+    @cached_property
+    def first(self) -> ThroughBlocks:
+        """The way through blocks that are quick."""
+        return ThroughBlocks(self.question, self.quick, self.start, careful=False)
+
+    @cached_property
+    def second(self) -> ThroughBlocks:
+        """The way that is taken where the first cannot be trusted."""
+        return ThroughBlocks(self.question, self.slow(), self.start, careful=True)
+
+
+class ArrayFunction:
+    """From arrays (N, k) of what is given to arrays (N, m) of what is found, matrices column after column; one row a point.
+
+    A scalar may be (N,). Rows are NaN where there is no solution on the branch of the start, or an argument is NaN.
+    Raises ModelError for arrays of other shapes.
+    """
+
+    def __init__(self, dae: Translated, given: Sequence[str], find: Sequence[str]):
+        self.given, self.find = tuple(given), tuple(find)
+        self._dae = dae
+        self._sizes = [len(dae.expand(name)) for name in self.given]
+        self._suited = True
+        self._points = PointByPoint(function(dae, self.given, self.find))
+
+    def __repr__(self) -> str:
+        return f"<ArrayFunction of {self._dae.name}: {', '.join(self.given)} to {', '.join(self.find)}>"
+
+    def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
+        """Results in the order of the names."""
+        return self._everywhere(self._checked(arguments), self._some)
+
+    def slopes(self, *arguments: np.ndarray) -> np.ndarray:
+        """Slopes of all results, below each other, by all arguments, (N, m, k)."""
+        return self._everywhere(self._checked(arguments), self._slopes_of_some)[0]
+
+    def _checked(self, arguments: Sequence[np.ndarray]) -> np.ndarray:
+        """All arguments beside each other, (N, k)."""
+        arrays = [np.asarray(a, dtype=float) for a in arguments]
+        scalar = [k == 1 for k in self._sizes] + [False] * len(arrays)
+        arrays = [a[:, None] if a.ndim == 1 and one else a for a, one in zip(arrays, scalar, strict=False)]
+        found = [a.shape for a in arrays]
+        count = found[0][0] if found and found[0] else 0
+        if found != [(count, k) for k in self._sizes]:
+            raise ModelError(
+                f"{self._dae.name}: found arrays of shapes {', '.join(map(str, found)) or 'none'}, expected "
+                f"{', '.join(f'{n} (N, {k})' for n, k in zip(self.given, self._sizes, strict=True))}; one row a point"
+            )
+        return np.concatenate(arrays, axis=1)
+
+    def _everywhere(self, q: np.ndarray, some: Callable[[np.ndarray], list[np.ndarray]]) -> list[np.ndarray]:
+        """What `some` finds of arguments that are numbers; NaN elsewhere."""
+        known = np.isfinite(q).all(axis=1)
+        rows = np.flatnonzero(known)
+        parts = [rows[k : k + TOGETHER] for k in range(0, len(rows), TOGETHER)] or [rows]
+        found: list[np.ndarray] = []
+        for part in parts:
+            results = some(q[part])
+            found = found or [np.full((len(q), *x.shape[1:]), np.nan) for x in results]
+            for whole, result in zip(found, results, strict=True):
+                whole[part] = result
+        return found
+
+    def _some(self, q: np.ndarray) -> list[np.ndarray]:
+        found = self._by_arrays(q, lambda arrays: [x.T for x in arrays(q.T)])
+        return self._points(q) if found is None else found
+
+    def _slopes_of_some(self, q: np.ndarray) -> list[np.ndarray]:
+        found = self._by_arrays(q, lambda arrays: [arrays.slopes(q.T)])
+        return [self._points.slopes(q)] if found is None else found
+
+    def _by_arrays(
+        self, q: np.ndarray, answer: Callable[[_Arrays], list[np.ndarray]]
+    ) -> list[np.ndarray] | None:
+        """What arrays answer; None where points go one by one."""
+        if len(q) < FEW or not self._suited:
+            return None
+        try:
+            return answer(self._arrays)
+        except NotForArrays:
+            self._suited = False
+            return None
+
+    @cached_property
+    def _arrays(self) -> _Arrays:
+        return composed(self._dae, self.given, self.find, _through, _open)
+
+
+def _through(
+    name: str, question: Question, quick: SolvedBlocks, careful, start: Mapping[str, float]
+) -> _Arrays:
+    return _Arrays(question, quick, careful, start)
+
+
+def _open(function: _Arrays) -> _Arrays:
+    raise NotForArrays("loops that the given parameters may open")

@@ -1,0 +1,178 @@
+"""One branch of the solutions of f(y, q) = 0 followed to many q at once, as `branch_follower` follows it to one.
+
+The trials are the same, and so is what is accepted. Matrices are eliminated by pivots that are good at the start, as
+expressions of which NumPy computes one instruction for all points; where the way ends so, it goes on with
+pivots that are chosen by value for each point, so that no answer is lost where one of the others vanishes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.answers import branch_follower as one
+from gantrytau.answers.implicit_blocks import SOLVED
+from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArrays
+from gantrytau.answers.many_points.elimination import eliminated, order_of_pivots, solved
+from gantrytau.language.term_sizes import term_sizes
+
+MOST = one.TRIALS[0] * one.TRIALS[1]
+CORRECTIONS = 8
+SETTLED = (
+    1e-8  # of the unknowns in their sizes: a correction after which Newton's method has reached rounding
+)
+ONWARD = 0.1  # of what is left of the way, the first trial after pivots are chosen anew
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedBranch:
+    """Unknowns y (n,) of a block; residual: (y, q) -> f (n,), an SX function; start: y where q is `begin`, both columns."""
+
+    residual: ca.Function
+    start: np.ndarray
+    begin: np.ndarray
+
+    def __call__(self, end: np.ndarray) -> np.ndarray:
+        """Y (n, N) at `end` (k, N); NaN where the branch does not lead there."""
+        rows, _ = self.units
+        y = np.full((len(self.start), end.shape[1]), np.nan)
+        z = np.repeat((self.start / self.units[1])[:, None], end.shape[1], axis=1)
+        way = np.ones((2, end.shape[1]))
+        self._along(self._trial, way, z, end)
+        late = np.flatnonzero(way[0] > 0)
+        if late.size and len(rows) > 1:
+            there, state, place = end[:, late], way[:, late], z[:, late]
+            state[1] = np.maximum(state[1], ONWARD * state[0])
+            self._along(self._trial_by_value, state, place, there)
+            way[:, late], z[:, late] = state, place
+        here = np.flatnonzero(way[0] == 0)
+        y[:, here] = self._corrected(z[:, here], end[:, here])
+        return y
+
+    def _along(self, trial, way: np.ndarray, z: np.ndarray, end: np.ndarray) -> None:
+        """Trials until all have arrived or do not move; way: what is left of it and the next step, (2, N), z: (n, N)."""
+        on = np.arange(end.shape[1])
+        for _ in range(MOST):
+            on = on[(way[0, on] > 0) & (way[1, on] > one.SMALLEST)]
+            if not on.size:
+                break
+            left, h = way[:, on]
+            both, sizes, pivots = trial(way[:, on], z[:, on], end[:, on])
+            with np.errstate(all="ignore"):
+                beside = sizes[0] / (sizes[1] * one.NEAR**2 + sizes[2] * one.ROUNDING**2)
+                # NaN, as a singular matrix makes it, is no step that is accepted
+                bend = np.maximum(np.sqrt(beside), np.abs(np.log(pivots)).max(axis=0) / np.log(one.ALIKE))
+                bend = np.where(np.isnan(bend), np.inf, bend)
+                wider = h * np.clip(one.WANTED / bend, *one.CHANGES)
+            good = bend <= 1
+            z[:, on[good]] += both[:, good]
+            left = np.where(good, left - h, left)
+            way[:, on] = left, np.minimum(wider, left)
+
+    def _corrected(self, z: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Y of points near the branch by Newton's method, to rounding; NaN where equations do not hold."""
+        on = np.arange(end.shape[1])
+        for _ in range(CORRECTIONS):
+            if not on.size:
+                break
+            (step,) = self._newton(z[:, on], end[:, on])
+            if len(z) > 1 and not np.isfinite(step).all():
+                step = np.where(
+                    np.isfinite(step).all(axis=0), step, self._newton_by_value(z[:, on], end[:, on])
+                )
+            z[:, on] += step
+            on = on[~(np.abs(step).max(axis=0) <= SETTLED * np.abs(z[:, on]).max(axis=0))]
+        y = z * self.units[1][:, None]
+        (error,) = self._errors(y, end)
+        with np.errstate(invalid="ignore"):
+            y[:, ~(error[0] <= SOLVED**2)] = np.nan
+        return y
+
+    @cached_property
+    def units(self) -> tuple[np.ndarray, np.ndarray]:
+        """What rows are divided by and unknowns are measured in."""
+        sizes = one.sizes_at(self.residual, ca.DM(self.start), ca.DM(self.begin))
+        rows, columns = (np.array(size).ravel() for size in sizes)
+        return rows, columns
+
+    @cached_property
+    def _reach(self) -> ca.DM:
+        return one.reach_along(self.residual, *map(ca.DM, (self.start, self.begin, self.units[1])))
+
+    @cached_property
+    def _here(self) -> ca.Function:
+        """(z, s, b) -> residual, its Jacobians by z and s."""
+        return one.residual_along(self.residual, ca.DM(self.begin), *map(ca.DM, self.units))
+
+    @cached_property
+    def order(self) -> list[tuple[int, int]]:
+        """Pivots that are good at the start, as (row, column)."""
+        _, matrix, _ = self._here(ca.DM(self.start / self.units[1]), 0, ca.DM(self.begin))
+        order = order_of_pivots(np.array(matrix))
+        if order is None:
+            raise NotForArrays(f"{self.residual.name()} is singular at the start")
+        return order
+
+    @cached_property
+    def _trial(self):
+        """(way, z, end) -> step with correction; squares of correction, of a usual step and of z; pivots between Jacobians.
+
+        Matrices are eliminated in the order that is good at the start.
+        """
+        n = len(self.start)
+        way, z, end = ca.SX.sym("way", 2), ca.SX.sym("z", n), ca.SX.sym("end", len(self.begin))
+        left, h = way[0], way[1]
+        f, before, slope = self._here(z, 1 - left, end)
+        step = -eliminated(before, f + h * slope, self.order)
+        f, after, _ = self._here(z + step, 1 - left + h, end)
+        both = eliminated(after, ca.horzcat(f, before), self.order)
+        pivots = one.pivots_of(both[:, 1:])
+        usual = ca.sumsqr(step) + h**2 * ca.dot(self._reach, (end - ca.DM(self.begin)) ** 2)
+        sizes = ca.vertcat(ca.sumsqr(both[:, 0]), usual, ca.sumsqr(z))
+        results = [step - both[:, 0], sizes, ca.vertcat(*pivots)]
+        return ArrayProgram(ca.Function("trial", [way, z, end], results, {"cse": True}))
+
+    def _trial_by_value(self, way: np.ndarray, z: np.ndarray, end: np.ndarray):
+        f, before, slope = self._matrices(z, (1 - way[:1]), end)
+        step = -solved(before, (f + way[1] * slope).T).T
+        f, after, _ = self._matrices(z + step, 1 - way[:1] + way[1:], end)
+        both = solved(after, np.concatenate([f.T[:, :, None], before], axis=2))
+        correction, n = -both[:, :, 0].T, len(z)
+        (pivots,) = self._pivots(both[:, :, 1:].transpose(2, 1, 0).reshape(n * n, -1))
+        sizes = [np.sum(x * x, axis=0) for x in (correction, step, z)]
+        sizes[1] += way[1] ** 2 * (np.array(self._reach).T @ (end - self.begin[:, None]) ** 2)[0]
+        return step + correction, sizes, pivots
+
+    def _matrices(self, z: np.ndarray, s: np.ndarray, end: np.ndarray):
+        """Residual (n, N), its Jacobian (N, n, n) by z and its slope (n, N) along the way."""
+        f, matrix, slope = self._numbers(z, s, end)
+        return f, matrix.reshape(len(z), len(z), -1).transpose(2, 1, 0), slope
+
+    @cached_property
+    def _numbers(self) -> ArrayProgram:
+        return ArrayProgram(self._here)
+
+    @cached_property
+    def _pivots(self) -> ArrayProgram:
+        matrix = ca.SX.sym("matrix", len(self.start), len(self.start))
+        return ArrayProgram(ca.Function("pivots", [ca.vec(matrix)], [ca.vertcat(*one.pivots_of(matrix))]))
+
+    @cached_property
+    def _newton(self) -> ArrayProgram:
+        z, end = ca.SX.sym("z", len(self.start)), ca.SX.sym("end", len(self.begin))
+        f, matrix, _ = self._here(z, 1, end)
+        step = -eliminated(matrix, f, self.order)
+        return ArrayProgram(ca.Function("newton", [z, end], [step], {"cse": True}))
+
+    def _newton_by_value(self, z: np.ndarray, end: np.ndarray) -> np.ndarray:
+        f, matrix, _ = self._matrices(z, np.ones((1, z.shape[1])), end)
+        return -solved(matrix, f.T).T
+
+    @cached_property
+    def _errors(self) -> ArrayProgram:
+        """(y, end) -> the square of the residual in the sizes of the terms of its equations."""
+        y, end = self.residual.sx_in()
+        f = self.residual(y, end)
+        terms = ca.vertcat(*(ca.if_else(t > 0, t, 1.0) for t in term_sizes(ca.densify(f).elements())))
+        return ArrayProgram(ca.Function("errors", [y, end], [ca.sumsqr(f / terms)], {"cse": True}))

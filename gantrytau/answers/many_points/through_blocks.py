@@ -1,0 +1,122 @@
+"""Targets of many points through solved blocks: closed forms by NumPy, blocks without along their branches."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, reduce
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.answers.function_through import Question, parted
+from gantrytau.answers.implicit_blocks import SINGULAR, linear_parts
+from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArrays
+from gantrytau.answers.many_points.elimination import solved
+from gantrytau.answers.many_points.followed_branches import FollowedBranch
+from gantrytau.answers.many_points.kept_unknowns import reduced
+from gantrytau.compiler.blocks.solution import SolvedBlocks
+from gantrytau.language.piecewise import switched
+
+AROUND = (
+    0.02,
+    0.1,
+)  # of one, or of an argument where it is larger: how far from the start unknowns are looked at
+LOOKED_AT = 16  # points at each of these distances
+
+
+class LinearSolution:
+    """A block of linear equations that are solved point by point: NaN where they are singular."""
+
+    def __init__(self, parts: tuple[ca.Function, ca.Function, ca.DM, np.ndarray]):
+        matrix, rows, self._other, self._columns = parts
+        self._matrix, self._rows = ArrayProgram(matrix), ArrayProgram(rows)
+
+    def __call__(self, known: np.ndarray) -> np.ndarray:
+        """Unknowns (n, N) of arguments and unknowns before, (k, N)."""
+        (matrix, right), (row,) = self._matrix(known), self._rows(known)
+        n = len(right)
+        left = (matrix.reshape(n, n, -1) * row).transpose(2, 1, 0)
+        other = np.broadcast_to(np.array(self._other), (len(left), n, 1))
+        with np.errstate(all="ignore"):
+            both = solved(left, np.concatenate([(row * right).T[:, :, None], other], axis=2))
+            both[~(np.sum(both[:, :, 1] ** 2, axis=1) <= SINGULAR**-2)] = np.nan
+        return (both[:, :, 0] / self._columns).T
+
+
+class ThroughBlocks:
+    """Targets through blocks as they are solved; trusted: expressions that hold where the closed forms can be trusted."""
+
+    def __init__(self, question: Question, blocks: SolvedBlocks, start: Mapping[str, float], careful: bool):
+        residuals, extents, targets, margins = parted(question, blocks)
+        trusted = [] if careful else [m > 0 for m in margins if not m.is_constant()]
+        q, tears = ca.vertcat(*question.arguments), ca.vertcat(ca.SX(0, 1), *blocks.tears)
+        self._start = np.array(question.start()).ravel()
+        self._steps: list[Callable[[np.ndarray], np.ndarray]] = []
+        near = _around(self._start)
+        before, place = ca.SX(0, 1), 0
+        for block in blocks.implicit:
+            begin, place = place, place + len(block.tears)
+            y, known = ca.vertcat(*block.tears), ca.vertcat(q, before)
+            residual = residuals[begin:place]
+            if switched([residual], {leaf.name() for leaf in y.elements()}).switches:
+                raise NotForArrays("equations that switch, in a block without closed form")
+            if block.scales is not None:
+                parts = linear_parts(residual, extents[begin:place], block.scales, y, known)
+                self._steps.append(LinearSolution(parts))
+            else:
+                function = ca.Function("residual", [y, known], [residual], {"cse": True})
+                numbers = np.array([start[leaf.name()] for leaf in tears[:place].elements()])
+                branch = FollowedBranch(
+                    function, numbers[begin:], np.concatenate([self._start, numbers[:begin]])
+                )
+                self._steps.append(reduced(branch, branch(near)))
+            before = ca.vertcat(before, y)
+            near = np.vstack([near, self._steps[-1](near)])
+        everything = [q, tears]
+        whole = [ca.densify(ca.vec(t)) for t in targets]
+        holds = [reduce(ca.logic_and, trusted)] if trusted else [ca.SX(1)]
+        self._rest = ArrayProgram(ca.Function("rest", everything, [*whole, *holds], {"cse": True}))
+        self._slopes = lambda: _slopes(everything, residuals, ca.vertcat(*whole))
+
+    def tears(self, q: np.ndarray) -> np.ndarray:
+        """Unknowns without closed form (n, N) of arguments (k, N)."""
+        known = q
+        for step in self._steps:
+            known = np.vstack([known, step(known)])
+        return known[len(q) :]
+
+    def targets(self, q: np.ndarray, tears: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+        """Targets (m, N) and whether they can be trusted, (N,)."""
+        *found, holds = self._rest(q, tears)
+        return found, holds[0] != 0
+
+    @cached_property
+    def slopes(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """(arguments, tears) -> the slopes of all targets, (N, m, k)."""
+        return self._slopes()
+
+
+def _around(start: np.ndarray) -> np.ndarray:
+    """Points about the start, (k, N)."""
+    random = np.random.default_rng(0)
+    sizes = np.maximum(1.0, np.abs(start))[:, None]
+    return np.hstack([
+        start[:, None] + share * sizes * random.uniform(-1, 1, (len(start), LOOKED_AT)) for share in AROUND
+    ])  # fmt: skip
+
+
+def _slopes(everything: Sequence[ca.SX], residuals: ca.SX, targets: ca.SX):
+    """(arguments, tears) -> dtargets/darguments, by the theorem of implicit functions."""
+    q, y = everything
+    n, m, k = y.numel(), targets.numel(), q.numel()
+    parts = [ca.densify(ca.jacobian(f, x)) for f in (targets, residuals) for x in (q, y)]
+    program = ArrayProgram(ca.Function("slopes", [q, y], parts, {"cse": True}))
+
+    def of(q: np.ndarray, y: np.ndarray) -> np.ndarray:
+        sizes = ((m, k), (m, n), (n, k), (n, n))
+        found = [
+            part.reshape(across, down, q.shape[1]).transpose(2, 1, 0)
+            for part, (down, across) in zip(program(q, y), sizes, strict=True)
+        ]
+        by_q, by_y, left_q, left_y = found
+        return by_q - by_y @ solved(left_y, left_q) if n else np.array(by_q)
+
+    return of
