@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands import controller, fmu, vision
+from gantrytau.commands import controller, fmu, new, vision
 from gantrytau.commands.calibrate.calibrate_command import calibrate
 from gantrytau.commands.check_command import check
 from gantrytau.commands.demo.demo_command import demo
@@ -84,6 +84,7 @@ app.command(epilog="Example: gantrytau view 'GantryTau(L1)' --pose 'tool.r=[0.5,
 )
 app.command(epilog="Example: gantrytau library --json")(library)
 app.command(epilog="Example: gantrytau describe Revolute")(describe)
+app.add_typer(new.app, name="new")
 app.add_typer(fmu.app, name="fmu")
 app.add_typer(controller.app, name="controller")
 app.add_typer(vision.app, name="vision")
