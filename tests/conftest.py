@@ -19,6 +19,7 @@ LONGEST = (  # ten seconds of one processor and more; test_compiling.py takes mi
     "fmu/runtime/test_singular_poses.py",
     "commands/calibrate/test_calibrate_verdict.py",
     "viewing/test_in_a_browser.py",
+    "commands/test_new.py",
     "models/mechanisms/test_f1.py",
     "optimica/procedure/test_plan.py",
     "models/mechanisms/test_stewart.py",

@@ -31,7 +31,9 @@ def robot(
         name = re.sub(r"[_-]+", " ", folder.absolute().name).strip() or "robot"
         _make(folder)
         written = []
-        for template in sorted(files(__package__).joinpath(TEMPLATES).iterdir(), key=lambda f: f.name):
+        for template in sorted(
+            files("gantrytau.commands.new").joinpath(TEMPLATES).iterdir(), key=lambda f: f.name
+        ):
             target = folder / template.name.removesuffix(".txt")
             write_text(template.read_text(encoding="utf-8").replace(NAME, name), target)
             written.append(target)
