@@ -14,6 +14,7 @@ from typing import Any
 from notebooks.site.builder.places import EXECUTED, NOTEBOOKS, PACKAGES, ROOT
 
 LONGEST = 600.0  # s, for one cell
+BUSY = 300.0  # s, for a kernel to begin, where much else is going on
 
 
 def executed_notebooks(workers: int | None = None) -> dict[Path, Path]:
@@ -32,7 +33,6 @@ def executed_notebooks(workers: int | None = None) -> dict[Path, Path]:
 def _execute(path: Path, target: Path) -> None:
     import jupytext
     import nbformat
-    from traitlets.config import Config
 
     nbclient = importlib.import_module("nbclient")  # of the extra `docs`, where the type checker need not be
 
@@ -40,8 +40,10 @@ def _execute(path: Path, target: Path) -> None:
     notebook = jupytext.read(path)
     environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"}
     environment["PYTHONPATH"] = os.pathsep.join([*_sources(), os.environ.get("PYTHONPATH", "")])
-    pipes = Config({"KernelManager": {"transport": "ipc"}})  # of this machine alone
-    client: Any = nbclient.NotebookClient(notebook, timeout=LONGEST, kernel_name="python3", config=pipes)
+    quiet = ["--log-level=ERROR"]
+    client: Any = nbclient.NotebookClient(
+        notebook, timeout=LONGEST, startup_timeout=BUSY, kernel_name="python3", extra_arguments=quiet
+    )
     try:
         client.execute(cwd=str(NOTEBOOKS), env=environment)
     except nbclient.exceptions.CellExecutionError as error:
