@@ -9,6 +9,7 @@ from collections import Counter
 import pytest
 
 from notebooks.site.builder.broken_links import broken_links
+from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import by_task, error_pages
 from notebooks.site.builder.generated.reference_pages import reference_pages, unplaced
 from notebooks.site.builder.generated.thesis_page import found, items
@@ -17,7 +18,7 @@ from notebooks.site.builder.reading.docstrings import markdown, summary
 from notebooks.site.builder.reading.error_catalogue import messages, split
 from notebooks.site.builder.reading.public_names import public_names, public_packages
 from notebooks.site.builder.reading.task_groups import listed_groups
-from notebooks.site.builder.staging import Stage, handwritten, relinked
+from notebooks.site.builder.staging import Stage, handwritten, relinked, stage_handwritten
 from tests.test_layers import house, too_large
 
 
@@ -140,11 +141,18 @@ def test_calls_of_the_thesis_page_are_there(item):
 
 
 def test_pages_of_trees_are_there():
-    pages = {*handwritten().values(), *dict(reference_pages()), "messages/index.md", "thesis/index.md"}
+    pages = {
+        *handwritten().values(),
+        *dict(reference_pages()),
+        "messages/index.md",
+        "thesis/index.md",
+        "command_line/index.md",
+    }
     index = (ROOT / "notebooks/site/index.md").read_text()
     for body in re.findall(r"```\{toctree\}\n(.*?)```", index, re.DOTALL):
-        for entry in [line for line in body.splitlines() if line and not line.startswith(":")]:
-            assert entry == "genindex" or f"{entry}.md" in pages or "*" in entry, entry
+        for line in [line for line in body.splitlines() if line and not line.startswith(":")]:
+            entry = line.partition("<")[2].rstrip(">") or line
+            assert entry == "genindex" or f"{entry}.md" in pages, entry
 
 
 def test_links_between_pages_of_folders_lead_to_pages_of_the_site(tmp_path):
@@ -171,6 +179,29 @@ def test_broken_links_are_found(tmp_path):
         "a.html: c.html: there is no such file",
         "a.html: p.png: an empty picture",
     ]
+
+
+def test_the_command_line_is_told_with_its_options():
+    page = command_page()
+    simulate = page[page.index("## gantrytau simulate") :].partition("\n## ")[0]
+    assert "| `--stop FLOAT` |  | Time at which to stop, in s. |" in simulate
+    assert "`MODEL`" in simulate
+    assert "## gantrytau fmu export" in page
+
+
+def test_code_that_is_a_public_name_leads_to_the_reference(tmp_path):
+    folder = tmp_path / "pages"
+    stage = Stage(folder)
+    stage_handwritten(stage)
+    text = (folder / "manual/gantrytau.md").read_text()
+    assert "{py:obj}`Dae <gantrytau.Dae>`" in text
+    assert "{py:obj}`" not in "".join(re.findall("```python.*?```", text, re.DOTALL))
+    stage.write("left.md", "x")
+    again = Stage(folder)
+    stage_handwritten(again)
+    again.clear()
+    assert not (folder / "left.md").exists()
+    assert (folder / "manual/gantrytau.md").exists()
 
 
 def test_every_module_has_a_task():

@@ -8,6 +8,7 @@ import time
 
 from notebooks.site.builder.broken_links import broken_links
 from notebooks.site.builder.executed_notebooks import executed_notebooks
+from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import error_pages
 from notebooks.site.builder.generated.reference_pages import reference_pages
 from notebooks.site.builder.generated.thesis_page import thesis_page
@@ -25,7 +26,8 @@ def main() -> int:
     begin = time.monotonic()
     stage = Stage()
     stage_handwritten(stage)
-    for page, text in (*reference_pages(), *error_pages(), ("thesis/index.md", thesis_page())):
+    single = {"thesis/index.md": thesis_page(), "command_line/index.md": command_page()}
+    for page, text in (*reference_pages(), *error_pages(), *single.items()):
         stage.write(page, text)
     told(begin, f"{len(stage.written)} pages staged; notebooks are executed")
     _stage_notebooks(stage, asked.without_outputs)

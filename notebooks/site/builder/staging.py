@@ -7,9 +7,9 @@ to a copy of it where it has none.
 import os
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
+from notebooks.site.builder.generated.reference_pages import resolver
 from notebooks.site.builder.places import NOTEBOOKS, ROOT, SOURCES, STAGE
 
 MANUAL = {  # page of a folder -> page of the site
@@ -29,6 +29,7 @@ MANUAL = {  # page of a folder -> page of the site
     "CHANGELOG.md": "manual/changelog.md",
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+NAMED = re.compile(r"(?<!`)`([A-Za-z_]\w+)(\([^`]*\)|)`(?!`)")
 CODE = re.compile(r"(^```.*?^```|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 
 
@@ -80,7 +81,7 @@ def stage_handwritten(stage: Stage) -> None:
     for path, page in pages.items():
         if path.suffix == ".md":
             text = relinked(path.read_text(encoding="utf-8"), path, page, stage)
-            stage.write(page, text + _tree_of(page))
+            stage.write(page, _with_names(text) + _tree_of(page))
 
 
 def relinked(text: str, source: Path, page: str, stage: Stage) -> str:
@@ -116,6 +117,26 @@ def relinked(text: str, source: Path, page: str, stage: Stage) -> str:
     return "".join(part if k % 2 else LINK.sub(there, part) for k, part in enumerate(parts))
 
 
+def _with_names(text: str) -> str:
+    """A page on which code that is a public name leads to the reference: a class, or a function with its parentheses."""
+    link, lines = resolver(""), text.splitlines(keepends=True)
+    fenced = False
+    for number, line in enumerate(lines):
+        fenced ^= line.lstrip().startswith("```")
+        if fenced or line.startswith("#"):
+            continue
+        parts = NAMED.split(line)
+        for k in range(1, len(parts), 3):
+            before = "".join(parts[:k])
+            name, rest = parts[k], parts[k + 1]
+            target = link(name) if before.rfind("[") <= before.rfind("]") else None
+            whole = target and not set(rest) & set("<>`") and (rest or name[0].isupper())
+            parts[k] = f"{{py:obj}}`{name}{rest} <{target}>`" if whole else f"`{name}{rest}`"
+            parts[k + 1] = ""
+        lines[number] = "".join(parts)
+    return "".join(lines)
+
+
 def _generated() -> tuple[str, ...]:
     """Folders of the site whose pages are generated."""
     return ("reference", "messages", "thesis", "command_line")
@@ -127,9 +148,3 @@ def _tree_of(page: str) -> str:
         return ""
     names = "\n".join(path.stem for path in sorted(NOTEBOOKS.glob("*.py")))
     return f"\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
-
-
-def links(text: str) -> Iterator[str]:
-    """Targets of the links of a text in Markdown, outside of code."""
-    for part in CODE.split(text)[::2]:
-        yield from (found[2] for found in LINK.finditer(part))

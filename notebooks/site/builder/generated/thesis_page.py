@@ -29,7 +29,7 @@ I. Dressler, "Modeling and Control of Stiff Robots for Flexible Manufacturing" (
 makes each of its figures and tables here, with the page where it is at work. Measured data of the thesis are not public:
 pictures are of synthetic data, or of your own. What a figure shows is told as far as it is known here from the text.
 """
-UNKNOWN = "not told of in the text that this project goes by: a photograph, a drawing, or another curve of its section"
+UNKNOWN = "not told of in what this project has of the thesis"
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,16 @@ def thesis_page() -> str:
 
 
 def _rows(held: list[Item]) -> Iterator[tuple[str, ...]]:
-    for one in held:
+    """A row for the numbers that share all else; those of which nothing is known come last."""
+    alike: dict[tuple[object, ...], list[Item]] = {}
+    for one in sorted(held, key=lambda one: one.why == UNKNOWN):
+        alike.setdefault((one.subject, one.call, *one.names, one.page, one.why), []).append(one)
+    for several in alike.values():
+        one = several[0]
         call = f"`{one.call}`" if one.call else escaped(one.why, resolver(""))
         links = ", ".join(_name(name) for name in one.names)
-        yield one.number, escaped(one.subject), f"{call}" + (f" ({links})" if links else ""), _page(one.page)
+        numbers = ", ".join(item.number for item in several)
+        yield numbers, escaped(one.subject), call + (f" ({links})" if links else ""), _page(one.page)
 
 
 def _name(full: str) -> str:

@@ -12,6 +12,8 @@ MARKUP = re.compile(r"([\\*_<>\[\]{}$~|])")
 ITEM = re.compile(r"(- |\d+\. )")
 NAME = r"`?\*{0,2}\w+`?"
 EXPLAINED = re.compile(rf"(?:^|(?<=; )|(?<=\. ))({NAME}(?:(?:, | and ){NAME})*): ")
+FULL = 100  # letters of a line that leaves no room for another word
+ERROR = re.compile(r"\b([A-Z][A-Za-z]+(?:Error|Result))\b")
 SENTENCE = re.compile(r"(Raises|Warns|Returns|Needs)\b")
 
 Link = Callable[[str], str | None]  # from what stands between backticks to the full name of which it is one
@@ -35,13 +37,19 @@ def escaped(text: str, link: Link = lambda word: None) -> str:
     parts = []
     for k, part in enumerate(CODE.split(text)):
         if k % 2 == 0:
-            parts.append(MARKUP.sub(r"\\\1", part))
+            words = ERROR.split(MARKUP.sub(r"\\\1", part))
+            parts += [_error(word, link) if i % 2 else word for i, word in enumerate(words)]
             continue
         word = part.strip("`")
         target = link(word)
         parts.append(f"{{py:obj}}`{word} <{target}>`" if target and not set(word) & set("<>`") else part)
     found = "".join(parts)
     return re.sub(r"^(\d+)([.)])|^([#+=-])", lambda m: f"{m[1]}\\{m[2]}" if m[1] else f"\\{m[3]}", found)
+
+
+def _error(word: str, link: Link) -> str:
+    target = link(word)
+    return f"{{py:obj}}`{word} <{target}>`" if target else word
 
 
 def _blocks(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
@@ -63,7 +71,7 @@ def _blocks(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
             part.append(line)
             continue
         now = _kind(line, kind, part)
-        if now != kind or (now == "text" and part and SENTENCE.match(line)):
+        if now != kind or (now == "text" and part and _begins(line, part[-1])):
             if part and kind:
                 yield kind, part
             kind, part = now, []
@@ -71,6 +79,12 @@ def _blocks(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
             part.append(line)
     if part and kind:
         yield kind, part
+
+
+def _begins(line: str, before: str) -> bool:
+    """Whether a line begins a paragraph: by its word, or behind a sentence that left room for it."""
+    room = len(before) + 1 + len(line.split()[0]) < FULL
+    return bool(SENTENCE.match(line)) or (before.endswith(".") and room and line[0].isupper())
 
 
 def _kind(line: str, before: str, part: list[str]) -> str:

@@ -38,20 +38,26 @@ class PublicName:
 
 @cache
 def public_names() -> tuple[PublicName, ...]:
-    """All of them, the packages in the order of `PACKAGES`, the shorter names of packages first."""
-    found: list[PublicName] = []
+    """All of them, the packages in the order of `PACKAGES`, the shorter names of packages first.
+
+    What several export is told of where it is written, if that exports it, or else by the first of them.
+    """
+    held = [(package, *one) for package in public_packages() for one in _exported(package)]
     first: dict[tuple[str, str], str] = {}
-    for package in public_packages():
-        for name, home, value in _exported(package):
-            key = (name, getattr(value, "__module__", None) or home)
-            same_as = first.setdefault(key, f"{package}.{name}")
-            line = _line(home, name)
-            found.append(
-                PublicName(
-                    package, name, home, value, line, "" if same_as == f"{package}.{name}" else same_as
-                )
-            )
+    for package, name, home, value in held:
+        key = _key(name, home, value)
+        if key not in first or package == home:
+            first[key] = f"{package}.{name}"
+    found = []
+    for package, name, home, value in held:
+        place = first[_key(name, home, value)]
+        same_as = "" if place == f"{package}.{name}" else place
+        found.append(PublicName(package, name, home, value, _line(home, name), same_as))
     return tuple(found)
+
+
+def _key(name: str, home: str, value: Any) -> tuple[str, str]:
+    return name, getattr(value, "__module__", None) or home
 
 
 @cache
