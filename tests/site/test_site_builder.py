@@ -184,7 +184,7 @@ def test_broken_links_are_found(tmp_path):
 def test_the_command_line_is_told_with_its_options():
     page = command_page()
     simulate = page[page.index("## gantrytau simulate") :].partition("\n## ")[0]
-    assert "| `--stop FLOAT` |  | Time at which to stop, in s. |" in simulate
+    assert "| `--stop NUMBER` |  | Time at which to stop, in s. |" in simulate
     assert "`MODEL`" in simulate
     assert "## gantrytau fmu export" in page
 

@@ -2,10 +2,18 @@
 
 import enum
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from notebooks.site.builder.generated.component_tables import table
 from notebooks.site.builder.reading.docstrings import escaped, summary
+
+WORDS = {
+    float: "NUMBER",
+    int: "NUMBER",
+    str: "TEXT",
+    Path: "PATH",
+}  # what an option takes, where it has no word for it
 
 
 def command_page() -> str:
@@ -15,7 +23,7 @@ def command_page() -> str:
     from gantrytau.cli import app
 
     held = list(_commands(typer.main.get_command(app), "gantrytau"))
-    text = "# Command line\n\nThe same for models of the library and for classes in files of your own; `--help` tells it, too.\n\n"
+    text = "# Command line\n\nFor models of the library and for classes in files of your own; `--help` tells it, too.\n\n"
     rows = [(f"[`{path}`](#{_place(path)})", summary(command.help)) for path, command in held]
     text += table("", ("command", "what it does"), rows)
     return text + "".join(f"\n\n{_command(path, command)}" for path, command in held) + "\n"
@@ -53,7 +61,8 @@ def _name(one: Any) -> str:
     if one.param_type_name == "argument":
         return one.metavar or one.name.upper()
     names = "/".join((", ".join(reversed(one.opts)), *one.secondary_opts))
-    return names if one.is_flag else f"{names} {one.metavar or one.type.name.upper()}"
+    kind = getattr(getattr(one, "type_descriptor", None), "annotation", None)
+    return names if one.is_flag else f"{names} {one.metavar or WORDS.get(kind, 'VALUE')}"
 
 
 def _default(one: Any) -> str:
