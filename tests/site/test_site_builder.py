@@ -56,7 +56,7 @@ def test_what_two_packages_export_is_told_of_in_one_place():
 def test_components_have_tables_with_units(reference):
     page = reference["reference/joints.md"]
     revolute = page[page.index("## Revolute") : page.index("## Cylindrical")]
-    assert "| `phi` | rad | angle from frame\\_a to frame\\_b about n |" in revolute
+    assert "| `tau` | N.m | driving torque about n |" in revolute
     assert "| `n[3]` | `[0.0, 0.0, 1.0]` | axis of rotation" in revolute
     assert "{py:obj}`Frame <gantrytau.mechanics.multibody.Frame>`" in revolute
 
