@@ -1,11 +1,13 @@
 """Cells of CSV files: separated by commas, or by semicolons or tabs, where decimals may then have a comma."""
 
 import csv
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from gantrytau.errors import ModelError
+from gantrytau.language.scales import Scale, column_of, known_scale
 
 SEPARATORS = (";", "\t", ",")
 
@@ -29,6 +31,32 @@ def read_cells(path: Path) -> tuple[list[tuple[int, list[str]]], str]:
             f"{path}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"
         ) from None
     return rows, separator
+
+
+def headings(
+    path: Path, header: Sequence[str], units: Callable[[str], Sequence[str]]
+) -> tuple[list[str], list[Scale | None]]:
+    """Names of columns, and their units where these stand behind in brackets, "x [mm]".
+
+    units: name -> what a column may measure, in SI units; none for one that is not read. ModelError for other units.
+    """
+    names, scales = [], list[Scale | None]()
+    for heading in header:
+        name, bracket, _ = heading.strip().rpartition(" [")
+        allowed = units(name.strip()) if bracket else ()
+        if not allowed:
+            names.append(heading.strip())
+            scales.append(None)
+            continue
+        try:
+            name, unit = column_of(heading)
+            if unit is not None and not any(unit.measures(one) for one in allowed):
+                known_scale(f"column {name}", unit.text, allowed[0])
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from None
+        names.append(name)
+        scales.append(unit)
+    return names, scales
 
 
 def check_cells(path: Path, line: int, row: list[str], count: int, separator: str) -> None:

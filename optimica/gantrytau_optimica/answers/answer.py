@@ -68,7 +68,7 @@ class Answer(Record, ABC):
 
     @property
     def displays(self) -> Mapping[str, str]:
-        """The units in which variables are shown, where they are declared, by name; none of an answer read from a file."""
+        """The units in which variables are shown, where they are declared, by name."""
         return {}
 
     @property

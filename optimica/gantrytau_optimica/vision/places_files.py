@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau import ModelError
+from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
 from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
@@ -70,7 +71,12 @@ def _columns(path: Path, names: tuple[str, ...], optional: tuple[str, ...] = ())
     rows, separator = read_cells(path)
     if not rows:
         raise VisionError(f"{path}: found an empty file, expected the columns {','.join(names)}")
-    header = [name.strip() for name in rows[0][1]]
+    try:
+        header, units = headings(
+            path, rows[0][1], lambda name: _units(name) if name in (*names, *optional) else ()
+        )
+    except ModelError as error:
+        raise VisionError(str(error)) from None
     missing = [name for name in names if name not in header]
     if missing:
         raise VisionError(
@@ -83,4 +89,11 @@ def _columns(path: Path, names: tuple[str, ...], optional: tuple[str, ...] = ())
         check_cells(path, line, row, len(header), separator)
         for name in wanted:
             table[name].append(number_of(path, line, name, row[header.index(name)], separator))
-    return {name: np.array(column) for name, column in table.items()}
+    found = {name: np.array(column) for name, column in table.items()}
+    scales = dict(zip(header, units, strict=True))
+    return {name: x if (unit := scales[name]) is None else unit.si(x) for name, x in found.items()}
+
+
+def _units(name: str) -> tuple[str, ...]:
+    """In what the numbers of a column are."""
+    return ("1",) if name == "number" else ("m", "rad") if name.startswith("q") else ("m",)

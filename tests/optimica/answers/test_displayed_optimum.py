@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, der
-from gantrytau_optimica import Free, Optimization, final, initial, optimize
+from gantrytau_optimica import Free, Optimization, final, initial, load_optimum, optimize
 
 matplotlib.use("Agg")
 
@@ -67,6 +67,12 @@ def test_files_of_an_optimum(quarter, tmp_path):
     assert float(rows[-1][column]) == pytest.approx(90, rel=1e-7)
     with pytest.raises(ModelError, match="a solution is kept in SI; leave it out"):
         quarter.save(tmp_path / "x.optimum", display="deg")
+
+
+def test_a_solution_on_file_keeps_what_is_declared(quarter, tmp_path):
+    again = load_optimum(quarter.save(tmp_path / "x.optimum"))
+    assert again.result.display("shaft.phi") == "deg"
+    assert again.plot("shaft.w").axes[0].get_ylabel() == "shaft.w [rpm]"
 
 
 def test_guesses_of_another_kind_are_refused():

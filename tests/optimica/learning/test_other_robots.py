@@ -173,9 +173,12 @@ def test_corrections_of_joints_that_slide_and_turn_have_units_of_their_own(tmp_p
     file = write_corrections(tmp_path / "u.csv", t, joints, u)
     assert file.read_text().splitlines()[0] == "time [s],carts[0].s [m],turntables[0].phi [rad]"
     assert read_corrections(file, joints, t) == pytest.approx(u, abs=1e-15)
-    file.write_text(file.read_text().replace("[rad]", "[m]"))
+    written = file.read_text()
+    file.write_text(written.replace("carts[0].s [m]", "carts[0].s [mm]"))
+    assert read_corrections(file, joints, t) == pytest.approx(u * [1e-3, 1.0], abs=1e-15)
+    file.write_text(written.replace("[rad]", "[m]"))
     with pytest.raises(
-        ModelError, match=r"found the column turntables\[0\].phi in m, expected rad; convert it"
+        ModelError, match=r"column turntables\[0\].phi: found 'm', a length, expected an angle in rad"
     ):
         read_corrections(file, joints, t)
 

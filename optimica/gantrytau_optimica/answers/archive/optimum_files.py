@@ -136,6 +136,7 @@ def _content(optimum: ProgramAnswer) -> tuple[dict[str, Any], Arrays]:
         "free": dict(optimum.free),
         "parameters": optimum.parameters,
         "units": units,
+        "displays": dict(optimum.displays),
         "descriptions": words,
         "vectors": {n: v.elements for n, v in dae.vectors.items() if tuple(v.elements) != (n,)},
         "phases": [
@@ -308,6 +309,7 @@ def _optimum(
         hashes=table("hashes", str),
         vectors=table("vectors", lambda elements: tuple(str(e) for e in elements)),
         phases={phase.name: phase for phase in phases},
+        display_units={str(name): str(unit) for name, unit in header.get("displays", {}).items()},
         multipliers=read("multipliers", "f", None),
         bound_multipliers=read("bound_multipliers", "f", None),
     )

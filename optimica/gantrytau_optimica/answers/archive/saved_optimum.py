@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -146,6 +146,12 @@ class SavedOptimum(Answer):
     phases: Mapping[str, SavedPhase]
     multipliers: np.ndarray
     bound_multipliers: np.ndarray
+    display_units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def displays(self) -> Mapping[str, str]:
+        """The units in which variables are shown, where they were declared, by name."""
+        return self.display_units
 
     def report(self) -> str:
         """How it ended, and what remained violated or bound, in the model's words."""

@@ -12,7 +12,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
-from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.calibration.data.findings import Finding
@@ -242,12 +242,20 @@ def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str,
     rows, separator = read_cells(path)
     if not rows:
         raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
-    header = [name.strip() for name in rows[0][1]]
+    header, units = headings(path, rows[0][1], _units)
     if words := _twice(header) or wrong(header):
         raise ModelError(f"{path}: found the header {','.join(header)}: {words}")
     numbers = [_cells(path, line, row, header, separator) for line, row in rows[1:]]
     table = np.array(numbers, dtype=float).reshape(len(numbers), len(header))
-    return dict(zip(header, table.T, strict=True)), np.array([line for line, _ in rows[1:]], dtype=int)
+    columns = (x if unit is None else unit.si(x) for x, unit in zip(table.T, units, strict=True))
+    return dict(zip(header, columns, strict=True)), np.array([line for line, _ in rows[1:]], dtype=int)
+
+
+def _units(name: str) -> tuple[str, ...]:
+    """The units in which the numbers of a column may be, none for one that is not read."""
+    if name == "q" or _ACTUATOR.fullmatch(name):
+        return "m", "rad"
+    return ("m",) if name in _POSITION else ("m2",) if name in _COVARIANCE else ("1",) if _read(name) else ()
 
 
 def _twice(header: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError, Result, did_you_mean
+from gantrytau.language.tables.csv_cells import headings
 from gantrytau_optimica.learning.servo_loop import unit_of
 
 UNIT = re.compile(r"\s*\[([^\]]*[a-z%][^\]]*)\]$")  # behind a name; [0] is an index
@@ -25,9 +26,9 @@ def write_corrections(
 
 
 def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.ndarray) -> np.ndarray:
-    """Corrections (N, n) of joints, in their order, at times t (N,) of a reference, from a CSV file in SI.
+    """Corrections (N, n) of joints, in their order, at times t (N,) of a reference, from a CSV file; headings may say units.
 
-    Raises ModelError for files that are none, joints that are missing, other units, other times, and what is not finite.
+    Raises ModelError for files that are none, joints that are missing, other quantities, other times, what is not finite.
     """
     file = Path(path)
     try:
@@ -40,13 +41,11 @@ def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.
         raise ModelError(
             f"{file}: found a file that is no table of numbers ({error}), expected corrections"
         ) from None
-    units = [found[1] if (found := UNIT.search(name.strip())) else None for name in header]
-    names = [UNIT.sub("", name.strip()) for name in header]
-    for joint, unit in zip(names[1:], units[1:], strict=True):
-        if joint in joints and unit not in (None, unit_of([joint])):
-            raise ModelError(
-                f"{file}: found the column {joint} in {unit}, expected {unit_of([joint])}; convert it"
-            )
+    names, units = headings(
+        file, header, lambda name: ("s",) if name == "time" else (unit_of([name]),) if name in joints else ()
+    )
+    names = [UNIT.sub("", name) for name in names]  # also of columns that are not read
+    for joint in names[1:]:
         if joint in joints and names.count(joint) > 1:
             raise ModelError(f"{file}: found the column {joint} twice, expected one for each joint")
     for joint in joints:
@@ -58,6 +57,7 @@ def read_corrections(path: str | os.PathLike[str], joints: Sequence[str], t: np.
         raise ModelError(
             f"{file}: found {len(rows)} rows, expected {len(t)}, one for each sample of the reference"
         )
+    rows = np.column_stack([x if unit is None else unit.si(x) for x, unit in zip(rows.T, units, strict=True)])
     off = np.abs(rows[:, 0] - t)
     if not np.all(off <= SAME * (t[1] - t[0])):
         raise ModelError(

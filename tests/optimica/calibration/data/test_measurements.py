@@ -174,3 +174,22 @@ def test_files_that_are_no_text(tmp_path, content):
         match=r"measurements\.csv: cannot be read as text \(.*save it as CSV with the encoding UTF-8",
     ):
         Measurements.read(path)
+
+
+def test_columns_may_be_in_other_units(tmp_path):
+    path = tmp_path / "mm.csv"
+    path.write_text("q1 [mm],q2 [deg],x [mm],y [m],z [in],note [any],cxx [um2],cxy,cxz,cyy,cyz,czz\n"
+                    "700,90,100,0.2,10,7,25,0,0,1e-12,0,1e-12\n")  # fmt: skip
+    read = Measurements.read(path)
+    assert read.q.tolist() == [[0.7, np.pi / 2]]
+    assert read.r.tolist() == [[0.1, 0.2, 0.254]]
+    assert read.covariance is not None
+    assert read.covariance[0, 0, 0] == pytest.approx(25e-12, rel=1e-15)
+    path.write_text("q1 [mm],x [deg],y,z\n700,1,2,3\n")
+    with pytest.raises(ModelError, match=r"mm\.csv: column x: found 'deg', an angle, expected a length in m"):
+        Measurements.read(path)
+    path.write_text("q1 [furlong],x,y,z\n700,1,2,3\n")
+    with pytest.raises(
+        ModelError, match=r"column 'q1 \[furlong\]': unit 'furlong': there is no unit 'furlong'"
+    ):
+        Measurements.read(path)
