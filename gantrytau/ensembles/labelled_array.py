@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.ensembles.case_table import FAILURE
 from gantrytau.ensembles.cases import CASE, SEED, Axes, Case
 from gantrytau.errors import ModelError
 from gantrytau.results.files import extra_module
@@ -14,16 +15,25 @@ if TYPE_CHECKING:
     import xarray
 
 
-def labelled(axes: Axes, cases: Sequence[Case], values: Sequence[Any], title: str) -> "xarray.Dataset":
-    """The dataset of a study; values: of each case, None where there is none. Raises ModelError for what is no number."""
+def labelled(
+    axes: Axes, cases: Sequence[Case], values: Sequence[Any], title: str, failures: Mapping[int, str]
+) -> "xarray.Dataset":
+    """The dataset of a study; values: of each case, None where there is none; failures: why, by its number.
+
+    Raises ModelError for what is no number.
+    """
     xarray: Any = extra_module("xarray")
     first = next((v for v in values if v is not None), None)
     if first is None:
         raise ModelError(f"{title}: no case has a result; look at .failures")
     variables = _of_results(axes, values) if isinstance(first, Result) else _of_values(axes, values, title)
-    coordinates = _coordinates(axes)
+    coordinates = _coordinates(axes, first if isinstance(first, Result) else None)
     if isinstance(first, Result):
         coordinates["time"] = ("time", common_times(values), {"units": "s", "long_name": "time"})
+    if failures:
+        told = np.array([failures.get(case.number, "") for case in cases])
+        about = {"long_name": "why a case has no result"}
+        coordinates[_free(FAILURE, variables, coordinates)] = (axes.names, told.reshape(axes.shape), about)
     return xarray.Dataset(variables, coords=coordinates, attrs={"title": title})
 
 
@@ -95,8 +105,15 @@ def _column(axes: Axes, values: Sequence[Any], title: str, name: str) -> Any:
     return ((*axes.names, *inner), table.reshape(*axes.shape, *shape))
 
 
-def _coordinates(axes: Axes) -> dict[str, Any]:
-    """The values along each axis: numbers by the name itself, vectors by "name values"."""
+def _free(name: str, *taken: Mapping[str, Any]) -> str:
+    """A name that nothing else has."""
+    while any(name in names for names in taken):
+        name += "_"
+    return name
+
+
+def _coordinates(axes: Axes, first: Result | None) -> dict[str, Any]:
+    """The values along each axis: numbers by the name itself, vectors by "name values"; with units, if of a model."""
     found: dict[str, Any] = {}
     for name, values in axes.over.items():
         label = axes.label(name)
@@ -105,11 +122,17 @@ def _coordinates(axes: Axes) -> dict[str, Any]:
             array = np.asarray(values, dtype=float)
         except (TypeError, ValueError):
             array = np.array([str(value) for value in values])
+        known = (
+            {"units": first.unit(name), "long_name": first.description(name)}
+            if first and name in first
+            else {}
+        )
+        told = {key: text for key, text in known.items() if text and array.dtype.kind == "f"}
         if array.ndim == 1:
-            found[label] = (axis, array)
+            found[label] = (axis, array, told)
         else:
             inner = tuple(f"axis{k}_{n}" for k, n in enumerate(array.shape[1:]))
-            found[f"{label} values"] = ((axis, *inner), array)
+            found[f"{label} values"] = ((axis, *inner), array, told)
     if axes.combine == "zip" and axes.over:
         found[CASE] = (CASE, np.arange(axes.shape[0]))
     if axes.seeds is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau.describing.record import Record
+from gantrytau.ensembles.case_table import case_table
 from gantrytau.ensembles.cases import SEED, Axes, Case, FailedCase, equal, spoken
 from gantrytau.ensembles.fan import draw_fan
 from gantrytau.ensembles.labelled_array import labelled
@@ -18,6 +19,7 @@ from gantrytau.results.result import Result
 from gantrytau.whole_files import replacing
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.figure import Figure
 
@@ -79,9 +81,25 @@ class Study(Record):
 
         Of a model: on the times of the first case, on which others are interpolated if theirs differ; NaN where a case
         failed and after its end. Of a function: its values as "value", numbers or arrays of one shape, or by name where it
-        returns mappings. With combine="zip" there is one axis, "case", along which names have coordinates.
+        returns mappings. With combine="zip" there is one axis, "case", along which names have coordinates. Where some case
+        has no result, the coordinate "failure" says why, "" for all others.
         """
-        return labelled(self.axes, self.cases, self.values, self.title)
+        return labelled(self.axes, self.cases, self.values, self.title, self._unfinished)
+
+    def to_pandas(self, *names: str) -> "pandas.DataFrame":
+        """The cases as a table: a row for each, columns of what varies, "seed", and "failure", "" where there is a result.
+
+        names: scalars and vectors of a model, whose last values stand in columns of their own; of a function that returns
+        mappings some of their keys, by default all; NaN where a case has no result. `frame.attrs["units"]` by name.
+        Raises ModelError for unknown names, GantryTauError without pandas (extra `results`).
+        """
+        return case_table(self.axes, self.cases, self.values, self._unfinished, names)
+
+    @property
+    def _unfinished(self) -> dict[int, str]:
+        """What came of cases without a result, by number."""
+        found = {case.number: "not finished" for case in self.cases if case.number not in self.outcomes}
+        return found | {failed.case.number: f"{failed.kind}: {failed.message}" for failed in self.failures}
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write `to_xarray()` as netCDF, .nc; an existing file is replaced only when the new one is complete."""

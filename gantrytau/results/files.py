@@ -142,7 +142,7 @@ def extra_module(module: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise GantryTauError(
-            f"{module}: not installed, but this format needs it; pip install 'gantrytau[results]'"
+            f"{module}: not installed, but what was asked for needs it; pip install 'gantrytau[results]'"
         ) from error
 
 

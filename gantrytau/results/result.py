@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gantrytau.describing.described import Description
+from gantrytau.results.data_frames import data_frame
 from gantrytau.results.described_result import series_described
 from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.figures import draw
@@ -12,6 +13,7 @@ from gantrytau.results.files import dataset, save
 from gantrytau.results.series import Series, Values
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.figure import Figure
 
@@ -53,6 +55,15 @@ class Result(Series):
         An existing file is replaced only when the new one is complete.
         """
         return save(self, path, display)
+
+    def to_pandas(self, *names: str, display: Display = None) -> "pandas.DataFrame":
+        """The variables as a table: a row for each time, which is the index, a column for each scalar, `tool.r[0]`.
+
+        names: scalars, vectors, or none for all. display: units, as `plot` takes them, in place of SI. `frame.attrs` has
+        "units" and "descriptions" by name, "title", "ended", and "modes", the names of the values of modes. Where something
+        jumps a time stands twice. Raises ModelError for unknown names, GantryTauError without pandas (extra `results`).
+        """
+        return data_frame(self, names, display)
 
     def to_xarray(self) -> "xarray.Dataset":
         """The variables as a dataset with the coordinate `time`, vectors whole, units as attributes."""

@@ -12,7 +12,7 @@ ELF, AARCH64 = b"\x7fELF", 183  # magic and machine of an object of Linux on ARM
 
 
 def results() -> str:
-    """A result is written as netCDF and as Parquet, and read again."""
+    """A result is written as netCDF and as Parquet, and read again; it becomes a table of pandas."""
     import pyarrow.parquet
     import xarray
 
@@ -26,7 +26,8 @@ def results() -> str:
             expect("x as netCDF", float(found["x"][-1]), 2.0, 0.0)
         table = pyarrow.parquet.read_table(result.save(file.with_suffix(".parquet")))
         expect("x as Parquet", float(table["x"][-1].as_py()), 2.0, 0.0)
-    return "wrote and read netCDF and Parquet"
+        expect("x in pandas", float(result.to_pandas()["x"].iloc[-1]), 2.0, 0.0)
+    return "wrote and read netCDF and Parquet, made a table of pandas"
 
 
 def view() -> str:

@@ -4,7 +4,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.display_units import Display
 from gantrytau_optimica.answers.described_answer import answer_described
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 Signal = Callable[[Any], np.ndarray]
 
@@ -220,6 +224,14 @@ class Answer(Record, ABC):
             raise ModelError(
                 f"{name}: the equations do not determine this derivative; draw '{split_derivative(name)[0]}'"
             ) from error
+
+    def to_pandas(self, *names: str, display: Display = None) -> "pandas.DataFrame":
+        """All variables over time, or those named, as Result.to_pandas; outside of its phase a variable is NaN."""
+        return self._whole.to_pandas(*names, display=display)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """All variables over time, as Result.to_xarray; outside of its phase a variable is NaN."""
+        return self._whole.to_xarray()
 
     def save(self, path: Any, *, display: Display = None):
         """Save all variables over time, as Result.save; outside of its phase a variable is NaN."""

@@ -62,3 +62,20 @@ def test_problems_and_prepared_ones_are_short(move):
     assert "comes to rest" in Move()._repr_html_()
     prepared = prepare(Move(), elements=8)
     assert len(prepared._repr_html_()) < 3000
+
+
+def test_optima_become_tables(move):
+    frame = move.to_pandas("cart.r")
+    assert list(frame.columns) == ["cart.r[0]", "cart.r[1]"]
+    np.testing.assert_array_equal(frame.index, move.time)
+    np.testing.assert_array_equal(frame.to_numpy(), move["cart.r"])
+    assert move.to_xarray()["cart.v"].attrs["units"] == "m/s"
+
+
+def test_phases_are_one_table_with_gaps():
+    moves = optimize(TwoMoves(), elements=6)
+    frame = moves.to_pandas()
+    first = moves.phases["first"]
+    after = frame.index.to_numpy() > first.final_time + 1e-9
+    assert np.isnan(frame["first.cart.r[0]"].to_numpy()[after]).all()
+    assert np.isfinite(frame["onward.cart.r[0]"].to_numpy()[after]).all()

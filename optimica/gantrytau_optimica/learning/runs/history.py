@@ -13,9 +13,12 @@ from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.learning.laws.learning import Stability
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
+from gantrytau_optimica.learning.runs.history_tables import error_table, history_dataset
 from gantrytau_optimica.learning.runs.reference import Reference
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
     from matplotlib.figure import Figure
 
 FORMAT = "gantrytau learning 1"
@@ -120,6 +123,16 @@ class History(Record):
         from gantrytau_optimica.learning.runs.history_pictures import draw
 
         return draw(self, what, file)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """All runs as a dataset: "input", "estimate" and "wanted" over run, time and correction, "q_ref" and "q" over run,
+        time and joint, "tool" and "reference" over axis; GantryTauError without xarray (extra `results`).
+        """
+        return history_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Errors in % of those of run 0, a row for each run, a column for each name and axis of the tool that moves."""
+        return error_table(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all runs to a file (.npz), from which `learn(..., history=)` goes on; it appears whole."""

@@ -242,3 +242,21 @@ def test_pictures_and_corrections_of_a_history(tmp_path):
     assert text[0] == "time [s],carts[0].s [m],carts[1].s [m],carts[2].s [m]"
     rows = np.array([[float(x) for x in line.split(",")] for line in text[1:]])
     assert np.array_equal(rows[:, 1:], history.corrected)
+
+
+def test_runs_become_tables_of_others():
+    history = learn(LinearPlant(), line(), Learning(window=WINDOW), response=RESPONSE, iterations=2)
+    errors = history.to_pandas()
+    assert list(errors.columns) == [*history.names, "tool x"]
+    np.testing.assert_array_equal(errors[history.names[0]], history.relative[:, 0])
+    runs = history.to_xarray()
+    assert dict(runs.sizes) == {
+        "run": 3,
+        "time": len(history.reference),
+        "correction": 3,
+        "joint": 3,
+        "axis": 3,
+    }
+    np.testing.assert_array_equal(runs["q"].sel(run=1, joint=history.joints[2]), history.q[1, :, 2])
+    assert runs["tool"].attrs["units"] == "m"
+    assert len(history._repr_html_()) < 4000
