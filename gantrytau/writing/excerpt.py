@@ -23,8 +23,9 @@ class Excerpt:
 
     sections: blocks, in the order of their solution; answers: what names are that no block gives by that name: wanted ones,
     and those that statements on instants read; instants: these; equations: of the flat model; known, states: names, the
-    latter with the symbols that stand for them; wanted: names, none where everything is written; of: how many blocks
-    there are.
+    latter with the symbols that stand for them; asked: what is wanted, by the names that were asked for, with their scalars,
+    nothing where everything is written; wanted: all these scalars; of: how many blocks there are; held: names that are set
+    at instants.
     """
 
     sections: tuple[Section, ...]
@@ -33,8 +34,10 @@ class Excerpt:
     equations: tuple[Equation, ...]
     known: tuple[str, ...]
     states: tuple[tuple[str, str], ...]
+    asked: tuple[tuple[str, tuple[str, ...]], ...]
     wanted: tuple[str, ...]
     of: int
+    held: tuple[str, ...] = ()
 
     @property
     def left_out(self) -> str:
@@ -45,11 +48,11 @@ class Excerpt:
         plural = "" if self.of == 1 else "s"
         return f"{count} of {self.of} block{plural}; the others do not matter for what is wanted"
 
-    def remark(self, wanted: str) -> str:
-        """What there is to say of a wanted name that is no result: "known", "a state", or ""."""
-        if wanted in self.known or wanted == "time":
-            return "known"
-        return "a state" if any(wanted in state for state in self.states) else ""
+    def remark(self, scalars: Collection[str]) -> str:
+        """What there is to say of wanted scalars that are no results: "known", "set at instants", "a state", or ""."""
+        states = {name for state in self.states for name in state}
+        kinds = {"set at instants": {*self.held}, "known": {*self.known, "time"}, "a state": states}
+        return next((words for words, names in kinds.items() if names.issuperset(scalars)), "")
 
 
 def excerpt(dae: Translated) -> Excerpt:
@@ -59,7 +62,7 @@ def excerpt(dae: Translated) -> Excerpt:
     states = tuple(zip(dae.states, dae.choice.states, strict=True))
     if not wanted:
         equations = dae.flat.equations
-        return Excerpt(tuple(every), (), instants, equations, dae.known, states, (), len(every))
+        return Excerpt(tuple(every), (), instants, equations, dae.known, states, (), (), len(every))
     needs = _Needs(dae, wanted, every, instants)
     given = {n for name in dae.request.given for n in dae.expand(name)}
     return Excerpt(
@@ -69,8 +72,10 @@ def excerpt(dae: Translated) -> Excerpt:
         equations=needs.equations(),
         known=tuple(n for n in dae.known if n in needs.used or n in given),
         states=tuple((name, symbol) for name, symbol in states if symbol in needs.used),
+        asked=tuple((name, dae.expand(name)) for name in dict.fromkeys(dae.request.find)),
         wanted=wanted,
         of=len(every),
+        held=dae.flat.event_names,
     )
 
 

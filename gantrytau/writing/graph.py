@@ -136,11 +136,19 @@ class Graph:
     def _logic(self, operator: int, arguments: Sequence[Node]) -> Node:
         if operator == ca.OP_NOT:
             return self.opposite(arguments[0])
-        return self.node("and" if operator == ca.OP_AND else "or", *arguments)
+        neutral = self._always(operator == ca.OP_AND)
+        left = [a for a in arguments if a is not neutral] or [neutral]
+        return left[0] if len(left) == 1 else self.node("and" if operator == ca.OP_AND else "or", *left)
+
+    def _always(self, value: bool) -> Node:
+        """A condition that is always true, or never."""
+        return self.node("!=", self.number(float(value)), self.number(0.0))
 
     def _comparison(self, word: str, a: Node, b: Node) -> Node:
         if a.operation == "number" and b.operation != "number":  # 0 < x reads better as x > 0
-            return self.node(MIRRORED[word], b, a)
+            return self._comparison(MIRRORED[word], b, a)
+        if word in ("!=", "==") and b.is_number(0.0):
+            return self.truth(a) if word == "!=" else self.opposite(self.truth(a))
         return self.node(word, a, b)
 
     def opposite(self, node: Node) -> Node:
@@ -150,8 +158,22 @@ class Graph:
         return node.arguments[0] if node.operation == "not" else self.node("not", node)
 
     def truth(self, node: Node) -> Node:
-        """A node as a condition: numbers are true unless zero."""
-        return node if node.boolean else self.node("!=", node, self.number(0.0))
+        """A node as a condition: numbers are true unless zero; what was made one or zero of a condition is that again."""
+        if node.boolean:
+            return node
+        if node.operation == "number":
+            return self._always(node.value != 0.0)
+        if (
+            node.operation == "select"
+            and node.arguments[1].is_number(1.0)
+            and node.arguments[2].is_number(0.0)
+        ):
+            return node.arguments[0]
+        if node.operation == "sub" and node.arguments[0].is_number(1.0):
+            counted = node.arguments[1]
+            if counted.operation == "select" and self.truth(counted) is counted.arguments[0]:
+                return self.opposite(counted.arguments[0])
+        return self.node("!=", node, self.number(0.0))
 
     def real(self, node: Node) -> Node:
         """A node as a number: conditions count one or zero."""

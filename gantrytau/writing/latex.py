@@ -65,7 +65,9 @@ class LatexSyntax:
         return Written(digits, SUM if value < 0 else ATOM, value < 0)
 
     def symbol(self, name: str) -> Written:
-        """A name with its derivative."""
+        """A name with its derivative; pre() of it just before an instant."""
+        if name.startswith("pre("):
+            return Written(rf"\operatorname{{pre}}{self.enclose(self.symbol(name[4:-1]).text)}")
         found = name_of(name)
         return Written(latex_name(found), PRODUCT if found.order and not found.dotted else ATOM)
 
@@ -138,7 +140,11 @@ def latex_text(dae: Translated) -> str:
     lines = [f"% Equations of {dae.name} in the order of their solution; needs \\usepackage{{amsmath}}."]
     lines += [rf"\section*{{Equations of {escaped(dae.name)}}}"]
     states = [name if name == symbol else f"{name} = {symbol}" for name, symbol in found.states]
-    rows = [("Known", found.known), ("States", states), *([("Wanted", found.wanted)] if found.wanted else [])]
+    rows = [
+        ("Known", found.known),
+        ("States", states),
+        *([("Wanted", [n for n, _ in found.asked])] if found.asked else []),
+    ]
     for words, names in rows:
         spoken = ", ".join(f"${' = '.join(syntax.symbol(x).text for x in n.split(' = '))}$" for n in names)
         lines.append(rf"\noindent {words}: {spoken or 'none'}.\par")

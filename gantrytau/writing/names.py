@@ -14,6 +14,7 @@ GREEK = {
 }  # fmt: skip
 NUMBERED = re.compile(r"([^\W\d_]+)(\d+)")  # phi1, q12
 MOST_DOTS = 2
+MOST_TAILS = 2  # below a letter
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Name:
 def name_of(name: str) -> Name:
     """`der(carts[0].v_x)` taken apart."""
     base, order = split_derivative(name)
+    if "(" in base:  # what was: delay(x, 0.5), pre(x)
+        return Name((Part(base, ()),), order)
     return Name(tuple(_part(member) for member in base.split(".")), order)
 
 
@@ -57,6 +60,8 @@ def _part(member: str) -> Part:
     numbered = NUMBERED.fullmatch(head)
     head, digits = (numbered[1], (numbered[2],)) if numbered else (head, ())
     letter = GREEK.get(head, head)
-    if len(letter) == 1 and all(tails):  # v_x, phi_rel, q1; kinetic_energy stays a word
+    if (
+        len(letter) == 1 and all(tails) and len(tails) <= MOST_TAILS
+    ):  # v_x, phi_rel, q1; kinetic_energy stays a word
         return Part(letter, (*digits, *tails, *indices))
     return Part(word, indices)

@@ -61,7 +61,7 @@ def block_text(dae: Translated) -> str:
         f"states: {', '.join(map(_state, found.states)) or 'none'}",
     ]
     if found.wanted:
-        remarks = [(name, found.remark(name)) for name in found.wanted]
+        remarks = [(name, found.remark(scalars)) for name, scalars in found.asked]
         wanted = ", ".join(f"{name} ({remark})" if remark else name for name, remark in remarks)
         lines += [f"wanted: {wanted}", *filter(None, [found.left_out])]
     lines += [line for one in found.instants for line in _instant(one)]

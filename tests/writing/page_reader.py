@@ -86,23 +86,29 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Formula:
-    """The two sides of a line, as programs; mark: its anchor."""
+    """The two sides of a line, as programs."""
 
     left: str
     right: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """Formulas that share abbreviations. mark: the anchor of a block or component, or the words above, or ""."""
+
     mark: str
+    formulas: list[Formula]
 
 
 class PageOfEquations:
-    """What a page says: `parts` are its formulas, those that share abbreviations together, by heading of level two."""
+    """What a page says: the rows of its table, by anchor, and its formulas, by heading of level two."""
 
     def __init__(self, text: str):
         tree = Reader(text).root
         rows = [row for row in tree.find("tr") if row.attributes.get("id")]
         cells = {row.attributes["id"]: tuple(cell.text.strip() for cell in row.find("td")) for row in rows}
         self.quantities = {f"#{mark}": Quantity(texts[0], texts) for mark, texts in cells.items()}
-        self.shapes: dict[str, int] = {}
-        self.parts: dict[str, list[list[Formula]]] = {}
+        self.parts: dict[str, list[Part]] = {}
         self.summaries: list[str] = []
         (body,) = tree.find("body")
         heading = ""
@@ -113,18 +119,28 @@ class PageOfEquations:
                 heading = element.text
                 self.parts[heading] = []
             elif element.tag == "details" and heading:
-                self.parts[heading].append([self._formula(p) for p in element.find("p") if " = " in p.text])
-                self.summaries.append(element.find("summary")[0].text)
-            elif element.tag == "p" and " = " in element.text:
-                new = element.attributes.get("id") or not self.parts[heading]
-                formula = self._formula(element)
-                self.parts[heading] += [[formula]] if new else []
-                self.parts[heading][-1] += [] if new else [formula]
+                (summary,) = element.find("summary")
+                mark = summary.find("b")[0].attributes.get("id") or ""
+                lines = [self._formula(p) for p in element.find("p") if " = " in p.text]
+                self.parts[heading].append(Part(mark, lines))
+                self.summaries.append(summary.text)
+            elif element.tag == "p":
+                self._line(element, self.parts[heading])
+
+    def _line(self, paragraph: Element, parts: list[Part]) -> None:
+        """A line outside of folded parts: the first of a part, or one more."""
+        mark = paragraph.attributes.get("id") or ""
+        if paragraph.attributes.get("class") == "from":
+            parts.append(Part(paragraph.text.strip(), []))
+        elif " = " in paragraph.text or mark:
+            if mark or not parts:
+                parts.append(Part(mark, []))
+            parts[-1].formulas.append(self._formula(paragraph))
 
     def _formula(self, paragraph: Element) -> Formula:
         inside = [x for x in paragraph.inside if isinstance(x, str) or x.tag not in ("small", "span")]
         left, right = self._program(inside).strip().split(" = ", 1)
-        return Formula(left, right, paragraph.attributes.get("id") or "")
+        return Formula(left, right)
 
     def _program(self, inside: "list[Element | str]") -> str:
         text = "".join(_plain(x) if isinstance(x, str) else self._element(x) for x in inside)
@@ -147,7 +163,9 @@ class PageOfEquations:
         if tag == "b":
             return f" {element.text.upper()} "
         if tag == "mtable":
-            *cases, (last, _) = ([self._program(c.inside) for c in row.find("mtd")] for row in inside)
+            *cases, (last, _) = (
+                [self._element(cell) for cell in row.inside if isinstance(cell, Element)] for row in inside
+            )
             for value, condition in reversed(cases):
                 last = f"({value} if {condition.removeprefix('if ')} else {last})"
             return last
@@ -156,6 +174,8 @@ class PageOfEquations:
     def _name(self, link: Element) -> str:
         """The name in the model: that of the row, of the element that is shown, as often differentiated as is shown."""
         whole = self.quantities[link.attributes["href"] or ""].name
+        if "(" in whole:
+            return whole
         rate = [x for x in link.inside if isinstance(x, Element) and x.tag == "b"]
         shown = "".join(
             x if isinstance(x, str) else "" if x.tag == "b" else f"_{x.text}" for x in link.inside
@@ -172,9 +192,9 @@ class PageOfEquations:
         mixed = re.search(r",(\d+)$", shown) if indices is None else None
         return derivative_name(whole + (f"[{mixed[1]}]" if mixed else element), order)
 
-    def values(self, group: list[Formula], numbers: Mapping[str, Any]) -> list[tuple[Formula, Any, Any]]:
+    def values(self, part: Part, numbers: Mapping[str, Any]) -> list[tuple[Formula, Any, Any]]:
         """The formulas of a part that are no abbreviations, with the values of both sides."""
-        shared = {f.left: f.right for f in group if f.left.startswith("S")}
+        shared = {f.left: f.right for f in part.formulas if f.left.startswith("S")}
         known: dict[str, Any] = {}
 
         class Names(dict[str, Any]):
@@ -187,7 +207,7 @@ class PageOfEquations:
             with np.errstate(all="ignore"):
                 return eval(program, {"__builtins__": {}}, Names(N=numbers, inf=np.inf, **FUNCTIONS))
 
-        return [(f, evaluate(f.left), evaluate(f.right)) for f in group if f.left not in shared]
+        return [(f, evaluate(f.left), evaluate(f.right)) for f in part.formulas if f.left not in shared]
 
 
 def _plain(text: str) -> str:

@@ -53,6 +53,8 @@ mtext span { white-space: nowrap; overflow-wrap: normal; }
 math { math-style: normal; }
 mfrac { padding: 0 .15em; }
 table { width: 100%; }
+tr { border-bottom: 1px solid #8886; }
+th, td { border: 0; }
 td:is(:first-child, :nth-child(4), :nth-child(5)) { overflow-wrap: anywhere; min-width: 6rem; }
 td:first-child { min-width: 11rem; white-space: normal; }
 td:nth-child(2) { white-space: nowrap; }
@@ -118,9 +120,8 @@ class _Page:
             self._name(name) + ("" if name == symbol else f" = {self._name(symbol)}")
             for name, symbol in found.states
         ]
-        wanted = [
-            self._name(n) + (f" ({remark})" if (remark := found.remark(n)) else "") for n in found.wanted
-        ]
+        remarks = {name: found.remark(scalars) for name, scalars in found.asked}
+        wanted = [self._name(n) + (f" ({remark})" if remark else "") for n, remark in remarks.items()]
         rows = [("wanted", ", ".join(wanted))] if wanted else []
         rows += [("known", ", ".join(map(self._name, found.known)) or "nothing")]
         count = f"{len(states)} state{'' if len(states) == 1 else 's'}" if states else "states"

@@ -38,7 +38,7 @@ class Quantities:
 
         places: links to where a quantity stands; owners: the anchor of a component, "" for none.
         """
-        groups: dict[str, list[Declared]] = {"states": [], "inputs": [], "outputs": []}
+        groups: dict[str, list[Declared]] = {"states": [], "known": [], "outputs": []}
         groups |= {"parameters": [], "variables": [], "passed on from frame to frame": []}
         for one in self.all:
             if only is None or one.name in only:
@@ -55,7 +55,8 @@ class Quantities:
 
     def _count(self, word: str, members: Sequence[Declared]) -> str:
         if word == "states":
-            return str(len(self.dae.states))
+            own = {n for one in members for n in one.elements}
+            return str(sum(split_derivative(n).root in own for n in self.dae.states))
         scalars = sum(len(one.elements) for one in members)
         return str(len(members)) if scalars == len(members) else f"{len(members)}, {scalars} scalars"
 
@@ -68,7 +69,7 @@ class Quantities:
         if names & set(one.elements):
             return "states"
         if set(self.dae.known) & set(one.elements):
-            return "inputs"
+            return "known"
         return "outputs" if one.kind == "output" else "variables"
 
     def _row(self, one: Declared, places: str, owner: str) -> str:

@@ -32,7 +32,8 @@ TAG = re.compile(r"<[^>]*>")
 def html_name(name: str) -> str:
     """A name in HTML: the path as it is, Greek letters, indices below, derivatives as dots or as d/dt in front."""
     found = name_of(name)
-    path, dot, _ = split_derivative(name).root.rpartition(".")
+    root = split_derivative(name).root
+    path, dot, _ = ("", "", "") if "(" in root else root.rpartition(".")  # delay(x, 0.5)
     last, operator = found.parts[-1], ""
     dots = DOTS[found.order] if found.dotted else ""
     below = below_line(",".join(last.below)) if last.below else ""
