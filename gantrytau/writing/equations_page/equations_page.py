@@ -31,9 +31,9 @@ dl { display: grid; grid-template-columns: max-content 1fr; gap: .2rem 1rem; }
 dd { margin: 0; }
 pre { white-space: pre-wrap; }
 details { border-left: 3px solid #8884; padding-left: 1rem; margin: .5rem 0; }
-p { margin: .3rem 0; padding-left: 5rem; text-indent: -2rem; overflow-wrap: anywhere; }
-p[id] { text-indent: -5rem; }
-p > span { display: inline-block; width: 3rem; text-indent: 0; opacity: .75; }
+p { margin: .3rem 0; padding-left: 5.4rem; text-indent: -2rem; overflow-wrap: anywhere; }
+p[id] { text-indent: -5.4rem; }
+p > span { display: inline-block; width: 3.4rem; text-indent: 0; opacity: .75; }
 p::after { content: ""; display: block; clear: both; }
 small { float: right; max-width: 24rem; margin-left: 1rem; text-indent: 0; text-align: right; line-height: 1.5; }
 small, .from, td:nth-child(6) { font: .78rem/1.5 system-ui, sans-serif; opacity: .75; }
@@ -61,6 +61,7 @@ td:nth-child(2) { white-space: nowrap; }
 td:nth-child(3) { min-width: 12rem; }
 td:nth-child(6) { max-width: 9rem; }
 :target { outline: 2px solid orange; }
+@media (max-width: 700px) { p { overflow-x: auto; } table { display: block; overflow-x: auto; } }
 @media print { body { max-width: none; } p, tr { break-inside: avoid; } }
 """
 # what a name means, on the name; parts that are folded open for links and for print
@@ -136,7 +137,7 @@ class _Page:
 
     def _grouped(self) -> dict[str, list[list[Equation]]]:
         """Equations by component, rows of one vector equation together."""
-        groups: dict[str, dict[tuple[str, int], list[Equation]]] = {}
+        groups: dict[str, dict[tuple[str, int, bool], list[Equation]]] = {}
         seen: dict[str, int] = {}
         equations = [(_heading(e), e) for e in self.excerpt.equations]
         if not self.excerpt.wanted:
@@ -144,7 +145,8 @@ class _Page:
         for heading, equation in equations:
             often = seen[equation.name] = seen.get(equation.name, -1) + 1
             name = equation.name.partition(", row ")[0]
-            groups.setdefault(heading, {}).setdefault((name, often), []).append(equation)
+            key = (name, often, equation.element is None)
+            groups.setdefault(heading, {}).setdefault(key, []).append(equation)
         return {heading: list(rows.values()) for heading, rows in groups.items()}
 
     def _numbered(self) -> dict[int, int]:

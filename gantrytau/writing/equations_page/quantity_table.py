@@ -14,6 +14,7 @@ from gantrytau.writing.equations_page.wrapping_formulas import FormulaSyntax
 from gantrytau.writing.subexpressions import located, written
 
 HEAD = ("name", "unit", "description", "role", "start or value", "in")
+NARROW = 12  # letters in a cell that are not broken
 Declared = FlatVariable | FlatParameter
 
 
@@ -29,7 +30,7 @@ class Quantities:
         )
         self.anchors = {n: f"v{k}" for k, v in enumerate(self.all) for n in (v.name, *v.elements)}
         self.elements = {n: (v.name, k, len(v.elements)) for v in self.all for k, n in enumerate(v.elements)}
-        self.syntax = FormulaSyntax(self.anchors)
+        self.syntax = FormulaSyntax(self.anchors, widest=NARROW)
 
     def tables(
         self, only: Collection[str] | None, places: Callable[[str], str], owners: Callable[[str], str]

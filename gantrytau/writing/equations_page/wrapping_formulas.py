@@ -25,6 +25,7 @@ AROUND = {"abs": "||", "floor": "⌊⌋", "ceil": "⌈⌉"}
 DOTS = {1: "\u0307", 2: "\u0308"}  # combining dots above
 LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 WIDEST = 60  # letters of what cannot be broken
+ROOTS = 4 / 3  # of that where it is a root, which has no second line
 CASES = (f"{JOINED}<math><mrow><mo>{{</mo><mtable>", f"</mtable></mrow></math>{JOINED}")
 TAG = re.compile(r"<[^>]*>")
 
@@ -49,11 +50,14 @@ def below_line(text: str) -> str:
 
 
 class FormulaSyntax:
-    """Formulas for a page. anchors: where quantities stand in it, by name; inside: a component, whose path is left out."""
+    """Formulas for a page. anchors: where quantities stand in it, by name; inside: a component, whose path is left out;
+    widest: letters of what cannot be broken.
+    """
 
     name = "HTML"
 
-    def __init__(self, anchors: Mapping[str, str], inside: str = ""):
+    def __init__(self, anchors: Mapping[str, str], inside: str = "", widest: int = WIDEST):
+        self._widest = widest
         self._anchors, self._prefix = anchors, f"{inside}." if inside else ""
         self._known: dict[str, Written] = {}
 
@@ -92,13 +96,13 @@ class FormulaSyntax:
 
     def enclose(self, text: str) -> str:
         """(text), as tall as it has to be."""
-        tall = "<math>" in text and width(text) <= WIDEST
+        tall = "<math>" in text and width(text) <= self._widest
         return tower(f"<mrow><mo>(</mo>{token(text)}<mo>)</mo></mrow>") if tall else f"({text})"
 
     def apply(self, operation: str, arguments: Arguments) -> Written | None:
         """Fractions, powers, cases, or a function."""
         a, b = arguments.bare(0), arguments.bare(len(arguments) - 1)
-        fits = all(width(arguments.bare(k)) <= WIDEST for k in range(len(arguments)))
+        fits = all(width(arguments.bare(k)) <= self._widest for k in range(len(arguments)))
         if operation == "div":
             if fits:
                 return Written(tower(f"<mfrac>{token(a)}{token(b)}</mfrac>"), PRODUCT)
@@ -107,7 +111,8 @@ class FormulaSyntax:
         if operation == "pow":
             return Written(f"{arguments.held(0, ATOM)}<sup>{b}</sup>", POWER)
         if operation == "sqrt":
-            return Written(tower(f"<msqrt>{token(a)}</msqrt>") if fits else f"√({a})")
+            short = width(a) <= ROOTS * self._widest
+            return Written(tower(f"<msqrt>{token(a)}</msqrt>") if short else f"√({a})")
         if operation == "mul":
             return Written(f"{arguments.held(0, PRODUCT)}·{arguments.held(1, PRODUCT)}", PRODUCT)
         if operation == "select":
