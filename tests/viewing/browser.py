@@ -46,13 +46,13 @@ class Tab:
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._ask(f"{domain}.enable")
 
-    def open(self, page: Path, document: str = "document") -> None:
-        """Go to a file, and wait until it draws in a document of it."""
+    def open(self, page: Path, document: str = "document", element: str = "canvas") -> None:
+        """Go to a file, and wait until there is an element in a document of it: what it draws on."""
         for place in ("about:blank", page.resolve().as_uri()):  # page.html may follow page.html
             self._ask("Page.navigate", url=place)
             self.until(f"location.href === {json.dumps(place)}")
         self.until("document.readyState === 'complete'")
-        self.until(f"{document}.querySelector('canvas') !== null")
+        self.until(f"{document}.querySelector('{element}') !== null")
 
     def run(self, script: str) -> Any:
         """The value of an expression in the page."""

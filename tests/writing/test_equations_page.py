@@ -122,7 +122,7 @@ class Switching(Model):
         yield sampled(self.held, self.h * self.twice, period=0.1)
         yield self.past == delay(self.h, 0.25) + self.held
         yield self.t == table(self.h, [0, 1, 2, 3], [0, 1, 4, 9], kind="spline")
-        yield self.c == if_else(self.h > 1, if_else(self.v < 0, sin(self.h), 2.0), abs(self.h) ** 1.5)
+        yield self.c == if_else(self.h > 1, if_else(self.v < 0, sin(self.h), 2.0), ca.fabs(self.h) ** 1.5)
         yield self.größe == self.t / (1 + self.c) + self.bounces
         yield self.R == self.M * self.größe + self.M
 

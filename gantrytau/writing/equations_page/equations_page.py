@@ -56,7 +56,7 @@ table { width: 100%; }
 tr { border-bottom: 1px solid #8886; }
 th, td { border: 0; }
 td:is(:first-child, :nth-child(4), :nth-child(5)) { overflow-wrap: anywhere; min-width: 6rem; }
-td:first-child { min-width: 11rem; white-space: normal; }
+td:first-child { min-width: 13rem; font-size: .8rem; }
 td:nth-child(2) { white-space: nowrap; }
 td:nth-child(3) { min-width: 12rem; }
 td:nth-child(6) { max-width: 9rem; }
@@ -67,7 +67,7 @@ td:nth-child(6) { max-width: 9rem; }
 # what a name means, on the name; parts that are folded open for links and for print
 SCRIPT = """<script>
 document.onmouseover = e => { const a = e.target.closest('a[href^="#v"]'), row = a && document.querySelector(a.hash);
-  if (row && !a.title) { const c = [...row.cells].map(x => x.innerText); a.title = `${c[0]} [${c[1]}]: ${c[2]}`; } };
+  if (row && !a.title) { const c = [...row.cells].map(x => x.textContent); a.title = `${c[0]} [${c[1]}]: ${c[2]}`; } };
 const open = () => { const found = location.hash && document.querySelector(location.hash);
   for (let d = found; d; d = d.parentElement) if (d.tagName == 'DETAILS') d.open = true;
   if (found) found.scrollIntoView({ block: 'center' }); };

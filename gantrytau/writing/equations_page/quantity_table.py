@@ -89,8 +89,9 @@ class Quantities:
         if one.kind == "propagated":
             return ""
         if isinstance(one, FlatParameter):
+            told = not all(v.is_constant() for v in one.value)  # by its formula
             own = set(one.elements) <= set(self.dae.table.independent)
-            return "" if own else "follows from others"
+            return "" if own or told else "shapes the equations"
         groups: dict[str, list[str]] = {}
         for name in one.elements:
             groups.setdefault(self._role(one, name), []).append(
