@@ -83,14 +83,16 @@ def draw_modes(
     columns = min(_COLUMNS, len(B))
     rows = -(-len(B) // columns)
     shape = np.clip((high - low)[2] / max(np.linalg.norm((high - low)[:2]), 1e-9), 0.5, 1.5)
-    figure = plt.figure(figsize=(3.0 * columns, (1.0 + 2.6 * shape) * rows), layout="constrained")
+    figure = plt.figure(figsize=(3.0 * columns, (1.4 + 2.6 * shape) * rows), layout="constrained")
+    engine: Any = figure.get_layout_engine()
+    engine.set(h_pad=0.1, rect=(0.0, 0.02, 1.0, 0.96))  # labels in space have no room of their own
     for k, ends in enumerate(B):
         axis: Any = figure.add_subplot(rows, columns, k + 1, projection="3d")
         _draw_robot(axis, geometry, A, ends, rails, {link for pair in modes.crossed[k] for link in pair})
         for name, least, most in zip("xyz", low, high, strict=True):
             getattr(axis, f"set_{name}lim")(least, most)
             getattr(axis, f"set_{name}label")(f"{name} [m]", fontsize="xx-small", labelpad=-6)
-        axis.set_box_aspect(np.maximum(high - low, 0.15 * (high - low).max()), zoom=1.0)
+        axis.set_box_aspect(np.maximum(high - low, 0.15 * (high - low).max()), zoom=0.9)
         axis.tick_params(labelsize="xx-small", pad=-2)
         axis.locator_params(nbins=4)
         pairs = ", ".join(f"{i}-{j}" for i, j in modes.crossed[k])
