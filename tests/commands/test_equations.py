@@ -34,6 +34,8 @@ def test_given_and_find_choose_the_causality(run):
     assert found.exit_code == 0
     assert "known: tool.r[0], tool.r[1], tool.r[2]" in found.stdout
     assert "states: none" in found.stdout
+    assert "wanted: carts[0].s, carts[1].s, carts[2].s\n3 of 55 blocks" in found.stdout
+    assert [line[:3] for line in found.stdout.splitlines()[5:]] == ["[1]", "[2]", "[3]"]
 
 
 def test_the_equations_go_to_a_file(run, answer, tmp_path):
