@@ -42,6 +42,7 @@ from gantrytau.mechanics.multibody.frames import (
     TwoFrames,
     World,
 )
+from gantrytau.mechanics.multibody.inertia_file import Inertias, read_inertias
 from gantrytau.mechanics.multibody.joints import (
     Cylindrical,
     Prismatic,
@@ -66,6 +67,7 @@ __all__ = [
     "FrameForce",
     "FrameTorque",
     "HuntCrossley",
+    "Inertias",
     "LineForce",
     "LinearContact",
     "PegContact",
@@ -82,4 +84,5 @@ __all__ = [
     "World",
     "WorldForce",
     "WorldTorque",
+    "read_inertias",
 ]
