@@ -167,6 +167,14 @@ def test_links_between_pages_of_folders_lead_to_pages_of_the_site(tmp_path):
         relinked("[a](nowhere.md)", ROOT / "README.md", "manual/overview.md", stage)
 
 
+def test_every_page_of_a_folder_is_on_the_site():
+    folders = ("gantrytau", "models", "optimica", "fmu", "notebooks", "tests")
+    pages = [page for folder in folders for page in (ROOT / folder).rglob("*.md")]
+    assert set(pages) | {ROOT / "README.md", ROOT / "CHANGELOG.md"} == {
+        path for path in handwritten() if path.suffix == ".md"
+    }
+
+
 def test_broken_links_are_found(tmp_path):
     (tmp_path / "a.html").write_text(
         '<a id="here" href="b.html#there">b</a><a href="c.html">c</a><img src="p.png"><a href="#here"></a>'

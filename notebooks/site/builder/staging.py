@@ -28,9 +28,11 @@ MANUAL = {  # page of a folder -> page of the site
     "tests/README.md": "manual/tests.md",
     "CHANGELOG.md": "manual/changelog.md",
 }
-LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+GENERATED = ("reference", "messages", "thesis", "command_line")  # folders of pages that nobody writes
+LINK = re.compile(  # or code, in which nothing is one
+    r"^```.*?^```|(!?\[(?:`[^`\n]*`|[^\]`])*\]\()([^)\s]+)(\))|`[^`\n]+`", re.MULTILINE | re.DOTALL
+)
 NAMED = re.compile(r"(?<!`)`([A-Za-z_]\w+)(\([^`]*\)|)`(?!`)")
-CODE = re.compile(r"(^```.*?^```|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 
 
 class Stage:
@@ -89,32 +91,25 @@ def relinked(text: str, source: Path, page: str, stage: Stage) -> str:
     pages = handwritten()
 
     def there(found: re.Match[str]) -> str:
-        target, _, anchor = found[2].partition("#")
+        target, _, anchor = (found[2] or "").partition("#")
         if not target or re.match(r"[a-z]+:", target):
             return found[0]
         path = (source.parent / target).resolve()
         if path.is_dir() and (path / "README.md") in pages:
             path = path / "README.md"
-        if path.is_dir():
-            return found[1].strip("![]( ") if found[1].startswith("[") else ""
         if path in pages:
             place = pages[path]
-        elif (
-            page.startswith(_generated()) or target.startswith(_generated()) or not path.is_relative_to(ROOT)
-        ):
+        elif any(path.is_relative_to(SOURCES / part) for part in GENERATED):
             return found[0]
-        elif path.exists():
+        elif path.is_file() and path.is_relative_to(ROOT):
             place = f"files/{path.relative_to(ROOT).as_posix()}"
             stage.copy(path, place)
-        elif any((source.parent / target).resolve().is_relative_to(SOURCES / part) for part in _generated()):
-            return found[0]  # a page that is generated beside
         else:
             raise ValueError(f"{source}: found a link to {target}, expected a file that is there; mend it")
         way = os.path.relpath(place, Path(page).parent)
         return f"{found[1]}{way}{f'#{anchor}' if anchor else ''}{found[3]}"
 
-    parts = CODE.split(text)
-    return "".join(part if k % 2 else LINK.sub(there, part) for k, part in enumerate(parts))
+    return LINK.sub(there, text)
 
 
 def _with_names(text: str) -> str:
@@ -135,11 +130,6 @@ def _with_names(text: str) -> str:
             parts[k + 1] = ""
         lines[number] = "".join(parts)
     return "".join(lines)
-
-
-def _generated() -> tuple[str, ...]:
-    """Folders of the site whose pages are generated."""
-    return ("reference", "messages", "thesis", "command_line")
 
 
 def _tree_of(page: str) -> str:
