@@ -252,13 +252,13 @@ def own_folder() -> Iterator[Path]:
     mpl.use("Agg")
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "FigureCanvasAgg is non-interactive")
-        sys.path.insert(0, folder)
+        sys.path.insert(0, "")  # the current folder, as at a prompt
         os.chdir(folder)
         try:
             yield Path(folder)
         finally:
             os.chdir(before)
-            sys.path.remove(folder)
+            sys.path.remove("")
             for name in [name for name, module in sys.modules.items() if _is_in(module, folder)]:
                 del sys.modules[name]
 

@@ -1,5 +1,6 @@
 """Every page of the site runs and prints what it says; pages that do not hold are found."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,24 @@ PAGES = [page for page in sorted(SITE.rglob("*.md")) if blocks(page.read_text(en
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(SITE).with_suffix("")))
 def test_a_page_of_the_site_runs_and_prints_what_it_says(page):
     check_page(page)
+
+
+def listed(index):
+    """Pages that the tables of contents of a page lead to."""
+    for contents in re.findall(r"```{toctree}\n(.*?)```", index.read_text(encoding="utf-8"), re.DOTALL):
+        for line in contents.splitlines():
+            if line and not line.startswith(":"):
+                yield (index.parent / line).with_suffix(".md").resolve()
+
+
+@pytest.mark.parametrize("folder", ["tutorial", "how_to", "coming_from"])
+def test_pages_stand_in_the_contents_and_links_arrive(folder):
+    index = SITE / folder / "index.md"
+    pages = {page.resolve() for page in (SITE / folder).rglob("*.md")}
+    assert pages == {index.resolve(), *listed(index)}
+    for page in pages:
+        for link in re.findall(r"\]\(([^)#: ]+\.\w+)[)#]", page.read_text(encoding="utf-8")):
+            assert (page.parent / link).exists(), f"{page.name} leads to {link}"
 
 
 HOLDS = """\
