@@ -98,7 +98,7 @@ class Scale:
             power = 10.0 ** (DIGITS - np.floor(np.log10(np.abs(found))))
             rounded = np.round(found * power) / power
             found = np.where(self._si(rounded) == whole, rounded, found)
-        return found if found.ndim else float(found)
+        return float(found) if isinstance(values, (int, float)) else found[()]
 
     @property
     def slope(self) -> float:

@@ -10,8 +10,7 @@ import numpy as np
 from gantrytau import Samples
 from gantrytau.errors import ModelError
 from gantrytau.inputs.input_signal import with_course
-from gantrytau.language.scales import given
-from gantrytau.language.units import dimension
+from gantrytau.language.scales import given, scale
 
 ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
 
@@ -63,9 +62,9 @@ def drives_of(name: str, value: Any, count: int, span: tuple[float, float]) -> l
 
 
 def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
-    """A value for a variable of an FMU, texts such as "700 mm" brought to its unit, all else as it is.
+    """A value for a variable of an FMU in its unit: texts such as "700 mm" and samples that say theirs brought to it.
 
-    Raises ModelError for a text of another kind, and for samples that say one, and where the FMU has a unit that is not SI.
+    All else is as it is. Raises ModelError for a text or samples of another kind, and for units that nobody knows.
     """
     samples = value if isinstance(value, Samples) and value.unit is not None else None
     texts = isinstance(value, str) or (
@@ -75,19 +74,23 @@ def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
         return value
     place = f"{argument} {name}"
     try:
-        dimension(unit or "1")
+        own = scale(unit) if unit else None
     except ModelError:
         raise ModelError(
             f"{place}: found {value!r}, expected numbers in '{unit}', the unit of this FMU; convert them",
             argument=argument,
         ) from None
+    coherent = None if own is None else unit if own.slope == 1.0 and not own.zero else own.coherent
     try:
         if samples is None:
-            return given(place, value, unit or None)
-        samples.check_unit(place, unit or None)
+            found = given(place, value, coherent)
+            return found if own is None else own.written(np.asarray(found, dtype=float))
+        samples.check_unit(place, coherent)
     except ModelError as error:
         raise ModelError(str(error), argument=argument) from None
-    return samples
+    values = samples.values if own is None else own.written(samples.values)
+    shaped = values.reshape(samples.times.size, *samples.shape, order="F")
+    return Samples(samples.times, shaped, kind=samples.kind, largest_gap=samples.largest_gap)
 
 
 def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:

@@ -156,7 +156,7 @@ def test_what_cannot_be_drawn_does_not_cost_the_answer(run, fails, move, tmp_pat
 
 
 def test_a_full_disk_does_not_cost_the_answer(fails, run, move, tmp_path, monkeypatch):
-    def full(result, path):
+    def full(result, path, display=None):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("gantrytau.commands.printing.result_output.rehearse", lambda file: None)

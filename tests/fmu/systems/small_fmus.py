@@ -164,6 +164,8 @@ def _units(variables):
         "mm": 'm="1" factor="0.001"',
         "kg": 'kg="1"',
         "N/m": 'kg="1" s="-2"',
+        "degC": 'K="1" offset="273.15"',
+        "furlong": 'm="1" factor="201.168"',
     }
     units = sorted({line[3] for line in variables if line[3] and line[5] == "real"})
     text = "".join(f'<Unit name="{escape(unit)}"><BaseUnit {base[unit]}/></Unit>' for unit in units)

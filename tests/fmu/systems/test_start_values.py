@@ -6,7 +6,7 @@ import zipfile
 
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Samples
 from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
 from tests.fmu.systems.small_fmus import variable
@@ -100,3 +100,19 @@ def test_start_values_may_bring_their_units(build, fmi):
     assert cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 N/mm"}).final("a.y") == 2000.0
     with pytest.raises(ModelError, match=r"start a\.k: found '2 mm', a length, expected a stiffness in N/m"):
         cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 mm"})
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_fmu_in_other_units_is_given_them(build, fmi):
+    lines = [variable("u", "input", 0.0, unit="mm"), variable("T", "parameter", 20.0, unit="degC")]
+    lines += [variable("y", "output", unit="mm"), variable("odd", "parameter", 1.0, unit="furlong")]
+    system = {"a": build(f"metric{fmi[0]}", lines, derive="v[2] = v[0] + v[1];", fmi=fmi)}
+    assert (
+        cosimulate(system, stop=0.1, step=0.1, start={"a.u": "1 m", "a.T": "300 K"}).final("a.y") == 1026.85
+    )
+    driven = cosimulate(system, stop=0.1, step=0.1, inputs={"a.u": Samples([0.0, 0.1], [2.0, 2.0], unit="m")})
+    assert driven.final("a.y") == 2020.0
+    with pytest.raises(ModelError, match=r"start a\.T: found '1 m', a length, expected a temperature in K"):
+        cosimulate(system, stop=0.1, step=0.1, start={"a.T": "1 m"})
+    with pytest.raises(ModelError, match=r"start a\.odd: found '1 m', expected numbers in 'furlong'"):
+        cosimulate(system, stop=0.1, step=0.1, start={"a.odd": "1 m"})
