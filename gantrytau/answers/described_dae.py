@@ -49,7 +49,7 @@ def _row(values: Mapping[str, float], quantity: FlatVariable) -> tuple[str, ...]
 
 def _shown(quantity: FlatVariable, values: np.ndarray) -> np.ndarray:
     """Values in the unit in which they are shown."""
-    return scale(quantity.display).written(values) if quantity.display else values
+    return np.asarray(scale(quantity.display).written(values)) if quantity.display else values
 
 
 def _numbers(values: Mapping[str, float], quantity: FlatVariable) -> np.ndarray:

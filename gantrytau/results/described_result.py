@@ -60,7 +60,7 @@ def _ends(series: Series, name: str, unit: Shown) -> tuple[str, str]:
         return "", ""
     small = ROUNDING * np.nanmax(np.abs(values), initial=0.0)
     first, last = (np.where(np.abs(value) < small, 0.0, value) for value in (values[0], values[-1]))
-    return array_words(unit.of(first)), array_words(unit.of(last))
+    return array_words(np.asarray(unit.of(first))), array_words(np.asarray(unit.of(last)))
 
 
 def _plain(unit: str) -> str:

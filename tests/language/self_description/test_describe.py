@@ -95,7 +95,7 @@ def test_a_joint_is_told_by_its_declarations():
     assert rows(said, "Parameters")["n[3]"]["value"] == "[0.0, 0.0, 1.0]"
     assert rows(said, "Variables")["phi"] == {
         "name": "phi",
-        "unit": "rad",
+        "unit": "deg",
         "description": "angle from frame_a to frame_b about n",
     }
     assert {name: row["class"] for name, row in rows(said, "Connectors").items()} == {
