@@ -22,7 +22,6 @@
 # %%
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
@@ -79,11 +78,12 @@ print(rig, square, sep="\n")
 # %%
 by_actuators = learn(rig, square, Learning(window=window), Actuators(), iterations=RUNS, seed=1)
 print(by_actuators)
-by_actuators.plot("errors")
-by_actuators.plot("path")
-plt.show()
 assert np.all(by_actuators.relative[5] < 4)
 assert by_actuators.tool_relative[5, 1] > 30
+by_actuators.plot("errors")
+
+# %%
+by_actuators.plot("path")
 
 # %% [markdown]
 # Actuators end at 2.5 %. The tool keeps more than a third of its error across the arms: it swings on them, and no encoder
@@ -123,7 +123,8 @@ assert forced.relative[5].max() > 500
 q = design_q(response)
 print(q.magnitude(np.array([2.0, 7.4, 11.0, 20.0]), PERIOD).round(2))
 plot_q(q, response, limit=40.0)
-plt.show()
+
+# %%
 by_gauges = learn(
     rig, square, Learning(q=q, window=window), Measured(), iterations=RUNS, seed=1, response=response
 )
@@ -161,13 +162,12 @@ for name, estimator in (
     learning = Learning(q=design_q(seen), window=window)
     histories[name] = learn(rig, square, learning, estimator, iterations=RUNS, seed=1, response=seen)
 histories["3, gauges"] = by_gauges
-plot_learning(histories)
-plt.show()
 print(f"{'case':20s} sigma   x     y     (printed: 13.3 36.1, 12.6 23.9, 13.3 25.2, 10.3 24.9)")
 for name, history in histories.items():
     tool = history.tool_relative[5:].mean(axis=0)
     print(f"{name:20s} {history.stability.sigma:.3f} {tool[0]:5.1f} {tool[1]:5.1f}")
     assert name.startswith("1") or tool[1] < by_actuators.tool_relative[5:, 1].mean() - 8
+plot_learning(histories)
 
 # %% [markdown]
 # Cases 1 and 2A are those of the thesis within its digits. With the Kalman filter and with gauges the simulated robot is
@@ -187,10 +187,9 @@ for name, law in (("gradient", Gradient(gain=1.8)), ("norm-optimal", NormOptimal
     compared[name] = learn(rig, square, learning, Measured(), iterations=RUNS, seed=1, response=response)
 for name, history in compared.items():
     print(f"{name}: {history.stability}\n    x, y: {history.relative[RUNS].round(1)} %")
-plot_learning(compared)
-plt.show()
 assert all(history.stability.monotone for history in compared.values())
 assert np.all(compared["norm-optimal"].relative[RUNS] < 0.5 * by_gauges.relative[RUNS])
+plot_learning(compared)
 
 # %% [markdown]
 # With the response of the robot at hand, norm-optimal learning leaves less than half of what the shift leaves, though its

@@ -114,7 +114,6 @@ print(identify_friction(drawn, runs))
 fast = [run for run in runs if abs(run.q[-1] - run.q[0]).min() / (run.t[-1] - run.t[0]) > 0.22]
 friction = identify_friction(drawn, fast)
 print(friction)
-friction.plot()
 carried = TRUTH.plate_mass + sum(TRUTH.link_masses) / 2
 assert abs(friction.mass - carried) < 3 * friction.deviations["mass"]
 assert not any(finding.kind == "smoothed" for finding in friction.findings)
@@ -122,6 +121,7 @@ for i in ARMS:
     for direction in range(2):
         off = friction.coulomb[i, direction] - TRUTH.coulomb[i]
         assert abs(off) < 4 * friction.deviations[f"coulomb[{i}][{direction}]"]
+friction.plot()
 
 # %% [markdown]
 # ## A motion that tells masses
@@ -276,9 +276,9 @@ for seed in range(9):
     steps.append(StepResponse(run.time, run["q_ref"], run["measured.q"]))
 servos = identify_servo(steps)
 print(servos)
-servos.plot()
 assert set(servos.delay) <= {5, 6}
 assert np.abs(servos.pole - [0.9647, 0.9656, 0.9728]).max() < 0.002  # as printed
+servos.plot()
 
 # %% [markdown]
 # ## Resonances
@@ -298,9 +298,9 @@ half = slice(0, count // 2), slice(count // 2, count)
 black_box = identify_system(stiff[half[0]], wrist[half[0]], order=10, period=PERIOD)
 print("Hz:", black_box.eigenfrequencies.round(2), "damping:", black_box.damping.round(3))
 print("explains", black_box.fit(stiff[half[1]], wrist[half[1]]).round(1), "% of the other half")
-black_box.plot_singular_values()
 assert np.all(black_box.fit(stiff[half[1]], wrist[half[1]]) > 90)
 assert black_box.singular_values[7] > 1.5 * black_box.singular_values[8]
+black_box.plot_singular_values()
 
 # %% [markdown]
 # Beside it stands what was measured, without a model, and what the equations of the component model say: modes in which

@@ -241,6 +241,8 @@ assert -alone["tool.r"][:, 2].min() < 0.02
 
 # %%
 plot_peg_orientation(helped)
+
+# %%
 plot_peg_forces(helped)
 
 # %% [markdown]

@@ -112,7 +112,6 @@ print(f"sampling every {PERIOD * 1e3:g} ms takes about {held:.0f} degrees of it"
 assert abs(2 * np.pi * np.exp(crossing) / CROSSOVER - 1) < 0.05
 assert 60 < margin < 80
 loop.plot_bode(hertz)
-plt.show()
 
 # %% [markdown]
 # ## The controller that samples

@@ -194,6 +194,7 @@ def test_the_command_line_is_told_with_its_options():
     simulate = page[page.index("## gantrytau simulate") :].partition("\n## ")[0]
     assert "| `--stop NUMBER` |  | Time at which to stop, in s. |" in simulate
     assert "`MODEL`" in simulate
+    assert "`--set NAME=VALUE\\|FILE`" in simulate
     assert "## gantrytau fmu export" in page
 
 

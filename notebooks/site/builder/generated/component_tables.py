@@ -1,10 +1,12 @@
 """Tables of a component, as `describe` tells of it: parameters, connectors, variables, parts."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from gantrytau import describe
 from notebooks.site.builder.reading.docstrings import escaped
 
+BAR = re.compile(r"(?<!\\)\|")  # which would end a cell
 CODE = {"name", "value", "class", "with"}  # columns of names and values
 
 
@@ -22,7 +24,7 @@ def component_tables(cls: type, link: Callable[[str], str | None]) -> Iterator[s
 
 def table(heading: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown below its heading, without columns that are empty; "" without rows."""
-    lines = [tuple(cell.replace("\n", " ") for cell in row) for row in rows]
+    lines = [tuple(BAR.sub(r"\\|", cell.replace("\n", " ")) for cell in row) for row in rows]
     if not lines:
         return ""
     kept = [k for k, _ in enumerate(columns) if k == 0 or any(row[k] for row in lines)]
@@ -35,5 +37,4 @@ def _cell(head: str, text: str, link: Callable[[str], str | None]) -> str:
     if head not in CODE or not text or text.startswith("("):
         return escaped(text, link)
     target = link(text) if head == "class" else None
-    code = text.replace("|", "\\|")
-    return f"{{py:obj}}`{code} <{target}>`" if target else f"`{code}`"
+    return f"{{py:obj}}`{text} <{target}>`" if target else f"`{text}`"
