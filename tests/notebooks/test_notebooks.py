@@ -1,5 +1,7 @@
 """Every notebook runs from top to bottom, and so does the code of the README."""
 
+import ast
+import re
 import runpy
 from pathlib import Path
 
@@ -40,3 +42,30 @@ def test_code_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     run_page(page, "README.md")
     assert (tmp_path / "fall.png").stat().st_size > 1000
     assert "solved" in page.printed
+
+
+def drawn_and_hidden(source: str, axes: set[str]) -> list[str]:
+    """Calls that draw a figure of the package in a cell, but not at its end, where notebooks show what a cell is worth."""
+    hidden = []
+    body = ast.parse(source).body
+    for node in body:
+        if isinstance(node, ast.Assign) and "subplot" in ast.unparse(node.value):
+            axes |= {name.id for name in ast.walk(node.targets[0]) if isinstance(name, ast.Name)}
+    for node in body[:-1]:
+        call = node.value if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) else None
+        name = ast.unparse(call.func) if call else ""
+        if name.rpartition(".")[2].startswith("plot") and re.split(r"\W", name)[0] not in axes:
+            hidden.append(ast.unparse(node))
+    return hidden
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_figures_stand_where_a_notebook_shows_them(path):
+    axes = set[str]()
+    cells = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
+    assert [call for source in cells for call in drawn_and_hidden(source, axes)] == []
+
+
+def test_a_figure_within_a_cell_is_found():
+    assert drawn_and_hidden("found.plot('errors')\nprint(1)", set()) == ["found.plot('errors')"]
+    assert drawn_and_hidden("figure, ax = plt.subplots()\nax.plot(x)\nprint(1)\nfound.plot()", set()) == []
