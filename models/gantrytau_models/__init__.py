@@ -14,6 +14,7 @@ from gantrytau_models.mechanisms.delta import DeltaRobot
 from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
 from gantrytau_models.mechanisms.f1 import F1GantryTau
 from gantrytau_models.mechanisms.five_bar import FiveBar
+from gantrytau_models.mechanisms.five_dof import FiveDofGantryTau
 from gantrytau_models.mechanisms.flexible import FlexibleGantryTau
 from gantrytau_models.mechanisms.four_bar import FourBar
 from gantrytau_models.mechanisms.gantry_tau import GantryTau
@@ -35,6 +36,7 @@ __all__ = [
     "F1WithWrist",
     "Feedforward",
     "FiveBar",
+    "FiveDofGantryTau",
     "FlexibleGantryTau",
     "ForwardKinematics",
     "FourBar",

@@ -4,7 +4,7 @@ Dressler (2012), section 4.4. Where the links of an arm are exactly parallel and
 keeps its orientation; offsets and lengths of their own make this the kinematic error model of (4.14).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts, tool_ahead_of_carts
 from gantrytau_models.prototypes import Arm as Record
-from gantrytau_models.prototypes import Prototype
+from gantrytau_models.prototypes import Link, Prototype
 
 SEAT = "links[0].on_cart.frame_b.r"  # the first joint on a cart
 
@@ -55,23 +55,11 @@ class SixLinkGantryTau(Model):
     ):
         name = type(self).__name__
         carts = driven_carts(prototype, friction, name)
-        found = tuple(len(arm.links) for arm in prototype.arms)
-        if found != (1, 2, 3):
-            raise ModelError(
-                f"{name}: found {prototype.name} with {found} links on its arms, expected (1, 2, 3); write another "
-                "structure as a Model of its own, of Arm and Link"
-            )
+        refuse_other_links(prototype, name)
         defaults = dict(
-            arms=[_arm(arm) for arm in prototype.arms],
+            arms=[links_on_guideway(arm, arm.links) for arm in prototype.arms],
             carts=[{**cart, "drawn": False} for cart in carts],
-            tool=dict(
-                m=prototype.plate_mass,
-                J=np.array(prototype.plate_inertia),
-                r_cm=list(prototype.plate_centre),
-                r=dict(start=tool_ahead_of_carts(prototype)),
-                v=dict(start=0.0),
-                q=dict(start=quaternion(np.array(prototype.plate_rotation))),
-            ),
+            tool=plate_of(prototype),
         )
         super().__init__(defaults, **modifications)
 
@@ -98,8 +86,31 @@ class SixLinkGantryTau(Model):
         return Rods(arms, given=[f"{arm.name}.offset" for arm in arms])
 
 
-def _arm(arm: Record) -> dict:
-    links = [
+def refuse_other_links(prototype: Prototype, robot: str) -> None:
+    """ModelError for a prototype that does not have one, two and three links on its arms."""
+    found = tuple(len(arm.links) for arm in prototype.arms)
+    if found != (1, 2, 3):
+        raise ModelError(
+            f"{robot}: found {prototype.name} with {found} links on its arms, expected (1, 2, 3); write another "
+            "structure as a Model of its own, of Arm and Link"
+        )
+
+
+def plate_of(prototype: Prototype) -> dict:
+    """Modifications of the plate of a robot on six links, which starts ahead of its carts."""
+    return dict(
+        m=prototype.plate_mass,
+        J=np.array(prototype.plate_inertia),
+        r_cm=list(prototype.plate_centre),
+        r=dict(start=tool_ahead_of_carts(prototype)),
+        v=dict(start=0.0),
+        q=dict(start=quaternion(np.array(prototype.plate_rotation))),
+    )
+
+
+def links_on_guideway(arm: Record, links: Sequence[Link]) -> dict:
+    """Modifications of an arm with these links on the guideway of a prototype's arm."""
+    each = [
         dict(
             length=link.length,
             offset=list(link.offset),
@@ -107,9 +118,9 @@ def _arm(arm: Record) -> dict:
             mass=link.mass,
             on_cart=dict(drawn=False),
         )
-        for link in arm.links
+        for link in links
     ]
-    return dict(offset=[0.0, 0.0, 0.0], direction=list(arm.direction), links=links, seat=SEAT)
+    return dict(offset=[0.0, 0.0, 0.0], direction=list(arm.direction), links=each, seat=SEAT)
 
 
 def quaternion(R: np.ndarray) -> list[float]:
