@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.answers.many_points.elimination import solved
 from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
@@ -122,6 +123,52 @@ class Kinematics(Record):
         """
         at = poses(r, R, "Kinematics.jacobian")
         return answered(at.one, self._solver.jacobian(at.r, at.R))[0]
+
+    def rates(self, r: Any, R: Any = None) -> np.ndarray:
+        """How joints move the tool: its velocity by their rates, (N, 3, n); with R its angular velocity besides, (N, 6, n).
+
+        Velocities are resolved in the world. Infinite or NaN in singular poses and out of reach.
+        """
+        at = poses(r, R, "Kinematics.rates")
+        if isinstance(self._solver, ModelFunctions):
+            return answered(at.one, self._solver.rates(at.r, at.R))[0]
+        matrix = self._solver.jacobian(at.r, at.R)
+        if matrix.shape[1] != matrix.shape[2]:
+            raise ModelError(
+                f"Kinematics.rates: found an orientation R for {self.dae.name}, whose three carts do not choose it; "
+                "leave it out"
+            )
+        return answered(at.one, solved(matrix, np.broadcast_to(np.eye(matrix.shape[1]), matrix.shape)))[0]
+
+    def variables(self, names: Sequence[str], r: Any, R: Any = None) -> list[np.ndarray]:
+        """Values of other variables of the model in poses, such as angles of passive joints, (N, k) each; (k,) for one pose.
+
+        Raises ModelError for robots that are computed by their rods: ask `ball_joint_angles`.
+        """
+        at = poses(r, R, "Kinematics.variables")
+        if not isinstance(self._solver, ModelFunctions):
+            raise ModelError(
+                f"Kinematics.variables: found {self.dae.name}, which answers by its rods alone, expected a robot "
+                "through its equations; use ball_joint_angles, or dae.array_function"
+            )
+        return list(answered(at.one, *self._solver.variables(tuple(names), at.r, at.R)))
+
+    def orientation(self, r: Any) -> np.ndarray:
+        """The orientation that follows from positions, (N, 3, 3), of a robot whose joints do not choose it."""
+        at = poses(r, None, "Kinematics.orientation")
+        if not isinstance(self._solver, ModelFunctions):
+            return answered(at.one, self.fk(self.ik(at.r))[1])[0]
+        return answered(at.one, self._solver.whole_pose(at.r)[1])[0]
+
+    @property
+    def through_equations(self) -> bool:
+        """Whether its equations answer, as of a robot that does not say by rods() what its links are."""
+        return isinstance(self._solver, ModelFunctions)
+
+    @property
+    def turning(self) -> bool:
+        """Whether the joints choose the orientation of the tool too, so that ik is given one."""
+        return self._solver.turning if isinstance(self._solver, ModelFunctions) else len(self.joints) == 6
 
     def ik_of_five_degrees(self, r: Any, R: Any) -> np.ndarray:
         """Coordinates q (N, 6) of the F1 as if the links of an arm were parallel and of one length (4.25).

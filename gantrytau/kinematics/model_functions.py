@@ -72,6 +72,34 @@ class ModelFunctions:
             found[np.isnan(self.ik(r, R)[0]).any(axis=1)] = np.nan
         return found
 
+    def rates(self, r, R=None):
+        """Velocity of the tool by rates of the joints, (N, 3, n); with R its angular velocity too, (N, 6, n)."""
+        x = self._coordinates(r, R)
+        count = len(self.places)
+        by_joints = solved(self._slopes_of(x), np.broadcast_to(np.eye(count), (len(x), count, count)))
+        if self.places == (0, 1, 2):
+            return by_joints
+        if count == 6:
+            turns = np.zeros((len(x), 6, 6))
+            turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
+            return solved(turns, by_joints)
+        moves = self._following.slopes(*self._arguments(x))
+        if not self.turning:
+            return moves[:, :3] @ by_joints
+        spins = (
+            moves[:, 3:].reshape(len(x), 3, 3, count).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
+        )
+        spins = np.stack([spins[:, :, i, j] for i, j in SPIN], axis=1)
+        return np.concatenate([moves[:, :3], spins], axis=1) @ by_joints
+
+    def whole_pose(self, r, R=None):
+        """The pose with the orientation that follows where none is given."""
+        return (r, R) if R is not None else self._pose_of(self._coordinates(r, None))
+
+    def variables(self, names, r, R=None):
+        """Values of other variables in poses, (N, k) each, matrices column after column."""
+        return self.dae.array_function(self._given, names)(*self._arguments(self._coordinates(r, R)))
+
     @property
     def turning(self) -> bool:
         """Whether the joints decide on the orientation beside the position."""
@@ -195,7 +223,7 @@ class ModelFunctions:
 
 def _whole(found: np.ndarray) -> np.ndarray:
     """The same with poses NaN of which some numbers are, as where one arm of two is too short."""
-    found[~np.isfinite(found).reshape(len(found), -1).all(axis=1)] = np.nan
+    found[~np.isfinite(found).all(axis=tuple(range(1, found.ndim)))] = np.nan
     return found
 
 

@@ -9,8 +9,9 @@ import pytest
 
 from gantrytau import Bounds, ModelError, Start
 from gantrytau.kinematics.kinematics import Kinematics
+from gantrytau.kinematics.workspace.examine import examine
 from gantrytau.kinematics.workspace.obstacles import Box, Capsule, Cylinder
-from gantrytau.kinematics.workspace.pose_limits import REASONS, Limits, examine
+from gantrytau.kinematics.workspace.pose_limits import REASONS, Limits
 from gantrytau.kinematics.workspace.workspace import workspace
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 

@@ -12,7 +12,7 @@ then leave the tool a region, of which three descriptions are compared:
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
+from gantrytau.kinematics.accuracy.joint_errors import JointErrors, joint_errors
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, shown, vectors
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
@@ -143,14 +144,39 @@ class Accuracy(Record):
         )
 
 
-def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> Accuracy:
-    """Errors of the tool of a three-link robot for errors of its actuators (Appendix A).
+@overload
+def accuracy(robot: Model | Kinematics, r: ArrayLike, semi_axes: ArrayLike) -> Accuracy: ...
+
+
+@overload
+def accuracy(
+    robot: Model | Kinematics, r: ArrayLike, *, errors: ArrayLike, R: ArrayLike | None = None
+) -> JointErrors: ...
+
+
+def accuracy(
+    robot: Model | Kinematics,
+    r: ArrayLike,
+    semi_axes: ArrayLike | None = None,
+    *,
+    errors: ArrayLike | None = None,
+    R: ArrayLike | None = None,
+) -> Accuracy | JointErrors:
+    """Errors of the tool for errors of the actuators: of a three-link robot by ellipsoids (Appendix A), of any by joints.
 
     robot: an instance such as GantryTau(prototypes.D1), or its Kinematics; r: places of the tool, (N, 3) or (3,), in m;
-    semi_axes: of the error ellipsoids along the axes of the base, (3, 3) in m, one row per actuator.
-    Raises ModelError for other robots, shapes, or semi-axes that are negative or not small.
+    semi_axes: of the error ellipsoids along the axes of the base, (3, 3) in m, one row per actuator; or errors: the largest
+    of each joint, (n,) in m and rad, with the orientation R, (3, 3) or (N, 3, 3), by default that of the start where joints
+    choose it. Raises ModelError for other robots, shapes, or errors that are negative or, as semi-axes, not small.
     """
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
+    if errors is not None and semi_axes is None:
+        return joint_errors(kinematics, r, R, floats(errors))
+    if semi_axes is None or errors is not None:
+        raise ModelError(
+            f"{kinematics.dae.name}: found {'neither' if errors is None else 'both'} semi_axes and errors, expected one: "
+            "ellipsoids (3, 3) of the carts of a three-link robot, or errors= of the joints of any robot"
+        )
     linked, name = kinematics.linked("accuracy"), kinematics.dae.name
     if not isinstance(linked, ThreeRods):
         raise ModelError(

@@ -88,7 +88,7 @@ def _levels(values: np.ndarray) -> np.ndarray:
 
 def _carts(axis: Any, carts: np.ndarray, first: int, second: int) -> None:
     """The guideways, where they pass through a slice that is across them."""
-    middle = np.nanmean(carts, axis=0)
+    middle = np.nanmean(carts, axis=0) if carts.shape[1] else ()
     for i, cart in enumerate(middle):
         axis.plot(cart[first], cart[second], "s", color="tab:red", markersize=5)
         axis.annotate(f"{i + 1}", (cart[first], cart[second]), xytext=(4, 4), textcoords="offset points")

@@ -13,7 +13,15 @@ from gantrytau.results.figures import check_suffix, finished
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOURS = ("#9fd69f", "#ffffff", "#c9d5e8", "#f2dfb0", "#e8b3ab")  # in the order of REASONS
+_COLOURS = (
+    "#9fd69f",
+    "#ffffff",
+    "#c9d5e8",
+    "#f2dfb0",
+    "#e8b3ab",
+    "#d9c8ea",
+    "#bfe3e0",
+)  # in the order of REASONS
 _OBSTACLE = "0.35"
 _UNITS = {"stroke": "m", "turn": "rad", "angle": "rad", "clearance": "m"}
 _FINE = 300  # points along a side, of which outlines of obstacles are drawn
@@ -84,9 +92,10 @@ def _legend(figure: Any, found: Cells, number: int, layer: int, hidden: bool) ->
     shown = [k for k in range(len(REASONS)) if (reasons == k).any()]
     signs: list[Any] = [Patch(facecolor=_COLOURS[k], edgecolor="0.5", label=REASONS[k]) for k in shown]
     signs += [Patch(facecolor=_OBSTACLE, label="obstacle")] if hidden else []
-    along = all(abs(way[number]) <= 0.5 * np.linalg.norm(way) for _, way in found.rails)
-    line, end = ("-", "") if along else ("", "s")
-    signs.append(Line2D([], [], color="tab:red", label="guideway", linestyle=line, marker=end))
+    if len(found.rails):
+        along = all(abs(way[number]) <= 0.5 * np.linalg.norm(way) for _, way in found.rails)
+        line, end = ("-", "") if along else ("", "s")
+        signs.append(Line2D([], [], color="tab:red", label="guideway", linestyle=line, marker=end))
     figure.legend(
         handles=signs, fontsize="small", loc="outside lower center", ncols=min(len(signs), 4), frameon=False
     )

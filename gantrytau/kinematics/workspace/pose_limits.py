@@ -18,7 +18,7 @@ from gantrytau.kinematics.rotations import angle_between
 from gantrytau.kinematics.workspace.obstacles import Capsule, between_segments, segment_distance
 from gantrytau.language.model import Model
 
-REASONS = ("inside", "out of reach", "stroke", "ball joint", "collision")
+REASONS = ("inside", "out of reach", "stroke", "ball joint", "collision", "passive joint", "near singular")
 _MISS = 1e-6  # m by which links of a pose may miss their lengths
 _BLOCK = 1024  # poses, whose links and their distances stay in the cache
 
@@ -36,6 +36,10 @@ class Limits(Record):
     plate: capsules in plate axes that stand for plate and tool. With a radius links of different arms may not touch
     each other either, where they end in different joints of the plate.
     stroke_margin (m), turn_margin, angle_margin (rad), clearance (m): what must be left of each limit for safety.
+    Of a robot that does not say by rods() what its links are, strokes are (n, 2) in the order of its joints, ball joints
+    are limited through `passive`, and bars that it shows stand for its links. passive: (least, largest) of other variables
+    by name, such as {"elbows[0].phi": (0.2, 2.5)}. condition: largest ratio of the speeds of the tool in its quickest and
+    its slowest direction for rates of the joints of one size; rotations count by `lever` m.
     """
 
     strokes: Any = None
@@ -50,6 +54,9 @@ class Limits(Record):
     turn_margin: float = 0.0
     angle_margin: float = 0.0
     clearance: float = 0.0
+    passive: Any = None
+    condition: float = math.inf
+    lever: float = 1.0
 
     def __post_init__(self):
         for name in ("link_radius", "stroke_margin", "turn_margin", "angle_margin", "clearance"):
@@ -61,6 +68,11 @@ class Limits(Record):
             raise ModelError(
                 f"Limits.ball_joint: found {self.ball_joint!r}, expected an angle above 0 and up to pi in rad; convert "
                 "degrees with math.radians"
+            )
+        if not (real(self.condition) > 1 and 0 < real(self.lever) < np.inf):
+            raise ModelError(
+                f"Limits: found condition={self.condition!r} and lever={self.lever!r}, expected a ratio above 1 and a "
+                "length above 0 m"
             )
         for name in ("obstacles", "plate"):
             bodies = getattr(self, name)
@@ -81,7 +93,8 @@ class Examined(Record):
     r (N, 3) in m, R (N, 3, 3), q (N, n). reason: (N,), the first limit that is broken as a number of REASONS, 0 for
     none. stroke: of the cart that has least left, m; turn: of the turntable, rad; angle: of the ball joint, rad;
     clearance: of links and plate from obstacles and of links from each other, m. What is not limited is infinite;
-    out of reach all are NaN, and clearance is NaN where another limit is broken, as it is not asked for there.
+    out of reach all are NaN, and clearance is NaN where another limit is broken, as it is not asked for there. condition:
+    of poses, where it is limited.
     """
 
     r: np.ndarray
@@ -92,23 +105,12 @@ class Examined(Record):
     turn: np.ndarray
     angle: np.ndarray
     clearance: np.ndarray
+    condition: np.ndarray | None = None
 
     @property
     def inside(self) -> np.ndarray:
         """Whether a pose keeps all limits, (N,)."""
         return self.reason == 0
-
-
-def examine(
-    robot: Model | Kinematics, r: ArrayLike, R: ArrayLike | None = None, limits: Limits | None = None
-) -> Examined:
-    """Which poses of a robot keep all limits, and what they leave of each.
-
-    robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; r: (N, 3) or (3,) in m; R: (N, 3, 3), one
-    (3, 3) for all, or None for the orientation that the links give, and for a robot with turntables that of its start.
-    Raises ModelError for what is no such robot, and for shapes.
-    """
-    return Examiner(robot, limits or Limits())(r, R)
 
 
 class Examiner:
@@ -123,12 +125,22 @@ class Examiner:
             )
         self.limits = limits
         self.linked = self.kinematics.linked("workspace")
+        if limits.passive is not None or math.isfinite(limits.condition):
+            raise ModelError(
+                f"{self.name}: found passive={limits.passive!r} and condition={limits.condition!r} for a robot whose links "
+                "are known by rods(), expected neither; limit its ball joints by ball_joint= and cart_axes="
+            )
         self.geometry: RodGeometry = self.linked.geometry
         self.carts = len(self.geometry.offset)
-        self.strokes = _strokes(self.kinematics, self.carts, limits.strokes)
+        self.strokes = strokes_of(self.kinematics, self.carts, limits.strokes)
         self.around, self.reach = self.geometry.reach()
         self._touching = touching_links(self.geometry) if limits.link_radius else []
         self._axes = self._joint_axes() if math.isfinite(limits.ball_joint) else None
+
+    @property
+    def rails(self) -> np.ndarray:
+        """A point and the direction of each guideway, (arms, 2, 3)."""
+        return np.stack([self.geometry.offset, self.geometry.direction], axis=1)
 
     def __call__(self, r: ArrayLike, R: ArrayLike | None = None) -> Examined:
         """See `examine`."""
@@ -139,7 +151,7 @@ class Examiner:
             q, turn = self._joints_and_orientation(place, turn)
             return self._of_block(q, place, turn)
 
-        return _in_blocks(at.r, block)
+        return in_blocks(at.r, block)
 
     def judge(self, q: ArrayLike, r: ArrayLike, R: ArrayLike) -> Examined:
         """The same for poses whose actuators are known, q (N, n), r (N, 3), R (N, 3, 3), such as `fk` gives them.
@@ -160,7 +172,7 @@ class Examiner:
             good = self._assembled(known, place, turn)
             return self._of_block(np.where(good[:, None], known, np.nan), place, turn)
 
-        return _in_blocks(at.r, block)
+        return in_blocks(at.r, block)
 
     def _assembled(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Whether links are as long as they are, each arm on its side, (N,)."""
@@ -259,8 +271,9 @@ class Examiner:
         return least - self.limits.clearance
 
 
-def _in_blocks(r: np.ndarray, block: Callable[[slice], dict[str, np.ndarray]]) -> Examined:
-    parts = [slice(k, k + _BLOCK) for k in range(0, len(r), _BLOCK)] or [slice(0)]
+def in_blocks(r: np.ndarray, block: Callable[[slice], dict[str, np.ndarray]], size: int = _BLOCK) -> Examined:
+    """What `block` finds of so many poses at a time, put together."""
+    parts = [slice(k, k + size) for k in range(0, len(r), size)] or [slice(0)]
     blocks = [block(part) for part in parts]
     return Examined(r=r, **{name: np.concatenate([each[name] for each in blocks]) for name in blocks[0]})
 
@@ -276,7 +289,7 @@ def touching_links(geometry: RodGeometry) -> list[tuple[int, int]]:
     ]
 
 
-def _strokes(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
+def strokes_of(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
     """Least and largest coordinate of each actuator, (n, 2)."""
     if strokes is None:
         return kinematics.limits

@@ -11,8 +11,10 @@ from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.kinematics.workspace.cells import Cells, axis_number, border
+from gantrytau.kinematics.workspace.examine import examiner_of
 from gantrytau.kinematics.workspace.figures import draw_layer, draw_solid
 from gantrytau.kinematics.workspace.grid_spacing import checked_places, settled_spacing
+from gantrytau.kinematics.workspace.model_limits import ModelExaminer
 from gantrytau.kinematics.workspace.pose_limits import Examiner, Limits
 from gantrytau.language.model import Model
 
@@ -71,12 +73,12 @@ def workspace(
     robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; spacing: side of a cell at most, m, 0.05 if
     nothing is said; places: in place of it, about how many are to be inside, some per cent more or less; box: (3, 2) of
     (least, largest) x, y, z in m, equal ones for a slice, or None for what strokes and links allow; R: (3, 3), None for
-    the orientation that the links give, for a robot with turntables that of its start; refine: cells on the border are
+    the orientation that the links give, for a robot that turns its tool that of its start; refine: cells on the border are
     judged by that many places along each axis. Raises ModelError for a box, a spacing or a robot that does not fit, and
     where neither strokes nor a box bound the workspace.
     """
     limits = limits or Limits()
-    examiner = Examiner(robot, limits)
+    examiner = examiner_of(robot, limits)
     bounds = _bounds(examiner) if box is None else floats(box)
     if bounds.shape != (3, 2) or not (np.isfinite(bounds).all() and (bounds[:, 0] <= bounds[:, 1]).all()):
         raise ModelError(
@@ -107,13 +109,13 @@ def workspace(
         examined=examined,
         fraction=fraction,
         limits=limits,
-        rails=np.stack([examiner.geometry.offset, examiner.geometry.direction], axis=1),
+        rails=examiner.rails,
         refine=int(refine),
     )
 
 
 def _shares(
-    examiner: Examiner,
+    examiner: Examiner | ModelExaminer,
     middles: np.ndarray,
     box: np.ndarray,
     shape: Sequence[int],
@@ -152,8 +154,14 @@ def _cells(name: str, box: np.ndarray, spacing: float) -> list[np.ndarray]:
     ]
 
 
-def _bounds(examiner: Examiner) -> np.ndarray:
+def _bounds(examiner: Examiner | ModelExaminer) -> np.ndarray:
     """The box outside of which some link cannot reach: around the way of its cart by its length, (3, 2)."""
+    if isinstance(examiner, ModelExaminer):
+        raise ModelError(
+            f"{examiner.name}: found no box for a robot that does not say by rods() how far its links reach, expected three "
+            "pairs (least, largest) of x, y and z in m, equal ones for a plane; give box=",
+            argument="box",
+        )
     strokes, arm = examiner.strokes[: examiner.carts], examiner.geometry.arm
     if not np.isfinite(strokes).all():
         raise ModelError(
