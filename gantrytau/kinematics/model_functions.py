@@ -79,13 +79,13 @@ class ModelFunctions:
         by_joints = solved(self._slopes_of(x), np.broadcast_to(np.eye(count), (len(x), count, count)))
         if self.places == (0, 1, 2):
             return by_joints
+        moves = self._following.slopes(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
+        if R is None:  # as then the joints do not choose it
+            return moves[:, :3] @ by_joints
         if count == 6:
             turns = np.zeros((len(x), 6, 6))
             turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
             return solved(turns, by_joints)
-        moves = self._following.slopes(*self._arguments(x))
-        if not self.turning:
-            return moves[:, :3] @ by_joints
         spins = (
             moves[:, 3:].reshape(len(x), 3, 3, count).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
         )

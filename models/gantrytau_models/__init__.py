@@ -13,12 +13,12 @@ from gantrytau_models.mechanisms.bushed_links import BushedSixLinkGantryTau
 from gantrytau_models.mechanisms.delta import DeltaRobot
 from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
 from gantrytau_models.mechanisms.f1 import F1GantryTau
-from gantrytau_models.mechanisms.five_bar import FiveBar
 from gantrytau_models.mechanisms.five_dof import FiveDofGantryTau
 from gantrytau_models.mechanisms.flexible import FlexibleGantryTau
-from gantrytau_models.mechanisms.four_bar import FourBar
 from gantrytau_models.mechanisms.gantry_tau import GantryTau
 from gantrytau_models.mechanisms.pendulum import Pendulum
+from gantrytau_models.mechanisms.planar.five_bar import FiveBar
+from gantrytau_models.mechanisms.planar.four_bar import FourBar
 from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
 from gantrytau_models.mechanisms.stewart import StewartPlatform
 from gantrytau_models.mechanisms.wrist import F1WithWrist, SerialWrist, SixLinkWithWrist, WithWrist

@@ -94,7 +94,7 @@ class Examined(Record):
     none. stroke: of the cart that has least left, m; turn: of the turntable, rad; angle: of the ball joint, rad;
     clearance: of links and plate from obstacles and of links from each other, m. What is not limited is infinite;
     out of reach all are NaN, and clearance is NaN where another limit is broken, as it is not asked for there. condition:
-    of poses, where it is limited.
+    ratio of speeds, 1 where it is not limited.
     """
 
     r: np.ndarray
@@ -105,7 +105,7 @@ class Examined(Record):
     turn: np.ndarray
     angle: np.ndarray
     clearance: np.ndarray
-    condition: np.ndarray | None = None
+    condition: np.ndarray
 
     @property
     def inside(self) -> np.ndarray:
@@ -196,7 +196,17 @@ class Examiner:
         free = reason == 0
         clearance[free] = self._clearance(q[free], r[free], R[free])
         reason[free & (clearance < 0)] = REASONS.index("collision")
-        return dict(R=R, q=q, reason=reason, stroke=stroke, turn=turn, angle=angle, clearance=clearance)
+        condition = np.where(reached, 1.0, np.nan)
+        return dict(
+            R=R,
+            q=q,
+            reason=reason,
+            stroke=stroke,
+            turn=turn,
+            angle=angle,
+            clearance=clearance,
+            condition=condition,
+        )
 
     def _joints_and_orientation(self, r: np.ndarray, R: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Actuators (N, n), NaN rows out of reach, and the orientation (N, 3, 3) that is given or follows."""

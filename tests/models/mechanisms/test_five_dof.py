@@ -1,5 +1,7 @@
 """The Gantry-Tau robot with five carts: lengths of its links, the six-link robot in it, its five degrees of freedom."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.rotations import turned
 from gantrytau_models import FiveDofGantryTau, SixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.five_dof import CARTS
+
+WITH_TURNTABLES: Any = prototypes.F1
 
 
 @pytest.fixture(scope="module")
@@ -88,4 +92,4 @@ def test_it_falls_as_its_links_let_it():
 
 def test_prototypes_of_other_structure_are_refused():
     with pytest.raises(ModelError, match=r"expected a prototype record such as prototypes.L1"):
-        FiveDofGantryTau(prototypes.F1)
+        FiveDofGantryTau(WITH_TURNTABLES)

@@ -13,7 +13,7 @@ from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect
 from gantrytau.language.self_description.appearance import PathLine
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Revolute, TwoFrames, World
 from gantrytau.mechanics.rotational import Torque
-from gantrytau_models.mechanisms.four_bar import Bar, Plane
+from gantrytau_models.mechanisms.planar.four_bar import Bar, Plane
 
 PHI = (2.2, np.pi - 2.2)  # rad, of the cranks at the start: elbows outwards
 PASSIVE = dict(phi=dict(prefer=StateSelect.DEFAULT), w=dict(prefer=StateSelect.DEFAULT))
