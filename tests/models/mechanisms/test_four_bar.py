@@ -7,11 +7,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from gantrytau_models.mechanisms.planar.four_bar import FourBar
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gantrytau import InitializationError, ModelError, SolveError, Start, simulate, translate
+from gantrytau_models.mechanisms.planar.four_bar import FourBar
 from tests.families import first_of
 from tests.references import four_bar
 from tests.references.rotations import random_rotation
