@@ -12,6 +12,7 @@ from notebooks.site.builder.generated.component_tables import table
 from notebooks.site.builder.generated.reference_pages import resolver
 from notebooks.site.builder.places import ROOT, SOURCES
 from notebooks.site.builder.reading.docstrings import escaped
+from notebooks.site.builder.reading.public_names import kind_of, public_names
 from notebooks.site.builder.staging import handwritten
 
 LAST = {
@@ -88,7 +89,10 @@ def _rows(held: list[Item]) -> Iterator[tuple[str, ...]]:
 
 
 def _name(full: str) -> str:
-    return f"{{py:obj}}`{'.'.join(part for part in _short(full))} <{full}>`"
+    parent, _, name = full.rpartition(".")
+    if any(one.full == parent and kind_of(one.value) == "module" for one in public_names()):
+        return f"{{py:obj}}`{parent.rpartition('.')[2]}.{name} <{parent}>`"
+    return f"{{py:obj}}`{'.'.join(_short(full))} <{full}>`"
 
 
 def _short(full: str) -> list[str]:
