@@ -73,11 +73,11 @@ class Diagnosis(Record):
         ]
         poor = "; they are nearly dependent here, name others in states=" if self.condition > POOR else ""
         lines += [
-            f"  {self.aliases} aliases removed, {self.differentiated} equations differentiated",
+            f"  {_counted(self.aliases, 'alias', 'es')} removed, {_counted(self.differentiated, 'equation')} differentiated",
             f"  mobility {self.mobility}",
             *_listed("redundant constraints", self.redundant),
             f"  states (condition {self.condition:.3g}{poor}): {', '.join(self.states) or 'none'}",
-            f"  {len(self.blocks)} blocks, of them with several unknowns: {', '.join(several) or 'none'}",
+            f"  {_counted(len(self.blocks), 'block')}, of them with several unknowns: {', '.join(several) or 'none'}",
             *(_listed("assumed", self.assumed) if self.assumed else []),
             *_listed("start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved]),
             *(f"  {assembly}" for assembly in self.assemblies),
@@ -89,6 +89,10 @@ class Diagnosis(Record):
             *(_listed("conditions", self.conditions) if self.conditions else []),
         ]
         return "\n".join(lines)
+
+
+def _counted(count: int, word: str, ending: str = "s") -> str:
+    return f"{count} {word}{'' if count == 1 else ending}"
 
 
 def _listed(title: str, items: Iterable[str], most: int = 8) -> list[str]:

@@ -34,6 +34,8 @@ SPELLING = Spelling(
     | {"inputs": "--input", "parameters": "--set", "max_step": "--max-step"},
 )
 
+FEW = 12  # variables that are shown where no state was kept
+
 
 def simulate(
     model: ModelName,
@@ -120,7 +122,7 @@ def _summary(chosen: Chosen, dae: "Dae", result: "Result", files: list[str]) -> 
 
 
 def _show(summary: dict[str, Any], dae: "Dae", result: "Result", units: Any) -> None:
-    """The states at both ends as a table; texts of the model are no markup."""
+    """The states at both ends, or a few of the outputs, as a table; texts of the model are no markup."""
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
@@ -129,16 +131,18 @@ def _show(summary: dict[str, Any], dae: "Dae", result: "Result", units: Any) -> 
     time = summary["time"]
     typer.echo(
         f"{summary['model']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
-        f"{len(result.names)} variables" + ("" if result.ended == "stop" else f", ended: {result.ended}")
+        f"{len(result.names)} variable{'' if len(result.names) == 1 else 's'}"
+        + ("" if result.ended == "stop" else f", ended: {result.ended}")
     )
     states = [name for name in dae.states if name in result]
-    if states:
+    shown = states or [name for name in result.names if name not in dae.parameter_values][:FEW]
+    if shown:
         table = Table(box=SIMPLE, pad_edge=False)
-        table.add_column("state", no_wrap=True)
+        table.add_column("state" if states else "variable", no_wrap=True)
         for heading in ("start", "end", "least", "greatest"):
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("unit")
-        for name, (values, unit) in of_table(result, states, units).items():
+        for name, (values, unit) in of_table(result, shown, units).items():
             numbers = (values[0], values[-1], values.min(), values.max())
             table.add_row(Text(name), *(f"{number:.6g}" for number in numbers), Text(unit))
         Console().print(table)

@@ -53,6 +53,11 @@ def test_only_the_outputs_that_are_asked_for_are_kept(run, answer, robots, tmp_p
     assert answer(*arguments)["final"] == pytest.approx({"x": 12.0, "der(v)": 1.5}, rel=1e-7)
     assert run(*arguments, "--output", str(tmp_path / "cart.csv")).exit_code == 0
     assert list(columns(tmp_path / "cart.csv")) == ["time [s]", "x [m]", "der(v) [m/s2]"]
+    spoken = run(*arguments[:-1], "der(v)").stdout  # no state is among them: what is kept is shown
+    assert "501 points, 1 variable\n" in spoken
+    assert [row.split()[:3] for row in spoken.splitlines() if row.strip().startswith("der(v)")] == [
+        ["der(v)", "1.5", "1.5"]
+    ]
     wrong = run(*arguments[:-1], "speed")
     assert (wrong.exit_code, "no variable or parameter 'speed'" in wrong.stderr) == (FAULT, True)
 

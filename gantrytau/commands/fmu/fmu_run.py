@@ -160,7 +160,7 @@ def _show(summary: Mapping[str, Any], result: "Result") -> None:
     time = summary["time"]
     typer.echo(
         f"{summary['file']}: {time['start']:g} s to {time['stop']:g} s, {time['points']} points, "
-        f"{len(result.names)} variables"
+        f"{len(result.names)} variable{'' if len(result.names) == 1 else 's'}"
     )
     table = Table(box=SIMPLE, pad_edge=False)
     table.add_column("variable", no_wrap=True)
