@@ -46,8 +46,8 @@ def options(
     """Acausal models of parallel robots: simulate, optimise, calibrate, identify, learn, export."""
 
 
-app.command()(doctor)
-app.command()(demo)
+app.command(epilog="Example: gantrytau doctor --json")(doctor)
+app.command(epilog="Example: gantrytau demo --output pictures")(demo)
 app.command(epilog="Example: gantrytau check 'GantryTau(D1)'")(check)
 app.command(
     epilog="Example: gantrytau simulate Pendulum --stop 10 --set x.start=0.5 --plot x,y --to swing.png"

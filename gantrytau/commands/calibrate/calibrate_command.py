@@ -66,7 +66,7 @@ Constraints = Annotated[
         "--constraint",
         metavar="NAME=VALUE",
         help="What numbers keep, with --method ipopt: 'arms[0].length=2.05', limits as 'arms[0].length=[2.0,2.1]', "
-        "'arms[1].links[0].length=arms[1].links[1].length', or '|arms[0].direction|=1' of a vector's length. Repeatable.",
+        "equal ones as 'arms[1].length=arms[0].length', or '|arms[0].direction|=1' of a vector's length. Repeatable.",
         show_default=False,
     ),
 ]

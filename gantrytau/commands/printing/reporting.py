@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from gantrytau import GantryTauError, heeding_interrupts
+from gantrytau.commands.printing.help_pages import tidy
 from gantrytau.commands.printing.spelling import Spelling
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
@@ -25,6 +26,13 @@ USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some version
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
 
 
+_PLAINLY = {
+    "Input should be a valid number, unable to parse string as a number": "expected a number, as 0.5",
+    "Input should be a valid integer, unable to parse string as an integer": "expected a whole number",
+    "Input should be a valid integer, got a number with a fractional part": "expected a whole number",
+    "Input should be greater than or equal to": "expected at least",
+    "Input should be less than or equal to": "expected at most",
+}
 PLAIN = Spelling((), {})
 
 
@@ -38,6 +46,20 @@ class Commands(TyperGroup):
     Arguments and options that do not exist or are missing are told as JSON where `--json` is among them.
     """
 
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A command by its name, with a help page for readers."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            tidy(command)
+            for below in getattr(command, "commands", {}).values():
+                tidy(below)
+        return command
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The page of all commands."""
+        tidy(self)
+        super().format_help(ctx, formatter)
+
     def invoke(self, ctx: Any) -> Any:
         """Run a command, and see to it that all it printed has arrived."""
         json = "--json" in [*getattr(ctx, "_protected_args", ()), *ctx.args]
@@ -49,6 +71,7 @@ class Commands(TyperGroup):
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
         except USAGE_ERROR as error:
+            error.message = in_plain_words(error.message)
             if not json:
                 raise
             fail(error.format_message(), MISUSE, json)
@@ -58,6 +81,13 @@ class Commands(TyperGroup):
             _drop_output()
             note(f"Cannot write: {error.strerror}; make room, or send the output to another place")
             raise typer.Exit(MISUSE) from None
+
+
+def in_plain_words(message: str) -> str:
+    """What Typer says of a value that is none, without the parsing of strings."""
+    for said, here in _PLAINLY.items():
+        message = message.replace(said, here)
+    return message
 
 
 def _drop_output() -> None:
