@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gantrytau import did_you_mean
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.arguments.values import listed
+from gantrytau.commands.arguments.values import check_names, listed
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting, write_text
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import Dae
 
+FORMATS = ("text", "latex", "html", "modelica")
 SPELLING = Spelling(("translate",), {"given": "--given", "find": "--find"})
 
 
@@ -25,8 +27,8 @@ def equations(
         str,
         typer.Option(
             "--format",
-            metavar="text|latex|html|modelica",
-            autocompletion=words("text", "latex", "html", "modelica"),
+            metavar="|".join(FORMATS),
+            autocompletion=words(*FORMATS),
             help="How to write them.",
         ),
     ] = "text",
@@ -63,7 +65,7 @@ def equations(
     are inverse kinematics. With --find, only what it needs is written (modelica: always all). Derivatives are called
     der(x). With --c the same becomes a C function.
     """
-    from gantrytau import translate
+    from gantrytau import flatten, translate
 
     with reporting(json, source_of(model), SPELLING):
         known, wanted = listed(given), listed(find)
@@ -73,7 +75,12 @@ def equations(
             raise CommandError(
                 "--c: a function needs arguments and results, as --given tool.r --find carts[0].s"
             )
+        if format not in FORMATS:
+            raise CommandError(f"--format {format}: found no such format{did_you_mean(format, FORMATS)}")
         chosen = build(model, prototype, set_ or ())
+        flat = flatten(chosen.model)
+        check_names("--given", known, flat.expand)
+        check_names("--find", wanted, flat.expand)
         with busy(f"translating {chosen.name}"):
             if c:
                 text = _c_code(chosen, known, wanted, jacobian, forward, reverse)

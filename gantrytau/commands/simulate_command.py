@@ -20,7 +20,7 @@ from gantrytau.commands.arguments.options import (
     Settings,
     To,
 )
-from gantrytau.commands.arguments.values import listed, signal
+from gantrytau.commands.arguments.values import check_names, listed, signal
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import as_json, busy, noted, reporting
 from gantrytau.commands.printing.spelling import Spelling
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gantrytau import Dae, Result
 
 SPELLING = Spelling(
-    ("simulate",),
+    ("simulate", "inputs"),
     {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs", "seed")}
     | {"inputs": "--input", "parameters": "--set", "max_step": "--max-step"},
 )
@@ -69,7 +69,7 @@ def simulate(
         result_output.rehearse(output)
         place = picture_output.place(drawn, to)
         chosen = build(model, prototype, set_ or ())
-        dae = _translated(chosen, (*drawn, *kept))
+        dae = _translated(chosen, drawn, kept, signals)
         check_display(units, dae.flat, drawn)
         policy = dict(
             stop=stop, start=start, tolerance=tolerance, points=points, max_step=max_step, seed=seed
@@ -90,17 +90,18 @@ def simulate(
             _show(summary, dae, result, units)
 
 
-def _translated(chosen: Chosen, drawn: tuple[str, ...]) -> "Dae":
-    """The model with the derivatives that are to be drawn; ModelError for a name that it does not have."""
-    from gantrytau import translate
+def _translated(
+    chosen: Chosen, drawn: tuple[str, ...], kept: tuple[str, ...], signals: dict[str, Any]
+) -> "Dae":
+    """The model with the derivatives that are to be drawn; CommandError for a name that it does not have."""
+    from gantrytau import flatten, translate
 
     with busy(f"translating {chosen.name}"):
-        find = [name for name in drawn if name.startswith("der(")]
-        dae = translate(chosen.model, find=find, events=True)
-    for name in drawn:
-        if name not in dae.flat.friction_modes:
-            dae.expand(name)
-    return dae
+        flat = flatten(chosen.model)
+        for option, names in (("--plot", drawn), ("--outputs", kept), ("--input", signals)):
+            check_names(option, (n for n in names if n not in flat.friction_modes), flat.expand)
+        find = [name for name in (*drawn, *kept) if name.startswith("der(")]
+        return translate(chosen.model, find=find, events=True)
 
 
 def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":

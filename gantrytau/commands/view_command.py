@@ -9,14 +9,25 @@ from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.arguments.saved_results import read_result
-from gantrytau.commands.arguments.values import number, split
-from gantrytau.commands.printing.reporting import CommandError, as_json, busy, reporting, writable
+from gantrytau.commands.arguments.values import check_names, number, split
+from gantrytau.commands.printing.reporting import (
+    CommandError,
+    as_json,
+    busy,
+    reporting,
+    writable,
+    writable_place,
+)
 from gantrytau.commands.printing.spelling import Spelling
 
 if TYPE_CHECKING:
     from gantrytau import Dae
 
-SPELLING = Spelling(("view", "animate"), {"speed": "--speed", "pose": "--pose"})
+SPELLING = Spelling(
+    ("view", "animate"),
+    {"speed": "--speed", "pose": "--pose"},
+    exactly={"without outputs=[...]": "without --outputs"},
+)
 
 
 def view(
@@ -53,6 +64,7 @@ def view(
             raise CommandError(
                 "found --pose and --result, expected one of them; a motion has poses of its own"
             )
+        writable_place("--output", output, ".html", ".htm")
         motions = [read_result(file, "--result") for file in result or ()]
         values = {
             name: number("--pose", name, value) for name, value in (split("--pose", p) for p in pose or ())
@@ -61,6 +73,7 @@ def view(
         place = output or Path(f"{chosen.name}.html")
         with busy(f"translating {chosen.name}"):
             dae = _translated(chosen)
+        check_names("--pose", values, dae.expand)
         page = _page(dae, values, motions, speed)
         with writable(place):
             page.save(place)

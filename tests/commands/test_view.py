@@ -69,7 +69,7 @@ def test_the_motion_of_an_optimum_is_that_of_its_robot(run, tmp_path):
         (MISUSE, ["--pose", "tool.r"], "--pose tool.r: expected NAME=VALUE"),
         (MISUSE, ["--pose", "tool.r=near"], "--pose tool.r=near: expected a number"),
         (FAULT, ["--pose", "tool.r=[50, 3, -0.6]"], "GantryTau"),
-        (FAULT, ["--pose", "tol.r=[0.5, 3, -0.6]"], "did you mean"),
+        (MISUSE, ["--pose", "tol.r=[0.5, 3, -0.6]"], "did you mean"),
         (MISUSE, ["--result", "none.csv"], "--result none.csv: there is no such file"),
         (MISUSE, ["--result", "motion.txt"], "--result motion.txt: found the suffix '.txt'"),
         (MISUSE, ["--result", "a.csv", "--pose", "tool.r=[0.5, 3, -0.6]"], "found --pose and --result"),

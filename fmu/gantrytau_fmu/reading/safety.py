@@ -192,8 +192,8 @@ def _opened(path: Path, what: str) -> Iterator[zipfile.ZipFile]:
             raise ModelError(_too_large(path, size))
         if not zipfile.is_zipfile(file) and not _MAGIC.startswith(head := _head(file)):
             raise ModelError(
-                f"{path}: found the beginning {head!r}, expected {_MAGIC!r}: this is no ZIP archive, so no {what}; "
-                "check that it is the right file"
+                f"{path}: found the beginning '{_shown(head)}', expected '{_shown(_MAGIC)}': this is no ZIP "
+                f"archive, so no {what}; check that it is the right file"
             )
         with _translated(path, "directory"):
             archive = zipfile.ZipFile(file)
@@ -371,3 +371,8 @@ def _empty(folder: Path, keep: bool) -> None:
             entry.unlink(missing_ok=True)
     if not keep:
         folder.rmdir()
+
+
+def _shown(head: bytes) -> str:
+    """Bytes as letters, others as their numbers."""
+    return repr(head)[2:-1]

@@ -14,6 +14,7 @@ SPELLING = Spelling(
     {name: f"--{name}" for name in ("elements", "points", "scheme", "tolerance", "refine", "starts", "guess")}
     | {"max_iterations": "--max-iterations", "max_time": "--max-time"},
     exactly={
+        ", or write guess={'component': solution} with the component that it is of": "",
         "What was reached so far is in .optimum.": "",
         "look at .optimum": "look at what --save keeps",
     },

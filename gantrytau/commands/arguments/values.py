@@ -2,8 +2,9 @@
 
 import ast
 import csv
+import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -108,8 +109,23 @@ def _called(text: str, value: str) -> InputSignal:
         )
     try:
         return getattr(gantrytau, call.func.id)(*arguments, **keywords)
-    except TypeError as error:
-        raise CommandError(f"--input {text}: {error}; see help(gantrytau.{call.func.id})") from None
+    except TypeError as error:  # too few, too many or unknown ones
+        raise CommandError(f"--input {text}: expected {_usage(call.func.id)}") from error
+
+
+def _usage(name: str) -> str:
+    """A signal with what it takes, as `prbs(bits, hold, amplitude=1.0)`; what has a value may be left out."""
+    parameters = inspect.signature(getattr(gantrytau, name)).parameters.values()
+    words = [p.name if p.default in (p.empty, None) else f"{p.name}={p.default!r}" for p in parameters]
+    needed = [p.name for p in parameters if p.default is p.empty]
+    return f"{name}({', '.join(words)}), with at least {' and '.join(needed)}"
+
+
+def check_names(option: str, names: Iterable[str], expand: Callable[[str], Any]) -> None:
+    """CommandError that names the option for a name that a model does not have; expand: knows its names."""
+    for name in names:
+        with refusing(f"{option} {name}: "):
+            expand(name)
 
 
 def _kept(text: str, make: Callable[[], Any]) -> Any:

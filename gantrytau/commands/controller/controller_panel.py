@@ -14,7 +14,7 @@ SPELLING = Spelling(("controller",), {"token": "--token", "port": "--web"})
 
 
 def panel(
-    port: Annotated[int, typer.Option(help="Port of the controller.")],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the controller.")],
     host: Annotated[str, typer.Option(help="Where it runs.")] = "127.0.0.1",
     token: Annotated[
         str, typer.Option(help="Of the controller; without it one may only look.", envvar="GANTRYTAU_TOKEN")

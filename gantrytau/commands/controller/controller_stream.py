@@ -16,7 +16,7 @@ def stream(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="CSV, as learning control writes corrections.")
     ],
-    port: Annotated[int, typer.Option(help="Port of the controller.")],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the controller.")],
     host: Annotated[str, typer.Option(help="Where it runs.")] = "127.0.0.1",
     name: Annotated[str, typer.Option(help="Its place at the controller.")] = "stream",
     at_end: Annotated[str, typer.Option(help="hold the last row, or stop.")] = "hold",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau import did_you_mean
+from gantrytau import did_you_mean, flatten
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
-from gantrytau.commands.arguments.values import listed
+from gantrytau.commands.arguments.values import check_names, listed
 from gantrytau.commands.fmu import export_options
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting
@@ -73,6 +73,9 @@ def export(
             "experiment": _experiment(stop, step, tolerance),
         }
         chosen = build(model, prototype, set_ or ())
+        flat = flatten(chosen.model)
+        for option in ("given", "find", "states"):
+            check_names(f"--{option}", policy[option] or (), flat.expand)
         file = to or Path(f"{chosen.name}.fmu")
         _check(file)
         begin = time.perf_counter()

@@ -206,14 +206,14 @@ def writable_place(option: str, file: Path | None, *suffixes: str) -> None:
     """CommandError, before the work, for a file of another suffix or in a folder that is not there; None is none."""
     if file is None:
         return
+    if file.is_dir():
+        raise CommandError(f"{option} {file} is a folder, expected the name of a file in it")
     if file.suffix.lower() not in suffixes:
         raise CommandError(
             f"{option} {file}: found the suffix '{file.suffix}', expected {' or '.join(suffixes)}"
         )
     if not file.absolute().parent.is_dir():
         raise CommandError(f"{option} {file}: the folder '{file.parent}' does not exist; create it first")
-    if file.is_dir():
-        raise CommandError(f"{option} {file}: found a folder, expected the name of a file in it")
 
 
 @contextmanager

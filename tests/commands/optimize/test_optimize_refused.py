@@ -132,7 +132,7 @@ def test_a_guess_of_another_model(fails, move, tmp_path):
     file = tmp_path / "a.csv"
     file.write_text("time [s],x\n0,1\n1,1\n")
     assert "the given solution has no variable of the problem" in fails(
-        FAULT, "optimize", move, "--guess", file
+        MISUSE, "optimize", move, "--guess", file
     )
 
 

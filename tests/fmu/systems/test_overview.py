@@ -117,7 +117,7 @@ def test_files_that_are_no_systems(tmp_path):
     file = tmp_path / "page.ssp"
     file.write_text("<html>")
     assert [str(finding) for finding in check_system(file)] == [
-        f"{file}: error: found the beginning b'<h', expected b'PK': this is no ZIP archive, so no SSP; "
+        f"{file}: error: found the beginning '<h', expected 'PK': this is no ZIP archive, so no SSP; "
         "check that it is the right file"
     ]
     assert command("info", file).exit_code == FAULT

@@ -141,7 +141,7 @@ def test_files_that_cannot_be_run(lag, tmp_path):
         page = run(tmp_path / name, "--stop", 1)
         assert page.exit_code == FAULT
         assert (
-            f"{name}: found the beginning b'<h', expected b'PK': this is no ZIP archive, so no {kind}; check"
+            f"{name}: found the beginning '<h', expected 'PK': this is no ZIP archive, so no {kind}; check"
             in page.output
         )
     path = write_ssp(tmp_path / "one.ssp", {"a": lag}, [], stop=1.0, step=0.1)
