@@ -20,6 +20,7 @@ from gantrytau.language.model import (
     check_member,
     refuse_container,
 )
+from gantrytau.language.scales import shape_of
 from gantrytau.language.symbols import Symbols, element_names, time
 
 ATTRIBUTES = (
@@ -271,8 +272,8 @@ def _shape(
         and "value" in attributes
     ):
         value = attributes["value"].value
-        if isinstance(value, (int, float, list, tuple, np.ndarray)):
-            shape = np.shape(value)
+        if isinstance(value, (int, float, str, list, tuple, np.ndarray)):
+            shape = shape_of(value)
     if isinstance(shape, (int, np.integer)):
         shape = (int(shape),)
     if not isinstance(shape, tuple) or len(shape) > 2 or any(not isinstance(n, int) or n < 1 for n in shape):

@@ -14,6 +14,7 @@ import numpy as np
 
 from gantrytau.describing.short_values import short
 from gantrytau.errors import ModelError
+from gantrytau.language.scales import shape_of
 
 Component = TypeVar("Component")
 
@@ -308,7 +309,7 @@ class Parameter(Quantity):
         assumed: str = "",
     ):
         if shape is None:
-            shape = () if value is None or callable(value) or isinstance(value, Formula) else np.shape(value)
+            shape = () if value is None or callable(value) or isinstance(value, Formula) else shape_of(value)
         words: dict[str, Any] = dict(unit=unit, display=display, description=description)
         super().__init__(shape, **words, min=min, max=max, nominal=nominal)
         self.value = value

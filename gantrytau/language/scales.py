@@ -294,6 +294,17 @@ def given(place: str, value: Any, unit: str | None) -> Any:
     return value
 
 
+def shape_of(value: Any) -> tuple[int, ...]:
+    """The shape of a value, of the vector in a text "[1, 2, 3] mm" too; () of a text that is none."""
+    if isinstance(value, str):
+        match = _VALUE.fullmatch(value)
+        try:
+            return np.shape(ast.literal_eval(match["number"])) if match else ()
+        except (ValueError, SyntaxError):
+            return ()
+    return np.shape(value)
+
+
 def _holds_text(value: Iterable[Any]) -> bool:
     return any(isinstance(x, str) or (isinstance(x, (list, tuple)) and _holds_text(x)) for x in value)
 

@@ -226,3 +226,18 @@ def test_studies_vary_values_with_units():
         study(Swing(), over={"L": ["500 mm", "1 s"]}, stop=0.1)
     with pytest.raises(ModelError, match="study: over: phi: found '1 s', a time"):
         study(Swing(), over={"phi": ["1 s"]}, stop=0.1)
+
+
+def test_texts_of_vectors_have_their_shape():
+    class Plate(Model):
+        """Places on a plate."""
+
+        r = Parameter("[1, 2, 3] mm", unit="m", description="place")
+        holes = Parameter(unit="m", description="places of two holes")
+
+        def equations(self):
+            yield from ()
+
+    flat = flatten(Plate(holes="[[1, 2], [3, 4]] mm"))
+    assert (flat.shape("r"), flat.shape("holes")) == ((3,), (2, 2))
+    assert [float(x) for x in flat.vectors["r"].value] == [0.001, 0.002, 0.003]  # pyright: ignore[reportAttributeAccessIssue]
