@@ -124,7 +124,7 @@ def test_a_member_that_cannot_be(members: dict[str, Any], words: str):
         ({"mass.x": [1.0, 2.0]}, "guess mass.x: found 2 values, expected 1"),
         ({"mass.x": math.nan}, "guess mass.x: found values that are not finite"),
         ({"mass.x": lambda t: [t, t]}, "guess mass.x: found 2 values, expected 1"),
-        ({"mass.x": "far"}, "guess mass.x: ValueError: could not convert"),
+        ({"mass.x": "far"}, "guess mass.x: found 'far', expected a number and its unit"),
         ({"mass.x": lambda t: 1 / 0}, "guess mass.x: ZeroDivisionError"),
         ({"final_time": math.nan}, "guess final_time: found nan, expected a finite number"),
         ({"final_time": "long"}, "guess final_time: found 'long', expected a number"),
