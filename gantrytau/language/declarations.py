@@ -178,7 +178,9 @@ class Quantity(Formula):
         """As it is declared, without what is left open: `Real(3, unit='m', description='position')`."""
         shape = self.declared_shape
         first = [short(shape)] if shape != () and not callable(shape) else []
-        return self._declared(first, ("unit", "start", "fixed", "min", "max", "nominal", "description"))
+        return self._declared(
+            first, ("unit", "start", "fixed", "min", "max", "nominal", "description", "display")
+        )
 
     def _declared(self, first: list[str], names: tuple[str, ...]) -> str:
         told = {name: getattr(self, name, None) for name in names}
@@ -260,7 +262,9 @@ class Discrete(Quantity):
         super().__init__(shape, unit=unit, display=display, description=description, start=start, **limits)
 
     def __repr__(self) -> str:
-        return self._declared([short(self.start)], ("unit", "min", "max", "nominal", "description"))
+        return self._declared(
+            [short(self.start)], ("unit", "min", "max", "nominal", "description", "display")
+        )
 
 
 class Flow(Quantity):
@@ -318,7 +322,7 @@ class Parameter(Quantity):
 
     def __repr__(self) -> str:
         first = [] if self.value is None else [short(self.value)]
-        return self._declared(first, ("unit", "min", "max", "nominal", "description"))
+        return self._declared(first, ("unit", "min", "max", "nominal", "description", "display"))
 
 
 class Array(Generic[Component]):
