@@ -68,7 +68,7 @@ def thesis_page() -> str:
     for kind, title in (("figure", "Figures"), ("table", "Tables")):
         held = [one for one in items() if one.kind == kind]
         made = sum(bool(one.call) for one in held)
-        text += f"\n## {title}\n\nOf {len(held)}, {made} are made here.\n\n"
+        text += f"\n## {title}\n\nOf {len(held)} whose numbers are known here, {made} are made.\n\n"
         for chapter in dict.fromkeys(one.number.partition(".")[0] for one in held):
             rows = list(_rows([one for one in held if one.number.startswith(f"{chapter}.")]))
             text += f"### {title} of chapter {chapter}\n\n{table('', ('', 'what', 'call', 'see'), rows)}\n\n"
