@@ -109,7 +109,7 @@ def test_sizes_of_none_one_and_many():
     many = np.hstack(function(r))
     assert np.isnan(many[17]).all()
     assert np.isfinite(np.delete(many, 17, axis=0)).all()
-    for count in (1, 2, 255, 256, 513):
+    for count in (1, 2, 255, 256, 2049):
         np.testing.assert_allclose(np.hstack(function(r[:count])), many[:count], atol=1e-13)
 
 
