@@ -140,7 +140,7 @@ class Kinematics(Record):
             )
         return answered(at.one, solved(matrix, np.broadcast_to(np.eye(matrix.shape[1]), matrix.shape)))[0]
 
-    def variables(self, names: Sequence[str], r: Any, R: Any = None) -> list[np.ndarray]:
+    def variables(self, names: str | Sequence[str], r: Any, R: Any = None) -> list[np.ndarray]:
         """Values of other variables of the model in poses, such as angles of passive joints, (N, k) each; (k,) for one pose.
 
         Raises ModelError for robots that are computed by their rods: ask `ball_joint_angles`.
@@ -151,7 +151,8 @@ class Kinematics(Record):
                 f"Kinematics.variables: found {self.dae.name}, which answers by its rods alone, expected a robot "
                 "through its equations; use ball_joint_angles, or dae.array_function"
             )
-        return list(answered(at.one, *self._solver.variables(tuple(names), at.r, at.R)))
+        wanted = (names,) if isinstance(names, str) else tuple(names)
+        return list(answered(at.one, *self._solver.variables(wanted, at.r, at.R))) if wanted else []
 
     def orientation(self, r: Any) -> np.ndarray:
         """The orientation that follows from positions, (N, 3, 3), of a robot whose joints do not choose it."""

@@ -68,9 +68,7 @@ class ModelFunctions:
             found[:, :, 3:] = (
                 slopes[:, :, len(moved) :] @ _turns_of_quaternions(R)[:, places[places >= 3] - 3]
             )
-        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
-            found[np.isnan(self.ik(r, R)[0]).any(axis=1)] = np.nan
-        return found
+        return self._in_reach(found, r, R)
 
     def rates(self, r, R=None):
         """Velocity of the tool by rates of the joints, (N, 3, n); with R its angular velocity too, (N, 6, n)."""
@@ -81,7 +79,7 @@ class ModelFunctions:
             return by_joints
         moves = self._following.slopes(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
         if R is None:  # as then the joints do not choose it
-            return moves[:, :3] @ by_joints
+            return self._in_reach(moves[:, :3] @ by_joints, r, R)
         if count == 6:
             turns = np.zeros((len(x), 6, 6))
             turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
@@ -90,7 +88,7 @@ class ModelFunctions:
             moves[:, 3:].reshape(len(x), 3, 3, count).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
         )
         spins = np.stack([spins[:, :, i, j] for i, j in SPIN], axis=1)
-        return np.concatenate([moves[:, :3], spins], axis=1) @ by_joints
+        return self._in_reach(np.concatenate([moves[:, :3], spins], axis=1) @ by_joints, r, R)
 
     def whole_pose(self, r, R=None):
         """The pose with the orientation that follows where none is given."""
@@ -98,7 +96,14 @@ class ModelFunctions:
 
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each, matrices column after column."""
-        return self.dae.array_function(self._given, names)(*self._arguments(self._coordinates(r, R)))
+        found = self.dae.array_function(self._given, names)(*self._arguments(self._coordinates(r, R)))
+        return [self._in_reach(each, r, R) for each in found]
+
+    def _in_reach(self, found: np.ndarray, r, R) -> np.ndarray:
+        """The same, NaN where the rest of a pose is not what its coordinates make it."""
+        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
+            found[np.isnan(self.ik(r, R)[0]).any(axis=1)] = np.nan
+        return found
 
     @property
     def turning(self) -> bool:

@@ -146,6 +146,16 @@ def test_rates_beside_differences_of_the_forward_kinematics(make):
         np.testing.assert_allclose(rates[:, :3, k], slope, atol=1e-6)
 
 
+def test_variables_and_rates_beside_the_plane_are_nan(bars):
+    beside = np.array([[0.0, 0.5, 0.0], [0.0, 0.5, 0.1], [0.0, 0.5, np.nan]])
+    (elbow,) = bars.variables("elbows[0].phi", beside)
+    distance = np.hypot(GROUND / 2, 0.5)
+    bend = np.arccos((distance**2 - CRANK**2 - COUPLER**2) / (2 * CRANK * COUPLER))
+    np.testing.assert_allclose(elbow[:, 0], [-bend, np.nan, np.nan], atol=1e-12)
+    assert np.isnan(bars.rates(beside)).all(axis=(1, 2)).tolist() == [False, True, True]
+    assert bars.variables([], beside) == []
+
+
 def test_rates_of_robots_on_rods_and_of_six_joints():
     three = Kinematics(GantryTau(prototypes.L1))
     np.testing.assert_allclose(
