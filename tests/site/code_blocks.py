@@ -289,7 +289,8 @@ def check_page(file: Path, *, write: bool = False) -> Page:
     if write:
         file.write_text(page.mended, encoding="utf-8")
     elif page.faults or page.unlike:
-        raise PageError(f"{file}: " + "\n".join(page.unlike + page.faults))
+        remedy = f"\n`python -m tests.site.code_blocks {file}` writes what is printed into the page; then read it again"
+        raise PageError(f"{file}: " + "\n".join(page.unlike + page.faults) + remedy)
     return page
 
 
