@@ -192,7 +192,7 @@ def _opened(path: Path, what: str) -> Iterator[zipfile.ZipFile]:
             raise ModelError(_too_large(path, size))
         if not zipfile.is_zipfile(file) and not _MAGIC.startswith(head := _head(file)):
             raise ModelError(
-                f"{path}: found the beginning '{_shown(head)}', expected '{_shown(_MAGIC)}': this is no ZIP "
+                f"{path}: found the beginning '{_letters(head)}', expected '{_letters(_MAGIC)}': this is no ZIP "
                 f"archive, so no {what}; check that it is the right file"
             )
         with _translated(path, "directory"):
@@ -373,6 +373,6 @@ def _empty(folder: Path, keep: bool) -> None:
         folder.rmdir()
 
 
-def _shown(head: bytes) -> str:
+def _letters(head: bytes) -> str:
     """Bytes as letters, others as their numbers."""
     return repr(head)[2:-1]
