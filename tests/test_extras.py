@@ -38,6 +38,10 @@ PROGRAMS = {  # used by name, not imported
     "basedpyright": "Makefile",
     "ruff": "Makefile",
     "pytest-xdist": "Makefile",
+    "furo": "notebooks/site/conf.py",
+    "ipykernel": "Makefile",
+    "myst-nb": "notebooks/site/conf.py",
+    "sphinx": "Makefile",
     "ziglang": "fmu/gantrytau_fmu/building/compile_libraries.py",
 }
 LOADED = {"tbb": "ecospy"}  # a library that another distribution loads: named in pyproject.toml as such
@@ -115,7 +119,13 @@ PAIRS = [(extra, name) for extra, names in EXTRAS.items() for name in sorted(nam
 def test_what_an_extra_installs_is_used(extra, distribution, used, used_by_tests):
     if distribution in PROGRAMS:
         text = (ROOT / PROGRAMS[distribution]).read_text(encoding="utf-8")
-        assert ("-n auto" if distribution == "pytest-xdist" else distribution) in text
+        words = {
+            "pytest-xdist": "-n auto",
+            "myst-nb": "myst_nb",
+            "sphinx": "docs",
+            "ipykernel": "docs",
+        }  # it builds pages
+        assert words.get(distribution, distribution) in text
         return
     distribution = LOADED.get(distribution, distribution)
     if not modules_of(distribution):
@@ -165,6 +175,8 @@ WITHOUT = [  # module that is missing, the extra that has it, and a call that ne
     ("h5py", *STUDY),
     ("xarray", *READ),
     ("h5netcdf", *READ),
+    ("pandas", "results", lambda: Result([0.0, 1.0], {"x": [1.0, 2.0]}).to_pandas()),
+    ("pandas", "results", lambda: study(size, over={"x": [1.0]}).to_pandas()),
     ("pyarrow", "results", lambda: Result([0.0, 1.0], {"x": [1.0, 2.0]}).save("a.parquet")),
     ("viser", "view", lambda: view(Pendulum())),
     ("trimesh", "view", lambda: view(Meshed())),
