@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,7 +14,7 @@ from gantrytau.commands.arguments import model_choice
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.loading import similar
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import CommandError, as_json, reporting
+from gantrytau.commands.printing.reporting import CommandError, as_json, note, reporting
 
 
 def library(json: Json = False) -> None:
@@ -39,8 +40,8 @@ def describe(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="a component or a model of the library, as Revolute; one of your own, as robot.py:Robot; with values, as "
-            "'GantryTau(L1)'.",
+            help="a component or a model of the library, as Revolute, or multibody.Fixed where others have "
+            "its name; one of your own, as robot.py:Robot; with values, as 'GantryTau(L1)'.",
         ),
     ],
     name: Annotated[
@@ -55,21 +56,36 @@ def describe(
     with reporting(json, source_of(what)):
         said = described(_found(what), name)
         typer.echo(as_json(said.as_mapping()) if json else str(said))
+        if others := _others(what):
+            note(f"Of the same name: {', '.join(others)}")
 
 
 def _found(what: str) -> Any:
-    """The class of a name of the library, or a model as other commands take it."""
-    known = {name: cls for classes in component_classes().values() for name, cls in classes.items()}
-    known |= model_choice.library()
-    last = what.rpartition(".")[2] if what.startswith("gantrytau") else what
-    if last in known:
+    """The class of a name of the library, with its module or without, or a model as other commands take it."""
+    held = component_classes()
+    known = {name: cls for classes in held.values() for name, cls in classes.items()} | model_choice.library()
+    module, _, last = what.rpartition(".")
+    for path, classes in held.items():
+        if module and last in classes and f".{path}".endswith(f".{module}"):
+            return classes[last]
+    if last in known and (not module or module.startswith("gantrytau")):
         return known[last]
-    if last.isidentifier():
+    if what.replace(".", "_").isidentifier() and not Path(what).exists():
         raise CommandError(
             f"{what}: the library has nothing of this name{similar(what, known)}\n`gantrytau library` lists what it holds; "
             "a model of your own is named by its file, as robot.py:Robot"
         )
     return model_choice.build(what).model
+
+
+def _others(what: str) -> list[str]:
+    """Components that a name without a module means as well, each with its module; none where it means one only."""
+    found = [
+        f"{path.rpartition('.')[2]}.{what}"
+        for path, classes in component_classes().items()
+        if what in classes
+    ]
+    return found if len(found) > 1 else []
 
 
 def components() -> dict[str, dict[str, str]]:

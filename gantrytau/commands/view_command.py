@@ -57,7 +57,7 @@ def view(
 ) -> None:
     """Write a page that shows a model in a pose or in motion, in any browser and without a network.
 
-    It needs the extra `view`: pip install 'gantrytau[view]'.
+    It needs the extra `view`; `gantrytau doctor` says whether that is there, and how to get it.
     """
     with reporting(json, source_of(model), SPELLING):
         if pose and result:

@@ -74,6 +74,28 @@ def test_components_and_models_are_described(run, answer):
     assert answer("describe", "GantryTau(D1)", "tool.r")["Attributes"][1] == {"name": "unit", "value": "m"}
 
 
+def test_components_of_one_name_are_told_apart_by_their_modules(run, answer, fails):
+    for module in ("translational", "rotational", "multibody"):
+        assert answer("describe", f"{module}.Fixed")["kind"].startswith(
+            f"model of gantrytau.mechanics.{module}"
+        )
+    said = run("describe", "Fixed")
+    assert "multibody.Fixed" in said.stderr
+    assert "rotational.Fixed" in said.stderr
+    assert "Of the same name" not in run("describe", "Revolute").stderr
+    assert "the library has nothing of this name" in fails(2, "describe", "multibody.Revolut")
+    assert "the library has nothing of this name" in fails(2, "describe", "rotational.Revolute")
+
+
+def test_units_that_are_shown_are_told_beside_those_of_numbers(answer):
+    assert answer("describe", "Revolute")["shown in"].startswith(
+        "deg for rad, deg/s for rad/s; a number that you give is in SI"
+    )
+    rows = {row["name"]: row["value"] for row in answer("describe", "Revolute", "phi")["Attributes"]}
+    assert (rows["unit"], rows["unit of numbers in models"]) == ("deg", "rad")
+    assert "shown in" not in answer("describe", "Spring")
+
+
 def test_models_of_a_file_are_described(answer, robots):
     assert answer("describe", f"{robots}:Runaway")["title"] == "Runaway"
 

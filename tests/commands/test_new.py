@@ -20,7 +20,9 @@ def project(tmp_path_factory):
     folder = tmp_path_factory.mktemp("new") / "my_first-robot"
     found = _python(folder.parent, "-m", "gantrytau.cli", "new", "robot", folder.name)
     assert found.returncode == 0, found.stderr
-    assert f"cd {folder.name} && gantrytau check robot.py" in found.stdout
+    (named,) = re.findall(rf"cd {folder.name} && gantrytau (check .*);", found.stdout)
+    checked = _python(folder, "-m", "gantrytau.cli", *named.split())
+    assert checked.stdout.startswith("FiveBar: "), checked.stderr
     return folder
 
 

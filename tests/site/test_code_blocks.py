@@ -8,6 +8,10 @@ import pytest
 from tests.site.code_blocks import PageError, blocks, check_page, same
 
 SITE = Path(__file__).parents[2] / "notebooks" / "site"
+MADE = {
+    "reference",
+    "messages",
+}  # folders that are written when the site is built, which finds broken links itself
 PAGES = [page for page in sorted(SITE.rglob("*.md")) if blocks(page.read_text(encoding="utf-8"))]
 
 
@@ -31,7 +35,9 @@ def test_pages_stand_in_the_contents_and_links_arrive(folder):
     assert pages == {index.resolve(), *listed(index)}
     for page in pages:
         for link in re.findall(r"\]\(([^)#: ]+\.\w+)[)#]", page.read_text(encoding="utf-8")):
-            assert (page.parent / link).exists(), f"{page.name} leads to {link}"
+            target = (page.parent / link).resolve()
+            made = target.is_relative_to(SITE) and target.relative_to(SITE).parts[0] in MADE
+            assert made or target.exists(), f"{page.name} leads to {link}"
 
 
 HOLDS = """\

@@ -41,7 +41,7 @@ def robot(
             typer.echo(as_json({"folder": str(folder), "files": [str(file) for file in written]}))
             return
         typer.echo(f"Written: {', '.join(str(file) for file in written)}")
-        typer.echo(f"Next: cd {folder} && gantrytau check robot.py; README.md has more commands")
+        typer.echo(f"Next: cd {folder} && gantrytau check robot.py:FiveBar; README.md has more commands")
 
 
 def _make(folder: Path) -> None:

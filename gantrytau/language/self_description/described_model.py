@@ -112,7 +112,22 @@ def _of_part(part: PlacedPart, title: str) -> Description:
         [*_quantities(part), *_components(part), *_settings_of(part)],
         key=lambda rows: ORDER.index(rows.heading),
     )
-    return Description(title, said, first_sentence(kind.__doc__), tuple(_inherited(kind)), tuple(tables))
+    return Description(
+        title, said, first_sentence(kind.__doc__), (*_inherited(kind), *_in_si(part)), tuple(tables)
+    )
+
+
+def _in_si(part: PlacedPart) -> Iterator[tuple[str, str]]:
+    """That numbers of a model are in SI, if what is shown is not."""
+    members = [
+        m for m in part.members.values() if isinstance(m, Quantity) and m.display and m.display != m.unit
+    ]
+    if members:
+        units = dict.fromkeys(f"{m.display} for {m.unit}" for m in members)
+        yield (
+            "shown in",
+            f"{', '.join(units)}; a number that you give is in SI, or a text: '30 {members[0].display}'",
+        )
 
 
 def _inherited(kind: Any) -> Iterator[tuple[str, str]]:
@@ -205,6 +220,7 @@ def _of_quantity(part: PlacedPart, name: str) -> Description:
     member: Any = part.members[name]
     rows = [("shape", str(_shape(member)))] if _shape(member) else []
     rows += [("unit", member.display or member.unit)] if member.unit else []
+    rows += [("unit of numbers in models", member.unit)] if member.display not in (None, member.unit) else []
     if isinstance(member, Parameter):
         rows.append(("value", _shown(member, part.value(name))))
     for key in ATTRIBUTES:
