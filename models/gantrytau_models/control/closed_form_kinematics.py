@@ -40,7 +40,8 @@ class ThreeLink(Model):
     def __init__(self, prototype: Prototype, **modifications):
         if not isinstance(prototype, Prototype):
             raise ModelError(
-                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1"
+                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1, "
+                "of `from gantrytau_models import prototypes`"
             )
         super().__init__(self._defaults(prototype), **modifications)
 

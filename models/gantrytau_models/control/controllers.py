@@ -53,7 +53,8 @@ class Controller(Model):
     def __init__(self, prototype: Prototype, *, start: Sequence[float] | None = None, **modifications: Any):
         if not isinstance(prototype, Prototype):
             raise ModelError(
-                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1"
+                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1, "
+                "of `from gantrytau_models import prototypes`"
             )
         tool = tool_ahead_of_carts(prototype) if start is None else start
         super().__init__(self._defaults(prototype, tool), **modifications)

@@ -191,7 +191,8 @@ def driven_carts(
     """Modifications of the carts of a robot; ModelError for what is no such record or no friction."""
     if not isinstance(prototype, record):
         raise WrongRecord(
-            f"{robot}: found {in_words(prototype)}, expected a prototype record such as prototypes.L1"
+            f"{robot}: found {in_words(prototype)}, expected a prototype record such as prototypes.L1, "
+            "of `from gantrytau_models import prototypes`"
         )
     if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
         raise WrongRecord(

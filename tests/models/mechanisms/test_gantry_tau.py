@@ -389,5 +389,8 @@ def test_rods_that_cannot_meet_are_named_when_translated():
 
 
 def test_what_is_not_a_prototype_is_refused():
-    with pytest.raises((TypeError, ModelError), match=r"found 'L1', expected a prototype record"):
+    with pytest.raises(
+        (TypeError, ModelError),
+        match=r"found 'L1', expected a prototype record such as prototypes.L1, of `from gantrytau_models import",
+    ):
         GantryTau("L1")  # pyright: ignore[reportArgumentType]
