@@ -125,7 +125,7 @@ def test_what_an_extra_installs_is_used(extra, distribution, used, used_by_tests
             "sphinx": "docs",
             "ipykernel": "docs",
         }  # it builds pages
-        assert words.get(distribution, distribution) in text
+        assert words.get(str(distribution), str(distribution)) in text
         return
     distribution = LOADED.get(distribution, distribution)
     if not modules_of(distribution):

@@ -80,6 +80,8 @@ def finished(figure: "Figure", file: str | os.PathLike[str] | None) -> "Figure":
     """The figure, saved to `file` if one is named; where there is no window for it, it belongs to its caller alone."""
     import matplotlib.pyplot as plt
 
+    if any(axes.get_aspect() != "auto" for axes in figure.axes):
+        figure.draw_without_rendering()  # the layout of a first drawing forgets what equal scales take
     if file is not None:
         with replacing(file) as partial:
             figure.savefig(partial, dpi=150)
