@@ -32,6 +32,8 @@ def test_titles_of_axes_with_equal_scales_are_whole():
     axes.set_aspect("equal")
     axes.set_title("a title")
     axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.set(xlim=(-0.8, 0.8), ylim=(0.0, 0.8))
     figure.legend(loc="outside lower center")
     canvas = FigureCanvasAgg(finished(figure, None))
     canvas.draw()
