@@ -20,6 +20,7 @@ WANTED = 0.7  # of that
 CHANGES = (0.1, 4.0)  # of a step after a trial
 ALIKE = 1.5  # largest ratio of Jacobians before and after a step, pivot by pivot
 ROUNDING = 1e-12  # of the unknowns, a correction that is none
+NOTHING = 1e-300  # beside which no correction is compared: unknowns that are 0 and stay there
 
 
 def follow(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca.MX) -> tuple[ca.MX, ca.MX]:
@@ -95,8 +96,9 @@ def _trial(along: ca.Function, way: tuple[ca.DM, ca.DM], n: int) -> ca.Function:
     both = _solved(after, ca.horzcat(f, before))
     correction = -both[:, 0]
     usual = ca.sumsqr(step) + h**2 * ca.dot(reach, (end - begin) ** 2)
-    beside = ca.sumsqr(correction) / (usual * NEAR**2 + ca.sumsqr(z) * ROUNDING**2)
-    bend = ca.fmax(ca.sqrt(beside), _change(n)(both[:, 1:]) / np.log(ALIKE))  # grows as the step does
+    beside = ca.sumsqr(correction) / (usual * NEAR**2 + ca.sumsqr(z) * ROUNDING**2 + NOTHING)
+    corrected = ca.if_else(beside >= 0, ca.sqrt(beside), ca.inf)  # fmax would pass over NaN
+    bend = ca.fmax(corrected, _change(n)(both[:, 1:]) / np.log(ALIKE))  # grows as the step does
     good = bend <= 1
     h = h * ca.fmax(ca.fmin(WANTED / bend, CHANGES[1]), CHANGES[0])
     rest = left - state[1]

@@ -6,6 +6,7 @@ to assemble the mechanism, and are made exact there. Where there is no solution 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,11 +60,13 @@ def solved_one_by_one(
     before, solved, begin = ca.SX(0, 1), ca.MX(0, 1), start
     for number, part in enumerate(implicit):
         y = ca.vertcat(*part.block.tears)
-        known, values = ca.vertcat(q, before), ca.vertcat(here, solved)
+        every = ca.vertcat(q, before)
+        used = which_stand_in([part.residual, part.rows], every)
+        known, values, first = (picked(x, used) for x in (every, ca.vertcat(here, solved), begin))
         if part.block.scales is not None:
             found = _linear(part, part.block.scales, y, known, values)
         else:
-            found = _newton(f"newton{number}", part, y, known, (begin, values))
+            found = _newton(f"newton{number}", part, y, known, (first, values))
         solved, before, begin = (
             ca.vertcat(solved, found),
             ca.vertcat(before, y),
@@ -73,6 +76,17 @@ def solved_one_by_one(
     found = rest(here, solved)
     found = list(found) if isinstance(found, (tuple, list)) else [found]
     return ca.Function(name, x, found, list(inside), list(outside))
+
+
+def which_stand_in(expressions: Sequence[ca.SX], known: ca.SX) -> list[int]:
+    """Which of some symbols (k,) expressions hold: a block is not led astray by a NaN that does not matter for it."""
+    there = {leaf.name() for leaf in ca.symvar(ca.veccat(*expressions))}
+    return [k for k, leaf in enumerate(known.elements()) if leaf.name() in there]
+
+
+def picked(column: Any, used: list[int]) -> Any:
+    """Elements of a column, as a column even where there are none."""
+    return column[used] if used else type(column).zeros(0, 1)
 
 
 def _linear(part: Implicit, scales: Scales, y: ca.SX, known: ca.SX, values: ca.MX) -> ca.MX:

@@ -11,7 +11,15 @@ from gantrytau.answers.many_points.elimination import eliminated, order_of_pivot
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
 from gantrytau.answers.many_points.kept_unknowns import ReducedBranch, reduced
 from gantrytau.errors import ModelError, StructureError
-from gantrytau_models import DeltaRobot, FourBar, GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
+from gantrytau_models import (
+    DeltaRobot,
+    FiveBar,
+    FourBar,
+    GantryTau,
+    SixLinkGantryTau,
+    StewartPlatform,
+    prototypes,
+)
 from tests.answers.test_branches import Coupled, Cubic
 
 PHI = [f"arms[{i}].phi" for i in range(3)]
@@ -215,3 +223,62 @@ def test_elimination_beside_numpy():
         pivots = np.array(ca.evalf(pivots_in_order(ca.SX(matrix), order)))
         assert abs(pivots.prod()) == pytest.approx(abs(np.linalg.det(matrix)))
     assert order_of_pivots(np.ones((2, 2))) is None
+
+
+class Still(Model):
+    """Two unknowns that are 0 where the model starts."""
+
+    a, b = Input(start=0.0), Input(start=0.0)
+    x, y = Real(start=0.0), Real(start=0.0)
+
+    def equations(self):
+        yield self.a == self.x + 0.3 * sin(self.y + self.x)
+        yield self.b == self.y - 0.3 * sin(self.x)
+
+
+def test_the_start_itself_is_answered_where_unknowns_are_zero_there():
+    a = np.linspace(-1, 1, 301)
+    a[0] = 1e-300
+    assert a[150] == 0
+    x, y = (one.ravel() for one in translate(Still()).array_function(["a", "b"], ["x", "y"])(a, a))
+    assert x[150] == y[150] == 0
+    assert abs(x[0]) < 1e-299
+    assert np.abs(x + 0.3 * np.sin(x + y) - a).max() < 1e-14
+
+
+@pytest.mark.parametrize("count", [3, 300])
+def test_an_arm_out_of_reach_does_not_lead_the_other_one_astray(count):
+    beside = np.array([0.49, -0.45])  # for the second arm alone
+    where = beside + np.random.default_rng(0).uniform(-0.03, 0.03, (count, 2))
+    found = translate(FiveBar()).array_function(
+        ["tool.r[0]", "tool.r[1]"], ["cranks[0].phi", "cranks[1].phi"]
+    )
+    left, right = (one.ravel() for one in found(*where.T))
+    assert np.isnan(left).all()
+    # two circles about its pivot and about the tool meet in its elbow, which stays on the outer side
+    x, y = where[:, 0] - 0.1, where[:, 1]
+    d = np.hypot(x, y)
+    expected = np.arctan2(y, x) - np.arccos((d**2 + 0.3**2 - 0.4**2) / (2 * 0.3 * d))
+    there = d < 0.68
+    assert there.any()
+    assert np.abs(right - expected)[there].max() < 1e-12
+
+
+class Constant(Model):
+    """A block that nothing given stands in, before one."""
+
+    a = Input(start=0.0)
+    x, y, z = Real(start=0.5), Real(start=0.5), Real(start=0.0)
+
+    def equations(self):
+        yield self.x == 0.9 * cos(self.x + self.y)
+        yield self.y == 0.8 * cos(self.y - self.x)
+        yield self.a == self.z + 0.3 * sin(self.z)
+
+
+@pytest.mark.parametrize("count", [3, 300])
+def test_blocks_that_nothing_given_stands_in(count):
+    a = np.linspace(-1, 1, count)
+    x, y, z = (one.ravel() for one in translate(Constant()).array_function(["a"], ["x", "y", "z"])(a))
+    assert np.ptp(x) == 0
+    assert np.abs([x - 0.9 * np.cos(x + y), y - 0.8 * np.cos(y - x), z + 0.3 * np.sin(z) - a]).max() < 1e-14

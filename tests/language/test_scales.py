@@ -184,3 +184,10 @@ def test_headings_of_columns():
 )
 def test_units_of_derivatives(unit, order, rate):
     assert per_second(unit, order) == rate
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int16, np.int32, np.int64])
+def test_whole_numbers_of_few_bits_do_not_run_over(kind):
+    assert si(np.array([40, 100], dtype=kind), "kN").tolist() == [40e3, 100e3]
+    assert si(kind(100), "kWh") == 3.6e8
+    assert si(np.array([100], dtype=kind), "degC").tolist() == [373.15]

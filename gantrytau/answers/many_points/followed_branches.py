@@ -60,7 +60,7 @@ class FollowedBranch:
             left, h = way[:, on]
             both, sizes, pivots = trial(way[:, on], z[:, on], end[:, on])
             with np.errstate(all="ignore"):
-                beside = sizes[0] / (sizes[1] * one.NEAR**2 + sizes[2] * one.ROUNDING**2)
+                beside = sizes[0] / (sizes[1] * one.NEAR**2 + sizes[2] * one.ROUNDING**2 + one.NOTHING)
                 # NaN, as a singular matrix makes it, is no step that is accepted
                 bend = np.maximum(np.sqrt(beside), np.abs(np.log(pivots)).max(axis=0) / np.log(one.ALIKE))
                 bend = np.where(np.isnan(bend), np.inf, bend)

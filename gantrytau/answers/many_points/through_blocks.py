@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.function_through import Question, parted
-from gantrytau.answers.implicit_blocks import SINGULAR, linear_parts
+from gantrytau.answers.implicit_blocks import SINGULAR, linear_parts, picked, which_stand_in
 from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArrays
 from gantrytau.answers.many_points.elimination import solved
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
@@ -49,27 +49,28 @@ class ThroughBlocks:
         trusted = [] if careful else [m > 0 for m in margins if not m.is_constant()]
         q, tears = ca.vertcat(*question.arguments), ca.vertcat(ca.SX(0, 1), *blocks.tears)
         self._start = np.array(question.start()).ravel()
-        self._steps: list[Callable[[np.ndarray], np.ndarray]] = []
+        self._steps: list[tuple[list[int], Callable[[np.ndarray], np.ndarray]]] = []
         near = _around(self._start)
         before, place = ca.SX(0, 1), 0
         for block in blocks.implicit:
             begin, place = place, place + len(block.tears)
-            y, known = ca.vertcat(*block.tears), ca.vertcat(q, before)
-            residual = residuals[begin:place]
+            y, every, residual = ca.vertcat(*block.tears), ca.vertcat(q, before), residuals[begin:place]
+            used = which_stand_in([residual, extents[begin:place]], every)
+            known = picked(every, used)
             if switched([residual], {leaf.name() for leaf in y.elements()}).switches:
                 raise NotForArrays("equations that switch, in a block without closed form")
             if block.scales is not None:
                 parts = linear_parts(residual, extents[begin:place], block.scales, y, known)
-                self._steps.append(LinearSolution(parts))
+                step: Callable[[np.ndarray], np.ndarray] = LinearSolution(parts)
             else:
                 function = ca.Function("residual", [y, known], [residual], {"cse": True})
                 numbers = np.array([start[leaf.name()] for leaf in tears[:place].elements()])
-                branch = FollowedBranch(
-                    function, numbers[begin:], np.concatenate([self._start, numbers[:begin]])
-                )
-                self._steps.append(reduced(branch, branch(near)))
+                known_at_start = np.concatenate([self._start, numbers[:begin]])[used]
+                branch = FollowedBranch(function, numbers[begin:], known_at_start)
+                step = reduced(branch, branch(near[used]))
+            self._steps.append((used, step))
             before = ca.vertcat(before, y)
-            near = np.vstack([near, self._steps[-1](near)])
+            near = np.vstack([near, step(near[used])])
         everything = [q, tears]
         whole = [ca.densify(ca.vec(t)) for t in targets]
         holds = [reduce(ca.logic_and, trusted)] if trusted else [ca.SX(1)]
@@ -79,8 +80,8 @@ class ThroughBlocks:
     def tears(self, q: np.ndarray) -> np.ndarray:
         """Unknowns without closed form (n, N) of arguments (k, N)."""
         known = q
-        for step in self._steps:
-            known = np.vstack([known, step(known)])
+        for used, step in self._steps:
+            known = np.vstack([known, step(known[used])])
         return known[len(q) :]
 
     def targets(self, q: np.ndarray, tears: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
