@@ -58,7 +58,7 @@ def test_an_interrupt_ends_the_call_between_two_blocks(delta):
     timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        delta.ik(np.tile([0.0, 0.0, -9.0], (2000, 1)))
+        delta.ik(np.tile([0.0, 0.0, -9.0], (200_000, 1)))
     timer.join()
     assert np.isfinite(delta.ik(delta.home.r)).all()
 
