@@ -76,8 +76,8 @@ class Scale:
         return self._si(numbers)
 
     def _si(self, numbers: Any) -> Any:
-        if isinstance(numbers, (np.ndarray, np.generic)) and numbers.dtype.kind in "iu":
-            numbers = numbers.astype(float)[()]  # 40 kN of 16 bits are no -25536 N
+        if not isinstance(numbers, (int, float)) and np.asarray(numbers).dtype.kind in "iu":
+            numbers = np.asarray(numbers, dtype=float)[()]  # 40 kN of 16 bits are no -25536 N
         if self.zero:
             return (numbers + self.zero) * self.slope
         if self._plain:  # 700 mm are 700 / 1000 m, which 700 * 0.001 is not

@@ -135,7 +135,11 @@ class _Needs:
         names = {id(e): self._variables((e.left, e.right)) for e in dae.flat.equations if id(e) not in left}
         equal = {key for key in names if key not in kept and self._known_by_root(names[key])}
         ends = [self._variables([e]) for one in self.instants for e in one.expressions]
-        ends += [set(map(_base, self.asked)), set(dae.known)]
+        ends += [
+            set(map(_base, self.asked)),
+            set(dae.known),
+            {_base(n) for n in dae.choice.states if n in self.used},
+        ]
         counts = Counter(n for key in (*kept, *equal) for n in names[key])
         counts.update(n for end in ends for n in end)
         loose = True

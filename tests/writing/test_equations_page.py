@@ -255,3 +255,18 @@ def test_wide_formulas_have_spaces_to_be_broken_at():
     text = translate(SixLinkGantryTau(prototypes.D1)).equations("html")
     for formula in re.findall(r"<math>.*?</math>", text):
         assert len(re.sub("<[^>]*>", "", formula)) < 150  # letters in numerator and denominator, side by side
+
+
+def test_what_is_a_multiple_of_a_state_is_told_as_it_was_written():
+    class Geared(Model):
+        a = Real(start=1.0)
+        b, c, beside = Real(), Real(), Real()
+
+        def equations(self):
+            yield self.b == 2 * self.a
+            yield self.c == -self.b
+            yield self.beside == 3 * self.a
+            yield der(self.a) == -self.a
+
+    found = excerpt(translate(Geared(), find=["c"]))
+    assert [e.name for e in found.equations] == [f"the model (Geared), equation {k}" for k in (1, 2)]
