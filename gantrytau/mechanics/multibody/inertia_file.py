@@ -26,7 +26,9 @@ PRODUCTS = {
     (0, 2): ("Jxz", "J[0,2]", "Ixz", "Jzx", "J[2,0]", "Izx"),
     (1, 2): ("Jyz", "J[1,2]", "Iyz", "Jzy", "J[2,1]", "Izy"),
 }
-EXAMPLE = "name, m [kg], x [mm], y [mm], z [mm], Jxx [kg.mm2], Jyy, Jzz, Jxy, Jxz, Jyz"
+EXAMPLE = (
+    "name, m [kg], x [mm], y [mm], z [mm], Jxx [kg.mm2], and Jyy, Jzz, Jxy, Jxz, Jyz with this unit each"
+)
 ROUNDED = 1e-3  # of the trace, by which printed inertias may miss what a body can have, as Body allows
 SMALLEST = -1e-9  # of the trace: eigenvalues of a thin rod are zero
 FAR = 50.0  # m, a radius of gyration above which a unit is wrong
@@ -82,7 +84,7 @@ def read_inertias(
     about: Literal["centre", "frame"] = "centre",
     products: Literal["tensor", "integrals"] = "tensor",
 ) -> Inertias:
-    """Bodies of a CSV file: a line for each, named columns with units, `m [kg]`, `x [mm]`, `Jxx [kg.mm2]`; SI without one.
+    """Bodies of a CSV file: a line for each, named columns with units, `m [kg]`, `x [mm]`, `Jxx [kg.mm2]`; SI without any.
 
     Columns: name; m; x, y, z of the centre of mass in the frame of the body, 0 if all three are missing; Jxx, Jyy, Jzz, Jxy,
     Jxz, Jyz of the inertia along the axes of that frame, the last three 0 if all are missing. Others are left alone. Cells
@@ -142,6 +144,8 @@ class _Columns:
         self.centre = self._all_or_none(CENTRE, "m")
         self.diagonal = [self._place(names, "kg.m2") for names in DIAGONAL]
         self.products = self._all_or_none(tuple(PRODUCTS.values()), "kg.m2")
+        for places in (self.centre or [], [*self.diagonal, *(self.products or [])]):
+            self._check_units(places)
 
     def _found(self, names: tuple[str, ...], unit: str | None = None) -> int | None:
         """The place of a column by one of its names, in any letters; ModelError for two, and for another unit."""
@@ -171,6 +175,17 @@ class _Columns:
                 f"{self.file}: found no column {lost}, expected {', '.join(each[0] for each in names)}, all or none"
             )
         return places or None
+
+    def _check_units(self, places: list[int]) -> None:
+        """ModelError for columns of one kind of which some have a unit: nobody means a y in m beside an x in mm."""
+        units = {self.header[place]: self.scales[place] for place in places}
+        said = next(((name, unit.text) for name, unit in units.items() if unit is not None), None)
+        bare = [name for name, unit in units.items() if unit is None]
+        if said is not None and bare:
+            raise ModelError(
+                f"{self.file}: found {said[0]} in {said[1]} and {', '.join(bare)} without a unit, expected units of all "
+                f"of them or of none; write '{bare[0]} [{said[1]}]'"
+            )
 
     def numbers(self, line: int, row: list[str], places: list[int] | None) -> np.ndarray:
         """The numbers of three columns in SI, zeros where there are none; ModelError for what is empty or not finite."""

@@ -148,6 +148,8 @@ def moments(*three: float) -> np.ndarray:
         ([HEADER.replace("m [kg]", "m [mm]"), line("bar", MASS, CENTRE, J)], "found 'mm', a length, expected a mass in kg"),
         ([HEADER.replace("m [kg]", "m [kgs]"), line("bar", MASS, CENTRE, J)], "there is no unit 'kgs'"),
         ([HEADER.replace("m [kg]", "weight"), line("bar", MASS, CENTRE, J)], "found no column m, expected name, m [kg]"),
+        ([HEADER.replace("z [mm]", "z"), line("bar", MASS, CENTRE, J)], "found x in mm and z without a unit, expected"),
+        ([HEADER.replace("Jxz [kg.mm2]", "Jxz"), line("bar", MASS, CENTRE, J)], "write 'Jxz [kg.mm2]'"),
         ([HEADER.replace("y [mm]", "why"), line("bar", MASS, CENTRE, J)], "no column y, expected x, y, z, all or none"),
         ([HEADER.replace("Jxz", "Jyx"), line("bar", MASS, CENTRE, J)], "found the columns Jyx and Jxy, expected one"),
     ],
