@@ -90,11 +90,25 @@ def test_its_files_are_written_in_the_style_of_this_project(project):
         assert ast.get_docstring(ast.parse(text)) or name == "notebook.py"
     options = ["--line-length", "110", "--isolated", str(project)]
     found = subprocess.run(
-        ["ruff", "format", "--check", *options], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "ruff", "format", "--check", *options],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert found.returncode == 0, found.stdout
     found = subprocess.run(
-        ["ruff", "check", "--select", "E,F,W", "--line-length", "125", "--isolated", str(project)],
+        [
+            sys.executable,
+            "-m",
+            "ruff",
+            "check",
+            "--select",
+            "E,F,W",
+            "--line-length",
+            "125",
+            "--isolated",
+            str(project),
+        ],
         capture_output=True,
         text=True,
         check=False,
