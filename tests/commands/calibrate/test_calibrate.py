@@ -120,7 +120,7 @@ def test_values_say_of_which_prototype_they_are(run, measured, poses, tmp_path):
     ("text", "words"),
     [
         ("[[arms]]\nlenght = 2.0\n", "did you mean 'length'"),
-        ("plate_mass = 'heavy'\n", "found plate_mass = 'heavy', expected a number"),
+        ("plate_mass = 'heavy'\n", "plate_mass: found 'heavy', expected a number and its unit, as '2.5 mm'"),
         ("plate_mass = \n", "cannot be read as TOML"),
         ("", "found no values"),
         (None, "there is no such file"),
@@ -238,7 +238,7 @@ def test_another_robot_and_too_few_poses(fails, measured, poses):
             ("--constraint", "length"),
             "--constraint length: expected NAME=VALUE, NAME=[LEAST,MOST] or NAME=NAME",
         ),
-        (("--constraint", "length=2=3"), "expected a number"),
+        (("--constraint", "length=2=3"), "unit '=3': cannot read '=3'"),
         (("--constraint", "a=1", "--constraint", "a=2"), "found a twice"),
         (("--prior", "length=[1,2,3]"), "or NAME=[VALUE,DEVIATION]"),
         (("--rails", "nowhere.csv"), "nowhere.csv: found no file to read"),

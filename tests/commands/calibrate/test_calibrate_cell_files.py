@@ -29,11 +29,11 @@ def test_the_example_is_printed(run, fails):
         (dict(tape=""), "robot.tape: found nothing, expected a length in m"),
         (
             dict(tape='tape = "5 deg"'),
-            'robot.tape: found "5 deg", expected a length in m; units are m, cm, mm, um',
+            'robot.tape: found "5 deg", expected a length in m; units are m, mm, cm, um, in',
         ),
         (dict(tape="tape = true"), "robot.tape: found True, expected a length in m"),
         (dict(tape="tape = 0"), "robot.tape: found 0, expected a length in m above 0"),
-        (dict(tape='tape = "1.2.3 mm"'), "expected a number and its unit"),
+        (dict(tape='tape = "1.2.3 mm"'), 'found "1.2.3 mm", expected a length in m; units are'),
         (dict(poses="poses = 4.5"), "goal.poses: found 4.5, expected a whole number"),
         (dict(poses="poses = 0"), "expected a whole number of at least 1"),
         (
