@@ -114,6 +114,12 @@ class ModelFunctions:
     def places(self) -> tuple[int, ...]:
         """The coordinates of the pose that the inverse is given: 0 to 2 of the position, 3 to 5 of the quaternion."""
         count = len(self.joints)
+        if count > 3 and f"{self.tool}.q" not in self.dae.vectors:
+            raise ModelError(
+                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, as the orientation follows "
+                "from joints in a row, expected a tool with coordinates of its own to be given a pose: "
+                f"{self.tool} = Body(..., free=True), or {self.tool}=dict(free=True) where it is made"
+            )
         if count == 6:
             return (0, 1, 2, 3, 4, 5)
         if count == 3:
