@@ -116,8 +116,8 @@ class ModelFunctions:
         count = len(self.joints)
         if count > 3 and f"{self.tool}.q" not in self.dae.vectors:
             raise ModelError(
-                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, as the orientation follows "
-                "from joints in a row, expected a tool with coordinates of its own to be given a pose: "
+                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, as the orientation "
+                "follows from joints in a row, expected a tool with coordinates of its own to be given a pose: "
                 f"{self.tool} = Body(..., free=True), or {self.tool}=dict(free=True) where it is made"
             )
         if count == 6:
