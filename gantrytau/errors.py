@@ -17,6 +17,12 @@ HINTS = {
 }
 
 
+USERS_ERRORS = (
+    Exception,
+    SystemExit,
+)  # what code of users raises: its sys.exit ends the call, not the caller
+
+
 class GantryTauError(Exception):
     """Base class of all errors of this toolkit.
 
@@ -88,7 +94,7 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     return f"; there is {shown}." if names else "."
 
 
-def in_words(error: Exception) -> str:
+def in_words(error: BaseException) -> str:
     """What an error of Python or CasADi says, in one line, with a remedy where one is known."""
     if isinstance(error, AttributeError) and error.obj is not None and error.name:
         names = [n for n in dir(error.obj) if not n.startswith("_")]
@@ -103,7 +109,7 @@ def in_words(error: Exception) -> str:
     return "; ".join([words.rstrip("."), *(text for key, text in HINTS.items() if key in str(error))][:2])
 
 
-def _index_in_words(error: Exception) -> str:
+def _index_in_words(error: BaseException) -> str:
     """An index out of an array: as the array and the index are written, and what there is."""
     sliced = re.search(r"start=(-?\d+), stop=(-?\d+).*supplied length of (\d+)", str(error))
     words = "out of bounds; expected an index below the length, from 0"
@@ -130,5 +136,5 @@ def told(place: str, evaluate: Callable[[], Any], within: str | None = None) -> 
         if within is not None and str(error).startswith((f"{within} (", f"{within}:", f"{within}.")):
             raise
         raise type(error)(f"{place}: {error}") from error
-    except Exception as error:  # of statements that are not ours
+    except USERS_ERRORS as error:  # of statements that are not ours
         raise ModelError(f"{place}: {in_words(error)}") from error

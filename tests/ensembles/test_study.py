@@ -1,6 +1,7 @@
 """Studies of models and functions: exact solutions, one answer wherever it is computed, cases that fail."""
 
 import os
+import sys
 from typing import Any
 
 import numpy as np
@@ -217,6 +218,8 @@ def test_mappings_become_variables_and_a_failed_case_is_not_a_number():
     def sides(a):
         if a == 2:
             raise ValueError("no triangle")
+        if a == 4:
+            sys.exit(1)
         return {"sum": a + 1.0, "powers": [a, a**2]}
 
     found = study(sides, over={"a": [1, 2, 3]})
@@ -226,6 +229,8 @@ def test_mappings_become_variables_and_a_failed_case_is_not_a_number():
     assert str(found.failures[0]) == "a=2: ValueError: no triangle"
     with pytest.raises(ModelError, match=r"sides: a=2 failed: ValueError: no triangle"):
         found.result(a=2)
+    (ended,) = study(sides, over={"a": [3, 4]}).failures
+    assert str(ended).startswith("a=4: SystemExit: the case called sys.exit(1), expected a value")
 
 
 def test_a_simulation_that_fails_is_a_row_and_not_the_end():

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import in_words
+from gantrytau.errors import USERS_ERRORS, in_words
 from gantrytau_fmu.controller.channels import Declaration, Values
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.timing import ClientCounts
@@ -82,6 +82,6 @@ class ClientLine:
             return None
         try:
             return call()
-        except Exception as error:  # of a client, which must not stop the robot
+        except USERS_ERRORS as error:  # of a client, which must not stop the robot
             self.failure = f"raised {type(error).__name__}: {in_words(error)}"
             return None

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, SolveError, in_words
+from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, in_words
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 
@@ -50,7 +50,7 @@ class ExternalKinematics(Record):
             found = self.function(pose)
             axes, status = found if isinstance(found, tuple) else (found, "")
             axes = np.asarray(axes, dtype=float).ravel()
-        except Exception as error:  # whatever a function of the user raises
+        except USERS_ERRORS as error:  # whatever a function of the user raises
             raise SolveError(
                 f"kinematics: raised {type(error).__name__}: {in_words(error)}; mend the function"
             ) from error

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Samples
-from gantrytau.errors import ModelError
+from gantrytau.errors import USERS_ERRORS, ModelError
 from gantrytau.inputs.input_signal import with_course
 from gantrytau.language.scales import given, scale
 
@@ -118,7 +118,7 @@ def _functions(name: str, function: Callable[[float], Any], count: int, begin: f
 def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
     try:
         value = function(t)
-    except Exception as error:  # whatever a function of the user raises
+    except USERS_ERRORS as error:  # whatever a function of the user raises
         raise ModelError(
             f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
             "at every time of the simulation",

@@ -16,7 +16,7 @@ from typing import Any
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.digests import digest
 from gantrytau.ensembles.workers.parcels import pack, unpack
-from gantrytau.errors import DoubtfulResult
+from gantrytau.errors import USERS_ERRORS, DoubtfulResult
 from gantrytau.progress import silent
 
 Task = Callable[[Case], Any]
@@ -82,10 +82,12 @@ def computed(task: Task, case: Case) -> Outcome:
         warnings.simplefilter("always", DoubtfulResult)
         try:
             found = Outcome(case.number, task(case))
-        except Exception as error:
+        except USERS_ERRORS as error:
             if getattr(error, "interrupted", False):
                 raise KeyboardInterrupt from error
             words = str(error) or type(error).__name__
+            if isinstance(error, SystemExit):
+                words = f"the case called sys.exit({error.code!r}), expected a value or an error; raise one"
             found = Outcome(case.number, error=words, kind=type(error).__name__)
     told = dict.fromkeys((warning.category, str(warning.message)) for warning in heard)
     return replace(found, told=tuple(told))

@@ -141,7 +141,9 @@ class Rig:
         if self._stiff is None and "tool.r" not in self.robot.vectors:
             return StraightAxes(self.joints)
         try:
-            return Kinematics(self.robot if self._stiff is None else self._stiff)
+            found = Kinematics(self.robot if self._stiff is None else self._stiff)
+            found.ik(found.home.r)
+            return found
         except StructureError:
             raise ModelError(
                 f"Rig: found {self.robot.name}, whose joints do not determine its tool, as it gives way; name the "

@@ -26,6 +26,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
 from gantrytau.describing.record import Record
+from gantrytau.errors import USERS_ERRORS
 from gantrytau.language.declarations import Formula
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.paths.fitting import (
@@ -178,7 +179,7 @@ class Path(Record):
             column = coordinates(function(u))
             first = ca.jacobian(column, u)
             evaluate = ca.Function("curve", [u], [column, first, ca.jacobian(first, u)])
-        except Exception as error:  # of a function that is not ours
+        except USERS_ERRORS as error:  # of a function that is not ours
             reason = str(error).splitlines()[-1] if str(error) else type(error).__name__
             raise ModelError(
                 f"{name}: {reason}; expected a function of one symbol that returns coordinates"

@@ -6,7 +6,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from gantrytau import ModelError, SolveError
-from gantrytau.errors import did_you_mean
+from gantrytau.errors import USERS_ERRORS, did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Problem, prepare_with
 from gantrytau_optimica.policy import TranscriptionKeywords, policy_of
@@ -184,7 +184,7 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
 def _value(label: str, quantity: Quantity, optimum: Optimum) -> float:
     try:
         value = float(quantity(optimum))
-    except Exception as error:  # of a function that is not ours
+    except USERS_ERRORS as error:  # of a function that is not ours
         raise ModelError(
             f"along {label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number",
             argument="along",

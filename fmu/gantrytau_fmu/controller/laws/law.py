@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError, did_you_mean, in_words
+from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau.language.units import dimension
 from gantrytau_fmu.controller.board import Board
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
@@ -71,7 +71,7 @@ class FunctionLaw:
         """See `Law.references`; SolveError where the function raises, or names what is no reference."""
         try:
             found = self._function(time, self._board.by_name())
-        except Exception as error:  # whatever a function of the user raises
+        except USERS_ERRORS as error:  # whatever a function of the user raises
             raise self._failure(f"raised {type(error).__name__}: {in_words(error)}; mend it", time) from error
         if not isinstance(found, Mapping):
             raise self._failure(f"answered {found!r}, expected {{name: value}} of references", time)

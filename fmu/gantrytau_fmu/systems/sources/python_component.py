@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError, SolveError, did_you_mean, in_words
+from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau_fmu.systems.component import Component, Scalar
 
 Function = Callable[[float, Mapping[str, Any]], Mapping[str, Any]]
@@ -155,7 +155,7 @@ class RunningFunction:
         taken = (*self.source.inputs, *self.source.parameters)
         try:
             found = self.source.function(self.time, {port.name: self._value(port) for port in taken})
-        except Exception as error:  # whatever a function of the user raises
+        except USERS_ERRORS as error:  # whatever a function of the user raises
             raise self._failure(f"raised {type(error).__name__}: {in_words(error)}; mend it") from error
         self._take(found)
         return self.get(wanted)

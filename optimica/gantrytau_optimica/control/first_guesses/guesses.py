@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError, Result
+from gantrytau.errors import USERS_ERRORS
 from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built
@@ -131,7 +132,7 @@ def _one(
                 ]
             else:
                 arrays = [np.asarray(value, dtype=float)]
-        except Exception as error:  # of a function that is not ours
+        except USERS_ERRORS as error:  # of a function that is not ours
             raise ModelError(
                 f"guess {name}: {type(error).__name__}: {error}; expected a number, an array or a function of time"
             ) from error

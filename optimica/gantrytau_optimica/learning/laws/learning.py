@@ -36,17 +36,26 @@ class Stability(Record):
     """What a learning law does to corrections from run to run.
 
     sigma: largest singular value of M with all axes coupled; diagonal: that of each axis alone, (m,); parts: M, or one
-    matrix for each axis where axes do not move each other.
+    matrix for each axis where axes do not move each other; inside: the samples (n,) of the window, which are those of M.
     """
 
     sigma: float
     diagonal: np.ndarray
     parts: Sequence[np.ndarray] = field(repr=False)
+    inside: np.ndarray = field(repr=False)
 
     @cached_property
     def rho(self) -> float:
         """Spectral radius of M; seconds for a thousand samples."""
         return max(map(spectral_radius, self.parts))
+
+    def next(self, u: np.ndarray) -> np.ndarray:
+        """M u, what is left after a run of a difference u (N, m) in corrections, (N, m)."""
+        columns = u[self.inside].T.reshape(len(self.parts), -1)
+        rows = np.concatenate([part @ column for part, column in zip(self.parts, columns, strict=True)])
+        found = np.zeros_like(u)
+        found[self.inside] = rows.reshape(u.shape[1], -1).T
+        return found
 
     @property
     def stable(self) -> bool:
@@ -155,10 +164,11 @@ class Learning(Record):
         ModelError for systems that are not sampled with one period, and for a window that does not fit the run.
         """
         M, m = self.matrix(response, samples), axes_of(response)
+        inside = np.flatnonzero(self.window.weights(samples, period_of(response)))
         n = len(M) // m
         parts = M.reshape(m, n, m, n)
         own = [parts[i, :, i] for i in range(m)]
         alone = [norm(part) for part in own]
         if sum(map(np.count_nonzero, own)) == np.count_nonzero(M):  # axes do not move each other
-            return Stability(max(alone), np.array(alone), own)
-        return Stability(norm(M), np.array(alone), [M])
+            return Stability(max(alone), np.array(alone), own, inside)
+        return Stability(norm(M), np.array(alone), [M], inside)

@@ -15,6 +15,7 @@ from gantrytau_optimica.learning.laws.lifted import pulses, toeplitz_blocks
 from gantrytau_optimica.learning.runs.corrections import Corrections
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
+from gantrytau_optimica.learning.runs.run_checks import check_run
 
 SAMPLES = 6000  # of the experiment
 HELD = 5  # samples, for which the sequence keeps its value
@@ -127,7 +128,9 @@ def excited(
     ]
     u = np.vstack([np.zeros((REST, corrections.count)), np.column_stack(sequences)])
     r = np.tile(place, (len(u), 1))
-    return u, plant.run(*corrections.references(r, u, plant.period), seed=seed)
+    run = plant.run(*corrections.references(r, u, plant.period), seed=seed)
+    check_run(run, len(u), plant)
+    return u, run
 
 
 def arm_model(

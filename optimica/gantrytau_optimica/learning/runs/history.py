@@ -2,6 +2,8 @@
 
 import json
 import os
+import zipfile
+import zlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -11,8 +13,10 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
+from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.learning.laws.learning import Stability
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
+from gantrytau_optimica.learning.runs.foretold import not_as_foretold
 from gantrytau_optimica.learning.runs.history_tables import error_table, history_dataset
 from gantrytau_optimica.learning.runs.reference import Reference
 
@@ -33,8 +37,8 @@ class History(Record):
     joints; full: the samples (N,) by which errors are judged, (7.25); inputs: corrections (K + 1, N, m); q_ref, q:
     references and measured positions of the joints (K + 1, N, n); tool: measured (K + 1, N, 3), of the kinematics where
     nothing else measures it; estimates, wanted: of what is learnt from, (K + 1, N, m) and (N, m); next_input: corrections
-    (N, m) of the run that would follow; settings: words of what learnt; stability: foretold, None of a history that was
-    read.
+    (N, m) of the run that would follow; settings: words of what learnt, "since" the run from which this law learnt;
+    stability: foretold, None of a history that was read.
     """
 
     reference: Reference
@@ -65,6 +69,7 @@ class History(Record):
         lines = [repr(self)[1:-1]]
         if self.stability is not None:
             lines.append(str(self.stability))
+        lines += map(str, self.findings)
         lines.append("errors in % of the first run")
         lines.append("run " + "".join(f"{head:>{width}}" for head in heads))
         table = np.hstack([self.relative, self.tool_relative[:, tool]])
@@ -80,6 +85,14 @@ class History(Record):
     def corrected(self) -> np.ndarray:
         """Corrections of the joints (N, n) of the last run, however they were learnt: what a controller adds."""
         return self.q_ref[-1] - self.q_ref[0]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What came otherwise than foretold: "foretold", with the runs whose corrections did not follow the response."""
+        if self.stability is None:
+            return ()
+        u, first = np.concatenate([self.inputs, self.next_input[None]]), self.settings.get("since", 0)
+        return not_as_foretold(u[first:], self.stability, first)
 
     def error(self, k: int = -1) -> np.ndarray:
         """What is wanted less what was estimated in run k, (N, m): (7.23) or (7.24)."""
@@ -167,9 +180,10 @@ class History(Record):
             return cls(reference=reference, **about, **arrays)
         except FileNotFoundError:
             raise ModelError(f"{path}: found no such file, expected a history of learning") from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise ModelError(
-                f"{path}: found a file that is no history of learning ({error}), expected one that History.save wrote"
+                f"{path}: found a file that is no history of learning ({error}), expected one that History.save wrote; "
+                "if it was cut off or damaged, remove it to begin anew"
             ) from None
 
     def save_corrections(self, path: str | os.PathLike[str]) -> Path:

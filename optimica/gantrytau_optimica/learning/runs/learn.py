@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, Result
+from gantrytau.errors import USERS_ERRORS
 from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
 from gantrytau_optimica.learning.estimators.estimators import Actuators
 from gantrytau_optimica.learning.laws.learning import Learning, Stability
@@ -19,7 +20,13 @@ from gantrytau_optimica.learning.runs.estimated_response import estimated_respon
 from gantrytau_optimica.learning.runs.history import History
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
-from gantrytau_optimica.learning.runs.run_checks import check_history, check_kinds, check_runs, check_window
+from gantrytau_optimica.learning.runs.run_checks import (
+    check_history,
+    check_kinds,
+    check_run,
+    check_runs,
+    check_window,
+)
 
 RUNS = 100  # seeds apart, so that no two runs of a trial draw the same
 
@@ -63,6 +70,7 @@ def learn(
     so_far, path = _kept(history)
     found = so_far or _started(rig, reference, learning, estimator, corrections)
     check_history(found, reference, corrections)
+    found = _under(learning, found)
     if response is None:
         response = estimated_response(rig, reference, estimator, seed=RUNS * seed)
     learning = learning.with_response(response)
@@ -83,6 +91,25 @@ def _kept(history: History | str | os.PathLike[str] | None) -> tuple[History | N
         return history, None
     path = Path(history)
     return (History.load(path) if path.exists() else None), path
+
+
+def _under(learning: Learning, found: History) -> History:
+    """A history that goes on under this law: errors are judged where all corrections applied in full.
+
+    Raises ModelError where the windows of both laws have no sample in common.
+    """
+    if found.settings.get("learning") == repr(learning):
+        return found
+    full = found.full & learning.window.full(len(found.full), found.reference.period)
+    if not full.any():
+        raise ModelError(
+            "learn: found a window that nowhere applies in full where that of the history does, expected samples by which "
+            "runs before and behind are judged; take the window of the history, or start without history",
+            argument="learning",
+        )
+    return replace(
+        found, full=full, settings=found.settings | dict(learning=repr(learning), since=len(found))
+    )
 
 
 def judged(learning: Learning, response: Response, samples: int, count: int, period: float) -> Stability:
@@ -131,15 +158,16 @@ def _next_run(
     try:
         q_ref, v_ref = corrections.references(so_far.reference.r, u, rig.period)
         run = rig.run(q_ref, v_ref, seed=seed)
+        check_run(run, len(so_far.reference), rig)
         estimate = estimator.estimate(run, rig.kinematics)[:, list(corrections.picked)]
         following = learning.next(u, so_far.wanted - estimate, rig.period)
-    except (GantryTauError, KeyboardInterrupt) as error:
+    except (*USERS_ERRORS, KeyboardInterrupt) as error:  # of a plant that is not ours
         pressed = isinstance(error, KeyboardInterrupt)
         raise LearningError(
             f"learn: run {k} {'was interrupted' if pressed else 'failed'}, the {k} before it stand in .history"
-            + ("" if pressed else f": {error}"),
+            + ("" if pressed else f": {error if isinstance(error, GantryTauError) else repr(error)}"),
             history=so_far if k else None,
-            argument=None if pressed else error.argument,
+            argument=getattr(error, "argument", None),
         ) from error
     found = so_far.with_run(
         inputs=u,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Result
 from gantrytau_optimica.learning.estimators.estimator import Estimator
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.runs.corrections import Corrections
@@ -55,6 +55,18 @@ def check_runs(verb: str, rig: Plant, reference: Reference, **counts: int) -> No
             f"{verb}: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "
             "again",
             argument="reference",
+        )
+
+
+def check_run(run: Result, samples: int, plant: Plant) -> None:
+    """Raises ModelError for a run of another length than its reference, or without the positions of the joints."""
+    place = f"{type(plant).__name__}.run"
+    if "measured.q" not in run.names and "measured.q[0]" not in run.names:
+        raise ModelError(f"{place}: found no measured.q, expected the measured positions of the joints")
+    if len(run.time) != samples:
+        raise ModelError(
+            f"{place}: found {len(run.time)} rows, expected {samples}, one for each of the reference",
+            argument="rig",
         )
 
 

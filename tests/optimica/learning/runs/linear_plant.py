@@ -26,23 +26,36 @@ RESPONSE = [servo(*each) for each in SERVOS]
 
 
 class LinearPlant:
-    """fails: the number of the run that breaks down; swing: of the tool beside stiff arms, Hz and damping."""
+    """fails: the number of the run that breaks down; swing: of the tool beside stiff arms, Hz and damping; late: samples
+    by which servos answer later than (6.11); limit: of what they answer to, m; lost: rows at the end of a run.
+    """
 
     period = PERIOD
     kinematics = KINEMATICS
 
     def __init__(
-        self, noise: float = 0.0, fails: int | None = None, swing: tuple[float, float] | None = None
+        self,
+        noise: float = 0.0,
+        fails: int | None = None,
+        swing: tuple[float, float] | None = None,
+        *,
+        late: int = 0,
+        limit: float = np.inf,
+        lost: int = 0,
     ):
         self.noise, self.fails, self.swing, self.runs = noise, fails, swing, 0
+        self.late, self.limit, self.lost = late, limit, lost
 
     def run(self, position: np.ndarray, velocity: np.ndarray, seed: int = 0) -> Result:
         if self.runs == self.fails:
             raise KeyboardInterrupt
         self.runs += 1
-        moved = position - position[0]
+        moved = np.clip(position - position[0], -self.limit, self.limit)
         q = np.column_stack(
-            [lfilter([*np.zeros(DELAY), b], [1, -a], x) for (b, a), x in zip(SERVOS, moved.T, strict=True)]
+            [
+                lfilter([*np.zeros(DELAY + self.late), b], [1, -a], x)
+                for (b, a), x in zip(SERVOS, moved.T, strict=True)
+            ]
         )
         q = position[0] + q + self.noise * np.random.default_rng(seed).standard_normal(q.shape)
         r = KINEMATICS.fk(q)[0]
@@ -51,8 +64,9 @@ class LinearPlant:
             a1, a2 = 2 * np.exp(-d * w) * np.cos(w * np.sqrt(1 - d**2)), -np.exp(-2 * d * w)
             r = r[0] + lfilter([0, 1 - a1 - a2], [1, -a1, -a2], r - r[0], axis=0)
         columns = {"measured.q": q, "measured.r": r, "q_ref": position}
-        values = {f"{name}[{k}]": x for name, array in columns.items() for k, x in enumerate(array.T)}
-        return Result(PERIOD * np.arange(len(q)), values)
+        rows = len(q) - self.lost
+        values = {f"{name}[{k}]": x[:rows] for name, array in columns.items() for k, x in enumerate(array.T)}
+        return Result(PERIOD * np.arange(rows), values)
 
 
 def line(samples: int = 400, length: float = 0.01) -> Reference:

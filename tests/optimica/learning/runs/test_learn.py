@@ -108,6 +108,44 @@ def test_what_would_diverge_is_refused_and_runs_by_force():
     assert learn(plant, line(), low, Measured(), iterations=14).relative[-1, 0] < 20
 
 
+@pytest.mark.parametrize("differs", [dict(late=25), dict(limit=2e-3), dict(noise=5e-3)], ids=str)
+def test_a_plant_that_answers_otherwise_than_foretold_is_told(differs):
+    """A delay, a limit, and runs that do not repeat, beside the response of (6.11); its own plant is told of nothing."""
+    asked: dict[str, Any] = dict(iterations=6, response=RESPONSE)
+    history = learn(LinearPlant(**differs), line(), Learning(window=WINDOW), **asked)
+    (finding,) = history.findings
+    assert finding.kind == "foretold"
+    assert "otherwise than the response foretells" in str(history)
+    assert learn(LinearPlant(1e-5), line(), Learning(window=WINDOW), **asked).findings == ()
+
+
+def test_a_run_of_another_length_is_told():
+    with pytest.raises(LearningError, match=r"LinearPlant\.run: found 397 rows, expected 400"):
+        learn(LinearPlant(lost=3), line(), Learning(window=WINDOW), response=RESPONSE)
+    with pytest.raises(ModelError, match=r"LinearPlant\.run: found 6097 rows, expected 6100"):
+        estimated_response(LinearPlant(lost=3), line(), Actuators())
+
+
+def test_a_history_goes_on_under_another_law_and_is_judged_where_both_apply():
+    asked: dict[str, Any] = dict(response=RESPONSE)
+    first = learn(LinearPlant(), line(), Learning(window=WINDOW), iterations=2, **asked)
+    narrow = Learning(window=Tukey(0.4, lead=0.2), gain=0.5)
+    found = learn(LinearPlant(), line(), narrow, iterations=5, history=first, **asked)
+    assert found.settings["learning"] == repr(narrow)
+    assert found.settings["since"] == 3
+    assert np.array_equal(found.full, first.full & narrow.window.full(400, PERIOD))
+    assert found.findings == ()
+    with pytest.raises(ModelError, match="nowhere applies in full where that of the history does"):
+        learn(
+            LinearPlant(),
+            line(),
+            Learning(window=Tukey(1.35, lead=0.1)),
+            history=first,
+            iterations=3,
+            **asked,
+        )
+
+
 def test_histories_on_file_go_on_where_they_ended(tmp_path):
     file = tmp_path / "history.npz"
     asked: dict[str, Any] = dict(response=RESPONSE, seed=2)
@@ -228,6 +266,19 @@ def test_files_that_are_no_history_are_refused(tmp_path):
     other.write_text("nothing")
     with pytest.raises(ModelError, match="no history of learning"):
         History.load(other)
+    whole = (
+        learn(LinearPlant(), line(), Learning(window=WINDOW), response=RESPONSE, iterations=1)
+        .save(other)
+        .read_bytes()
+    )
+    for damaged in (
+        whole[: len(whole) // 2],
+        whole[:-40] + bytes(40),
+        whole[:2000] + b"\1\2\3\4" + whole[2004:],
+    ):
+        other.write_bytes(damaged)
+        with pytest.raises(ModelError, match="no history of learning"):
+            History.load(other)
     with pytest.raises(ModelError, match="no such file"):
         History.load(tmp_path / "none.npz")
 

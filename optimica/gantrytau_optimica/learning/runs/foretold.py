@@ -1,0 +1,32 @@
+"""Corrections of a plant held against what its response foretells: u_{k+1} = M u_k + ..., Dressler (2012), (7.16)."""
+
+import numpy as np
+
+from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.learning.laws.learning import Stability
+
+LEFT = 0.3  # of the corrections: noise and friction leave 0.03 to 0.1 on the flexible robot, another plant 0.4 and more
+
+
+def not_as_foretold(u: np.ndarray, stability: Stability, first: int) -> tuple[Finding, ...]:
+    """A finding "foretold" where corrections u (K + 1, N, m) of one law, from run `first` on, do not follow the response.
+
+    On a linear plant that repeats itself u_{k+1} - u_1 = M (u_k - u_0).
+    """
+    moved = [(u[k] - u[0], u[k + 1] - u[1]) for k in range(1, len(u) - 1) if np.any(u[k] != u[0])]
+    left = [np.linalg.norm(b - stability.next(a)) / np.linalg.norm(a) for a, b in moved]
+    kept = [np.linalg.norm(b) / np.linalg.norm(a) for a, b in moved]
+    rows = np.flatnonzero(np.array(left) > LEFT)
+    if not rows.size:
+        return ()
+    k = int(rows[-1])
+    return (
+        Finding(
+            "foretold",
+            first + 1 + rows,
+            f"run {first + 1 + k} left {kept[k]:.2f} of its corrections to the next, {left[k]:.0%} of them otherwise than the "
+            f"response foretells (at most {stability.sigma:.2f} in all): it is the response of another plant, forces or speeds "
+            "are at a limit, or runs do not repeat themselves; measure the response again (response=None), look at the forces, "
+            "or take `repeat`",
+        ),
+    )
