@@ -139,7 +139,7 @@ def _used(there: Mapping[str, Any], words: Iterable[str]) -> dict[str, Any]:
 
 
 def _steady(thing: Any) -> bool:
-    """Whether a value of a module is code or numbers; what a function fills as it runs, such as a cache of models, is not."""
+    """Whether a value of a module is code or numbers; what a function fills as it runs, as a cache of models, is not."""
     if isinstance(thing, (list, tuple, dict, set, frozenset)):
         return bool(thing) and all(map(_steady, thing.values() if isinstance(thing, dict) else thing))
     return isinstance(thing, STEADY) or is_dataclass(thing) or hasattr(thing, "__wrapped__")
